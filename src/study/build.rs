@@ -9,7 +9,7 @@ use super::folder::{StudyFolder, read_json, write_json};
 use super::plan::{FilmContent, StudyKey, StudyPlan};
 use super::preregistration::Preregistration;
 use super::seal::StudySeal;
-use super::stimuli::cut::{RefusedSegment, StudyClip};
+use super::stimuli::cut::{RejectedSegment, StudyClip};
 use super::stimuli::film::{check_encoder, film_name};
 use super::stimuli::filmed_speaker::{CutSpeaker, FilmedSpeaker, normalise_loudness};
 use anyhow::{Context, Result, ensure};
@@ -42,7 +42,7 @@ pub struct BuiltStudy {
     pub speakers: Vec<BuiltSpeaker>,
 }
 
-/// File that describes the clips, in the folder of their sounds.
+/// File that describes the clips, in the folder of their audio.
 const CLIPS_FILE: &str = "clips.json";
 
 /// Clips of a speaker.
@@ -51,7 +51,8 @@ pub struct BuiltSpeaker {
     pub name: String,
     pub clips: Vec<StudyClip>,
     /// Segments of speech from which no clip could be cut.
-    pub refused: Vec<RefusedSegment>,
+    #[serde(alias = "refused")]
+    pub rejected: Vec<RejectedSegment>,
 }
 
 /// Builds the study of `file` in the folder `out`, with films of `size` px, width and height
@@ -62,13 +63,13 @@ pub struct BuiltSpeaker {
 pub fn build(file: &StudyFile, out: &Path, size: [usize; 2], progress: &dyn Progress) -> Result<BuiltStudy> {
     check_encoder()?;
     let folder = StudyFolder::new(out);
-    ensure!(!out.is_file(), "{} is a file; name a folder for the study", out.display());
+    ensure!(!out.is_file(), "{} is a file: expected a folder for the study (--out)", out.display());
     let _lock = lock(out)?;
     if folder.seal().exists() {
         return existing_study(file, &folder);
     }
     let has_responses = folder.responses().exists();
-    ensure!(!has_responses, "{} has responses: build into another folder (--out)", out.display());
+    ensure!(!has_responses, "{} contains responses: build into another folder (--out)", out.display());
     let n_clips = |speaker: &StudySpeaker| speaker.clips.unwrap_or_else(|| ClipNeeds::of(file).total());
     let rank = |clip: &str| -> u64 {
         let hash = blake3::hash(format!("{} clip {clip}", file.seed).as_bytes());
@@ -96,11 +97,11 @@ pub fn build(file: &StudyFile, out: &Path, size: [usize; 2], progress: &dyn Prog
     let filmed: BTreeMap<String, FilmedSpeaker> = filmed.collect::<Result<_>>()?;
     let mut key = StudyKey { films: BTreeMap::new() };
     let designed = design(file, &clips, &mut |mut content| {
-        let speaker = filmed.get(&content.speaker).with_context(|| format!("no speaker {}", content.speaker))?;
+        let speaker = filmed.get(&content.speaker).with_context(|| format!("unknown speaker {}", content.speaker))?;
         content.motion_of = speaker.motion_of(&content)?;
         let name = film_name(file.seed, &content);
         let is_unique = key.films.insert(name.clone(), content.clone()).is_none_or(|other| other == content);
-        ensure!(is_unique, "two films are called {name}: choose another seed");
+        ensure!(is_unique, "two films have the name {name}: choose another seed");
         Ok(name)
     })?;
     let rendered = render_films(&folder, &key, &filmed, progress)?;
@@ -124,7 +125,7 @@ fn existing_study(file: &StudyFile, folder: &StudyFolder) -> Result<BuiltStudy> 
     let existing = StudyFile::read(&folder.study_file())?;
     ensure!(
         existing == *file,
-        "{} is sealed, and {} in it is not this study: build into another folder (--out)",
+        "{} is sealed, and {} differs from this study file: build into another folder (--out)",
         folder.dir().display(),
         folder.study_file().display()
     );
@@ -146,7 +147,7 @@ impl ClipReport {
     fn built(self, folder: &StudyFolder, up_to_date: bool, balance: Vec<String>) -> Result<BuiltStudy> {
         let plan: StudyPlan = read_json(&folder.plan())?;
         let key: StudyKey = read_json(&folder.key())?;
-        let first = key.films.keys().next().context("the study has no film")?;
+        let first = key.films.keys().next().context("the study has no films")?;
         let film = folder.film(first);
         Ok(BuiltStudy {
             folder: folder.dir().to_owned(),
@@ -165,8 +166,8 @@ impl ClipReport {
 
 impl BuiltSpeaker {
     fn of(speaker: &CutSpeaker) -> Self {
-        let (clips, refused) = (speaker.cut.clips.clone(), speaker.cut.refused.clone());
-        Self { name: speaker.name().to_owned(), clips, refused }
+        let (clips, rejected) = (speaker.cut.clips.clone(), speaker.cut.rejected.clone());
+        Self { name: speaker.name().to_owned(), clips, rejected }
     }
 }
 
@@ -191,10 +192,10 @@ fn render_films(
     progress: &dyn Progress,
 ) -> Result<BTreeMap<String, PathBuf>> {
     let dir = unpublished_films_dir(folder);
-    fs::create_dir_all(&dir).with_context(|| format!("cannot make the folder {}", dir.display()))?;
+    fs::create_dir_all(&dir).with_context(|| format!("cannot create the folder {}", dir.display()))?;
     let task = progress.begin("films", key.films.len() as u64);
     let film = |(name, content): (&String, &FilmContent)| -> Result<(String, PathBuf)> {
-        let speaker = speakers.get(&content.speaker).with_context(|| format!("no speaker {}", content.speaker))?;
+        let speaker = speakers.get(&content.speaker).with_context(|| format!("unknown speaker {}", content.speaker))?;
         let performance = speaker.performance(content)?;
         let scene = speaker.scene(content, &performance);
         let path = dir.join(format!("{}.mp4", scene.hash()));
@@ -253,7 +254,7 @@ pub fn common_bytes(lengths: impl IntoIterator<Item = usize>) -> usize {
 pub fn padded(mut film: Vec<u8>, n_bytes: usize) -> Result<Vec<u8>> {
     let missing = n_bytes.checked_sub(film.len()).filter(|missing| *missing >= BOX_HEADER_BYTES);
     let size = missing.and_then(|missing| u32::try_from(missing).ok());
-    let size = size.with_context(|| format!("{} bytes cannot become {n_bytes}", film.len()))?;
+    let size = size.with_context(|| format!("cannot pad a film of {} bytes to {n_bytes} bytes", film.len()))?;
     film.extend(size.to_be_bytes());
     film.extend(b"free");
     film.resize(n_bytes, 0);

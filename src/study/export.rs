@@ -105,7 +105,13 @@ impl JoinedPlan {
     }
 
     fn vote(&self, participant: &Participant, answer: SubmittedAnswer) -> Result<StudyVote> {
-        let context = || format!("answer {} of {}: not in plan.json and key.json", answer.position + 1, participant.id);
+        let context = || {
+            format!(
+                "answer {} of the participant {} is not in plan.json and key.json: restore the files of the build",
+                answer.position + 1,
+                participant.id
+            )
+        };
         let session = self.plan.sessions.get(participant.session as usize).with_context(context)?;
         let trial = session.trials.get(answer.position as usize).with_context(context)?;
         let task = self.plan.tasks.get(trial.task).with_context(context)?;

@@ -13,7 +13,7 @@ use std::path::{Path, PathBuf};
 pub fn read_json<T: DeserializeOwned>(path: &Path) -> Result<T> {
     let bytes = std::fs::read(path).with_context(|| format!("cannot read {}", path.display()))?;
     serde_json::from_slice(&bytes)
-        .with_context(|| format!("{} is not as `orator study build` writes it", path.display()))
+        .with_context(|| format!("{} is damaged: expected the file as written by `orator study build`", path.display()))
 }
 
 /// Writes a JSON file of a study atomically.

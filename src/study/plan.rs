@@ -44,7 +44,7 @@ pub struct StudyPlan {
     /// Opaque name of the film of the sound check before the first trial; empty if there is none.
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub sound_check: String,
-    /// One session per participant, in the order of assignment. Sessions beyond the wanted number of participants
+    /// One session per participant, in the order of assignment. Sessions beyond the target number of participants
     /// replace participants who withdraw or are excluded.
     pub sessions: Vec<PlannedSession>,
 }

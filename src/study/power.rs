@@ -2,7 +2,7 @@
 //! chance and the crossed equivalence test. More participants cannot compensate for too few clips; the result reports
 //! when the power stays below the requirement.
 
-use super::analyse::number_format::percent;
+use super::analyse::number_format::{percent, points};
 use super::analyse::outcome::BinaryVote;
 use super::analyse::result::{ShareAnalysis, ShareMeasure, StatisticSettings};
 use super::analyse::share::{CHANCE, ShareCell, share};
@@ -12,6 +12,7 @@ use super::stats::equivalence::votes_needed;
 use super::stats::estimate::ConfidenceInterval;
 use super::stats::proportion::BinomialCount;
 use anyhow::{Result, ensure};
+use orator_base::text::counted;
 use rayon::prelude::*;
 use serde::Serialize;
 use statrs::distribution::{ContinuousCDF, Normal};
@@ -81,16 +82,34 @@ pub struct PowerPlan {
 /// # Errors
 /// A quantity of `question` is out of its range.
 pub fn plan(question: &PowerQuestion, on_row: &(dyn Fn(&PowerRow) + Sync)) -> Result<PowerPlan> {
-    ensure!(question.n_trials > 0 && question.n_clips > 1, "a participant has at least one trial, a study two clips");
+    ensure!(
+        question.n_trials > 0 && question.n_clips > 1,
+        "expected at least one trial per participant and at least two clips"
+    );
     let (trials, clips) = (question.n_trials, question.n_clips);
-    let few = "a participant sees no clip twice; give more clips or fewer trials";
-    ensure!(trials <= clips, "{trials} trials of {clips} clips: {few}");
-    ensure!((0.1..1.0).contains(&question.power), "the power is a share from 0.1 to below 1");
-    ensure!((0.001..=0.499).contains(&(question.effect - CHANCE).abs()), "the effect is a share other than 0.5");
-    ensure!((0.001..0.5).contains(&question.bound), "the bound is a share below 0.5");
-    ensure!((100..=100_000).contains(&question.n_simulations), "simulations are 100 to 100000");
+    let hint = "a participant sees no clip twice; use more clips or fewer trials";
+    ensure!(trials <= clips, "{trials} trials with only {clips} clips: {hint}");
+    ensure!((0.1..1.0).contains(&question.power), "invalid power {}: expected 0.1 to below 1", question.power);
+    ensure!(
+        (0.001..=0.499).contains(&(question.effect - CHANCE).abs()),
+        "invalid effect {}: expected a share other than 50 %",
+        percent(question.effect)
+    );
+    ensure!(
+        (0.001..0.5).contains(&question.bound),
+        "invalid bound {}: expected 0.1 to below 50 percentage points",
+        points(question.bound)
+    );
+    ensure!(
+        (100..=100_000).contains(&question.n_simulations),
+        "invalid number of simulations {}: expected 100 to 100000",
+        question.n_simulations
+    );
     let deviations = [question.sd_participants, question.sd_clips];
-    ensure!(deviations.iter().all(|sd| (0.0..=5.0).contains(sd)), "standard deviations are 0 to 5 log odds");
+    ensure!(
+        deviations.iter().all(|sd| (0.0..=5.0).contains(sd)),
+        "invalid standard deviations {deviations:?}: expected 0 to 5 log odds"
+    );
     let z = |share: f64| Normal::standard().inverse_cdf(share);
     let naive = ((z(1.0 - LEVEL / 2.0) + z(question.power)) / (question.effect - CHANCE)).powi(2) / 4.0;
     let found = |analysis: &ShareAnalysis| {
@@ -184,21 +203,31 @@ fn curve(
 pub fn text(plan: &PowerPlan) -> String {
     let question = &plan.question;
     let mut text = format!(
-        "{} votes a participant, {} clips; standard deviations of log odds: participants {:.2}, clips {:.2}\n\
-         {} simulated studies a row, tests at 5 % with participants and clips crossed\n",
-        question.n_trials, question.n_clips, question.sd_participants, question.sd_clips, question.n_simulations
+        "{} per participant, {}; standard deviations of log odds: participants {:.2}, clips {:.2}\n\
+         {} simulated studies per row, tests at 5 % with crossed participants and clips\n",
+        counted(question.n_trials, "vote"),
+        counted(question.n_clips, "clip"),
+        question.sd_participants,
+        question.sd_clips,
+        question.n_simulations
     );
     let curves = [
-        (&plan.difference, format!("a true share of {} is found different from 50 %", percent(question.effect))),
+        (
+            &plan.difference,
+            format!("probability that a true share of {} is found to differ from 50 %", percent(question.effect)),
+        ),
         (
             &plan.equivalence,
-            format!("a true share of 50 % is found equivalent within \u{b1}{} points", 100.0 * question.bound),
+            format!(
+                "probability that a true share of 50 % is found equivalent within \u{b1}{} percentage points",
+                points(question.bound)
+            ),
         ),
     ];
-    for (curve, what) in curves {
-        let _ = writeln!(text, "\n{what}\n  participants    votes    power    95 % interval");
+    for (curve, title) in curves {
+        let _ = writeln!(text, "\n{title}\n  participants    votes    power    95 % interval");
         for row in &curve.rows {
-            let mark = if Some(row.n_participants) == curve.n_participants { "  <- enough" } else { "" };
+            let mark = if Some(row.n_participants) == curve.n_participants { "  <- sufficient" } else { "" };
             let PowerRow { n_participants, n_votes, .. } = row;
             let [power, low, high] = [row.power, row.ends.low, row.ends.high].map(percent);
             let _ = writeln!(text, "  {n_participants:>12} {n_votes:>8} {power:>8}    {low} to {high}{mark}");
@@ -206,13 +235,13 @@ pub fn text(plan: &PowerPlan) -> String {
         text += &match curve.n_participants {
             Some(n) => format!("  {n} participants for a power of {}\n", percent(question.power)),
             None => format!(
-                "  not with {MAX_PARTICIPANTS} participants: the {} clips leave too much to chance; take more clips\n",
+                "  not reached with {MAX_PARTICIPANTS} participants: {} clips are too few; use more clips\n",
                 question.n_clips
             ),
         };
         let (n, PowerRow { n_participants, power, .. }) = (curve.naive_votes, curve.at_naive);
-        let needed = format!("{n} votes ({n_participants} participants), whose actual power is {}", percent(power));
-        let _ = writeln!(text, "  the formula for independent votes asks for {needed}");
+        let needed = format!("{n} votes ({n_participants} participants), with an actual power of {}", percent(power));
+        let _ = writeln!(text, "  the formula for independent votes requires {needed}");
     }
     text
 }
@@ -243,7 +272,7 @@ mod tests {
         assert!(plan.difference.at_naive.power < 0.9 && plan.difference.naive_votes > 300, "{:?}", plan.difference);
         assert_eq!(plan.equivalence.naive_votes, 271);
         assert!(plan.difference.rows.is_sorted_by_key(|row| row.n_participants));
-        assert!(text(&plan).contains("<- enough"), "{}", text(&plan));
+        assert!(text(&plan).contains("<- sufficient"), "{}", text(&plan));
     }
 
     #[test]

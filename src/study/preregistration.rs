@@ -84,14 +84,15 @@ impl Preregistration {
     /// The file is missing, damaged or of another version.
     pub fn read(path: &Path) -> Result<Self> {
         let bytes = std::fs::read(path).with_context(|| {
-            format!("cannot read the pre-registration {}; `orator study build` writes one", path.display())
+            format!("cannot read the pre-registration {}; `orator study build` creates it", path.display())
         })?;
-        let read: Self = serde_json::from_slice(&bytes)
-            .with_context(|| format!("{} is damaged: build the study again or restore the file", path.display()))?;
+        let read: Self = serde_json::from_slice(&bytes).with_context(|| {
+            format!("{} is damaged: restore the file or rebuild the study in a new folder", path.display())
+        })?;
         let (found, path) = (read.version, path.display());
         ensure!(
             found == VERSION,
-            "{path} has version {found} and this program reads {VERSION}: use the one that wrote it"
+            "{path} has version {found}, expected {VERSION}: use the version of orator that wrote it"
         );
         Ok(read)
     }
@@ -99,10 +100,10 @@ impl Preregistration {
 
 /// Description of the statistic that decides a hypothesis.
 fn statistic(claim: &StudyHypothesis, design: Option<TaskDesign>, alpha: f64) -> String {
-    let error = "with the standard error of participants and clips crossed and a t distribution";
+    let error = "with a standard error for crossed participants and clips and a t distribution";
     let share = match design {
-        Some(TaskDesign::Mismatch) => "share of votes for the matched film",
-        _ => "share of right responses",
+        Some(TaskDesign::Mismatch) => "share of votes for the matching film",
+        _ => "share of correct responses",
     };
     let test = match claim.kind {
         HypothesisKind::DiffersFromChance => format!("two-sided test of the {share} against 50 %, {error}"),
@@ -115,11 +116,11 @@ fn statistic(claim: &StudyHypothesis, design: Option<TaskDesign>, alpha: f64) ->
         }
         HypothesisKind::Differs => {
             let difference = match design {
-                Some(TaskDesign::Preference) => "mean preferred step of two conditions against 0",
+                Some(TaskDesign::Preference) => "mean preference step between two conditions against 0",
                 Some(TaskDesign::TuringSingle) => {
-                    "difference of two conditions' shares of films taken for real against 0"
+                    "difference between the shares of films judged real of two conditions against 0"
                 }
-                _ => "mean difference of two conditions' scores of one page against 0",
+                _ => "mean difference between the scores of two conditions on the same page against 0",
             };
             format!("two-sided test of the {difference}, {error}")
         }
@@ -127,7 +128,7 @@ fn statistic(claim: &StudyHypothesis, design: Option<TaskDesign>, alpha: f64) ->
     let is_one = !claim.per_speaker && claim.conditions.is_empty() && claim.kind != HypothesisKind::Differs;
     let adjustment = match is_one || claim.kind == HypothesisKind::Equivalence {
         true => "",
-        false => ", p adjusted by Holm where the task has several such tests",
+        false => ", Holm-adjusted p if the task has several such tests",
     };
     format!("{test}, alpha {alpha}{adjustment}")
 }
@@ -150,7 +151,7 @@ mod tests {
         assert!(
             registration.hypotheses[0]
                 .statistic
-                .starts_with("two one-sided tests of the share of right responses against 50 % - 10")
+                .starts_with("two one-sided tests of the share of correct responses against 50 % - 10")
         );
         let path = dir.path().join("preregistration.json");
         registration.write(&path).unwrap();

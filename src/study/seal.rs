@@ -58,7 +58,7 @@ impl StudySeal {
     pub fn of(folder: &StudyFolder) -> Result<Self> {
         let listed = sealed_files(folder)?;
         if let Some((name, _)) = listed.iter().find(|(_, path)| !path.is_file()) {
-            bail!("{} has no {name}: build the study again", folder.dir().display());
+            bail!("{} has no {name}: rebuild the study", folder.dir().display());
         }
         let files: BTreeMap<String, String> =
             listed.iter().map(|(name, path)| Ok((name.clone(), hash_file(path)?))).collect::<Result<_>>()?;
@@ -77,19 +77,23 @@ impl StudySeal {
     pub fn read(folder: &StudyFolder) -> Result<Self> {
         let path = folder.seal();
         let bytes = fs::read(&path).with_context(|| {
-            format!("{} is no finished study: it has no seal; `orator study build` makes one", folder.dir().display())
+            format!(
+                "{} is not a finished study: it has no seal; `orator study build` creates one",
+                folder.dir().display()
+            )
         })?;
         let path = path.display();
         let read: Self = serde_json::from_slice(&bytes)
-            .with_context(|| format!("{path} is damaged: restore it, or build the study again"))?;
+            .with_context(|| format!("{path} is damaged: restore it, or rebuild the study in a new folder"))?;
         ensure!(
             read.version == VERSION,
-            "{path} has version {} and this program reads {VERSION}: use the one that wrote it",
+            "{path} has version {}, expected {VERSION}: use the version of orator that wrote it",
             read.version
         );
         ensure!(
             read.seal == combined_hash(&read.files),
-            "{path} was changed itself: its hashes do not give {}",
+            "{path} was modified: the combined hash of its files is not {}; restore it, or rebuild the study in a new \
+             folder",
             read.seal
         );
         Ok(read)
@@ -104,7 +108,7 @@ impl StudySeal {
         let mismatch = seal.compare(folder)?;
         ensure!(
             mismatch.is_empty(),
-            "{} is not as it was sealed ({mismatch}): restore those files, or build the study in a new folder",
+            "{} was modified after sealing ({mismatch}): restore these files, or rebuild the study in a new folder",
             folder.dir().display()
         );
         Ok(seal)
@@ -160,7 +164,7 @@ fn collect_files(dir: &Path, paths: &mut Vec<PathBuf>) -> Result<()> {
             collect_files(&entry.path(), paths)?;
         } else {
             let path = entry.path();
-            ensure!(kind.is_file(), "{} is no plain file: put the film itself in its place", path.display());
+            ensure!(kind.is_file(), "{} is not a regular file: replace it with the film itself", path.display());
             paths.push(path);
         }
     }
@@ -188,7 +192,7 @@ mod tests {
         let (_dir, folder) = study();
         let seal = StudySeal::of(&folder).unwrap();
         assert_eq!(seal.files.len(), 6);
-        assert!(StudySeal::verify(&folder).unwrap_err().to_string().contains("no finished study"));
+        assert!(StudySeal::verify(&folder).unwrap_err().to_string().contains("not a finished study"));
         seal.write(&folder).unwrap();
         fs::write(folder.responses(), "answers").unwrap();
         fs::write(folder.public().join(".hidden"), "").unwrap();
@@ -207,7 +211,7 @@ mod tests {
     }
 
     #[test]
-    fn a_damaged_or_modified_seal_is_refused() {
+    fn a_damaged_or_modified_seal_is_rejected() {
         let (_dir, folder) = study();
         StudySeal::of(&folder).unwrap().write(&folder).unwrap();
         let original = fs::read_to_string(folder.seal()).unwrap();
@@ -217,7 +221,7 @@ mod tests {
         for (text, message) in [
             (original[..original.len() / 2].to_owned(), "is damaged"),
             ("[]".to_owned(), "is damaged"),
-            (forged, "was changed itself"),
+            (forged, "was modified"),
             (original.replace("\"version\": 1", "\"version\": 2"), "version 2"),
         ] {
             fs::write(folder.seal(), text).unwrap();
@@ -227,9 +231,9 @@ mod tests {
     }
 
     #[test]
-    fn a_symlink_instead_of_a_film_is_refused() {
+    fn a_symlink_instead_of_a_film_is_rejected() {
         let (_dir, folder) = study();
         std::os::unix::fs::symlink("/etc/hostname", folder.film("03")).unwrap();
-        assert!(StudySeal::of(&folder).unwrap_err().to_string().contains("no plain file"));
+        assert!(StudySeal::of(&folder).unwrap_err().to_string().contains("not a regular file"));
     }
 }

@@ -92,7 +92,7 @@ pub fn run(args: &Args, ui: &Ui) -> Result<Outcome> {
     });
     let facts = json!({ "analysis": analysis, "report": args.report, "methods": args.methods });
     ui.summary(&shown, next.as_deref(), facts);
-    Ok(if analysis.refused.is_empty() { Outcome::Done } else { Outcome::SomeFailed })
+    Ok(if analysis.rejected.is_empty() { Outcome::Done } else { Outcome::SomeFailed })
 }
 
 /// Checks that the page and the paragraph do not overwrite an input.

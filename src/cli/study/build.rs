@@ -54,8 +54,8 @@ pub fn run(args: &Args, ui: &Ui) -> Result<Outcome> {
 
 fn text(built: &BuiltStudy) -> String {
     let mut text = String::new();
-    for BuiltSpeaker { name, clips, refused } in &built.speakers {
-        let hidden = clips.iter().filter(|clip| clip.unseen > 0.0).count();
+    for BuiltSpeaker { name, clips, rejected } in &built.speakers {
+        let hidden = clips.iter().filter(|clip| clip.hidden_share > 0.0).count();
         let loud = clips.iter().filter(|clip| !clip.ends_in_pauses()).count();
         let _ = write!(text, "{name}: {}", counted(clips.len(), "clip"));
         if hidden > 0 {
@@ -65,11 +65,11 @@ fn text(built: &BuiltStudy) -> String {
             let _ = write!(text, ", {loud} cut during speech because pauses are missing");
         }
         text += "\n";
-        for refused in refused.iter().take(MAX_LISTED) {
-            let _ = writeln!(text, "  rejected {}: {}", refused.name, refused.reason);
+        for rejected in rejected.iter().take(MAX_LISTED) {
+            let _ = writeln!(text, "  rejected {}: {}", rejected.name, rejected.reason);
         }
-        if refused.len() > MAX_LISTED {
-            let _ = writeln!(text, "  and {}", counted(refused.len() - MAX_LISTED, "more segment"));
+        if rejected.len() > MAX_LISTED {
+            let _ = writeln!(text, "  and {}", counted(rejected.len() - MAX_LISTED, "more segment"));
         }
     }
     for line in &built.balance {

@@ -2,6 +2,7 @@
 
 use super::exclusion::exclude;
 use super::methods::methods;
+use super::number_format::counted;
 use super::registration::{Registration, judge};
 use super::result::{StatisticSettings, StudyAnalysis, TaskAnalysis};
 use super::task::task;
@@ -21,12 +22,16 @@ pub fn analyse(
     registration: Option<&Registration>,
     settings: &StatisticSettings,
 ) -> Result<StudyAnalysis> {
-    let (kept, mut exclusions) = exclude(read, registration.map(|registration| &registration.exclusion));
+    let (included, mut exclusions) = exclude(read, registration.map(|registration| &registration.exclusion));
     exclusions.registered = registration.is_some_and(|registration| registration.seal.is_some());
-    ensure!(exclusions.n_votes > 0, "{source} has no vote of the main phase");
-    ensure!(!kept.is_empty(), "{source}: the exclusion rules leave no vote of {}", exclusions.n_votes);
+    ensure!(exclusions.n_votes > 0, "{source} has no votes of the main phase: collect answers first");
+    ensure!(
+        !included.is_empty(),
+        "{source}: the exclusion rules exclude all {} votes: relax [exclusion] or collect more",
+        exclusions.n_votes
+    );
     let hypotheses = registration.map(|registration| &registration.hypotheses[..]).unwrap_or_default();
-    let mut tasks = tasks(&kept, hypotheses, settings)?;
+    let mut tasks = tasks(&included, hypotheses, settings)?;
     let judged = judge(&mut tasks, hypotheses, settings.level());
     let without_exclusions = match exclusions.any_excluded() {
         true => self::tasks(&exclude(read, None).0, &[], settings)?,
@@ -38,7 +43,7 @@ pub fn analyse(
         source: source.to_owned(),
         seal: registration.and_then(|registration| registration.seal.clone()),
         settings: settings.clone(),
-        refused: read.refused.clone(),
+        rejected: read.rejected.clone(),
         exclusions,
         hypotheses: judged,
         tasks,
@@ -79,18 +84,20 @@ fn tasks(
 /// Notes that a reader must know in addition to the statistics.
 fn notes(analysis: &StudyAnalysis, read: &VotesRead, registration: Option<&Registration>) -> Vec<String> {
     let mut notes = Vec::new();
-    if !read.refused.is_empty() {
-        notes.push(format!(
-            "{} rows are no votes and were left out; they are listed with their reasons.",
-            read.refused.len()
-        ));
+    if !read.rejected.is_empty() {
+        let rows = counted(read.rejected.len(), "invalid row");
+        notes.push(format!("The source contains {rows}, which the analysis ignores; see the list of rejected rows."));
     }
     if registration.is_none() {
-        notes.push("The votes came without a sealed study: nothing of the analysis was registered before, all of it is exploratory.".to_owned());
+        notes.push(
+            "The votes are not from a sealed study: nothing was registered in advance, and all statistics are \
+            exploratory."
+                .to_owned(),
+        );
     }
     for rule in analysis.exclusions.rules.iter().filter(|rule| rule.unknown.is_some()) {
         notes.push(format!(
-            "The rule \"{}\" could not be applied: {}.",
+            "The exclusion rule \"{}\" could not be applied: {}.",
             rule.rule,
             rule.unknown.clone().unwrap_or_default()
         ));
@@ -98,14 +105,16 @@ fn notes(analysis: &StudyAnalysis, read: &VotesRead, registration: Option<&Regis
     for hypothesis in registration.map(|registration| &registration.hypotheses[..]).unwrap_or_default() {
         let about = &hypothesis.claim.task;
         if !analysis.tasks.iter().any(|task| task.task == *about) {
-            notes.push(format!("A hypothesis is about the task {about}, which has no vote."));
+            notes.push(format!("A hypothesis concerns the task {about}, which has no votes."));
         }
     }
     for task in &analysis.tasks {
         if task.n_clips < 10 || task.n_participants < 10 {
             notes.push(format!(
-                "{}: with {} participants and {} clips the crossed figures are rough; 20 of each are wanted.",
-                task.task, task.n_participants, task.n_clips
+                "{}: with {} and {}, the crossed statistics are imprecise; at least 20 of each are recommended.",
+                task.task,
+                counted(task.n_participants, "participant"),
+                counted(task.n_clips, "clip")
             ));
         }
         notes.extend(task.missing.iter().map(|missing| format!("{}: {missing}.", task.task)));

@@ -10,12 +10,12 @@ use std::collections::{BTreeMap, BTreeSet};
 /// Summary of the exclusions. Counts refer to votes of the main phase.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct ExclusionSummary {
-    /// Whether the rules were registered before the data were seen.
+    /// Whether the rules were registered before data collection.
     pub registered: bool,
     pub n_participants: usize,
     pub n_votes: usize,
-    pub n_participants_kept: usize,
-    pub n_votes_kept: usize,
+    pub n_participants_analysed: usize,
+    pub n_votes_analysed: usize,
     pub rules: Vec<ExclusionCount>,
 }
 
@@ -60,48 +60,48 @@ pub fn exclude<'v>(read: &'v VotesRead, rules: Option<&ExclusionRules>) -> (Vec<
             Excluded::Participants(_) => excluded.iter().map(|vote| &vote.participant).collect::<BTreeSet<_>>().len(),
             Excluded::Votes(_) => 0,
         };
-        let unknown = read.absent.contains(&rule.field).then(|| format!("there is no column {}", rule.field));
+        let unknown = read.absent.contains(&rule.field).then(|| format!("the votes have no column {}", rule.field));
         ExclusionCount { rule: rule.description.clone(), n_participants, n_votes: excluded.len(), unknown }
     };
     let n_participants =
         |votes: &[&StudyVote]| votes.iter().map(|vote| &vote.participant).collect::<BTreeSet<_>>().len();
     let counts = applied.iter().map(count).collect();
-    let kept: Vec<&StudyVote> =
+    let included: Vec<&StudyVote> =
         main.iter().copied().filter(|vote| !applied.iter().any(|rule| is_excluded(rule, vote))).collect();
     let summary = ExclusionSummary {
         registered: rules.is_some(),
         n_participants: n_participants(&main),
         n_votes: main.len(),
-        n_participants_kept: n_participants(&kept),
-        n_votes_kept: kept.len(),
+        n_participants_analysed: n_participants(&included),
+        n_votes_analysed: included.len(),
         rules: counts,
     };
-    (kept, summary)
+    (included, summary)
 }
 
 fn tests_of_rules<'v>(rules: &ExclusionRules, votes: &'v [StudyVote]) -> Vec<ExclusionTest<'v>> {
     let mut applied = Vec::new();
     let mut add = |description: String, field, predicate| applied.push(ExclusionTest { description, field, predicate });
-    if let Some(most) = rules.failed_checks {
+    if let Some(n) = rules.failed_checks {
         let mut n_failed: BTreeMap<&str, u32> = BTreeMap::new();
         let is_failed = |vote: &&StudyVote| {
             vote.phase == TrialPhase::AttentionCheck && vote.expected.as_ref() != Some(&vote.response)
         };
         votes.iter().filter(is_failed).for_each(|vote| *n_failed.entry(&vote.participant).or_default() += 1);
-        let names = n_failed.into_iter().filter(|(_, n)| *n >= most.max(1)).map(|(name, _)| name).collect();
-        add(format!("failed {most} or more attention checks"), "phase", Excluded::Participants(names));
+        let names = n_failed.into_iter().filter(|(_, n_failed)| *n_failed >= n.max(1)).map(|(name, _)| name).collect();
+        add(format!("failed {n} or more attention checks"), "phase", Excluded::Participants(names));
     }
     if rules.incomplete {
         let names = votes.iter().filter(|vote| !vote.completed).map(|vote| vote.participant.as_str()).collect();
         add("did not complete the session".to_owned(), "completed", Excluded::Participants(names));
     }
-    if let Some(most) = rules.stalled_secs {
-        let predicate = Excluded::Votes(Box::new(move |vote| vote.stalled_secs > most));
-        add(format!("trial: films stalled over {most} s"), "stalled_secs", predicate);
+    if let Some(max_secs) = rules.stalled_secs {
+        let predicate = Excluded::Votes(Box::new(move |vote| vote.stalled_secs > max_secs));
+        add(format!("trial: playback stalled for more than {max_secs} s"), "stalled_secs", predicate);
     }
-    if let Some(most) = rules.unfocused_secs {
-        let predicate = Excluded::Votes(Box::new(move |vote| vote.unfocused_secs > most));
-        add(format!("trial: page not in front over {most} s"), "unfocused_secs", predicate);
+    if let Some(max_secs) = rules.unfocused_secs {
+        let predicate = Excluded::Votes(Box::new(move |vote| vote.unfocused_secs > max_secs));
+        add(format!("trial: page in background for more than {max_secs} s"), "unfocused_secs", predicate);
     }
     applied
 }
@@ -109,7 +109,7 @@ fn tests_of_rules<'v>(rules: &ExclusionRules, votes: &'v [StudyVote]) -> Vec<Exc
 impl ExclusionSummary {
     /// Whether any vote was excluded.
     pub fn any_excluded(&self) -> bool {
-        self.n_votes_kept < self.n_votes
+        self.n_votes_analysed < self.n_votes
     }
 }
 
@@ -133,13 +133,13 @@ mod tests {
         let file = path.path().join("votes.csv");
         std::fs::write(&file, text).unwrap();
         let read = VotesRead::of_file(&file, &ColumnNames::default(), None).unwrap();
-        assert_eq!(read.refused, []);
-        let (kept, summary) = exclude(&read, Some(&ExclusionRules::default()));
+        assert_eq!(read.rejected, []);
+        let (included, summary) = exclude(&read, Some(&ExclusionRules::default()));
         let counts: Vec<_> = summary.rules.iter().map(|rule| (rule.n_participants, rule.n_votes)).collect();
         assert_eq!(counts, [(1, 1), (1, 1), (0, 1), (0, 1)]);
-        assert_eq!(kept.iter().map(|vote| vote.clip.as_str()).collect::<Vec<_>>(), ["1", "3"]);
-        assert_eq!((summary.n_participants, summary.n_participants_kept), (4, 2));
-        assert_eq!((summary.n_votes, summary.n_votes_kept, summary.any_excluded()), (6, 2, true));
+        assert_eq!(included.iter().map(|vote| vote.clip.as_str()).collect::<Vec<_>>(), ["1", "3"]);
+        assert_eq!((summary.n_participants, summary.n_participants_analysed), (4, 2));
+        assert_eq!((summary.n_votes, summary.n_votes_analysed, summary.any_excluded()), (6, 2, true));
         let (all, summary) = exclude(&read, None);
         assert_eq!((all.len(), summary.rules.len(), summary.registered), (6, 0, false));
     }

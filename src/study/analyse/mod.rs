@@ -1,8 +1,9 @@
 //! Analysis of a study's votes. `votes` reads them, `exclusion` applies the exclusion rules, `outcome` converts
 //! responses to scores, `share` and `pair` test them with `stats`, `task` and `analysis` collect everything in a
-//! `result`, which `verdict`, `methods`, `text` and `page` present.
+//! `result`, which `conclusions`, `methods`, `text` and `page` present.
 
 pub mod analysis;
+pub mod conclusions;
 pub mod exclusion;
 pub mod methods;
 pub mod number_format;
@@ -16,7 +17,6 @@ pub mod statistic;
 pub mod strength;
 pub mod task;
 pub mod text;
-pub mod verdict;
 pub mod votes;
 
 pub use analysis::analyse;

@@ -6,13 +6,18 @@ use crate::stats::estimate::ConfidenceInterval;
 pub fn count(n: usize) -> String {
     let digits = n.to_string();
     let mut text = String::new();
-    for (place, digit) in digits.chars().enumerate() {
-        if place > 0 && (digits.len() - place).is_multiple_of(3) {
+    for (idx, digit) in digits.chars().enumerate() {
+        if idx > 0 && (digits.len() - idx).is_multiple_of(3) {
             text.push(',');
         }
         text.push(digit);
     }
     text
+}
+
+/// Count with thousands separators and its noun: `1 vote`, `2,000 votes`.
+pub fn counted(n: usize, noun: &str) -> String {
+    format!("{} {noun}{}", count(n), if n == 1 { "" } else { "s" })
 }
 
 /// `p = 0.027`, `p = 6.5e-12`.
@@ -62,6 +67,7 @@ mod tests {
     #[test]
     fn numbers_read_well() {
         assert_eq!([0, 999, 1083, 2_000_000].map(count), ["0", "999", "1,083", "2,000,000"]);
+        assert_eq!([1, 2000].map(|n| counted(n, "vote")), ["1 vote", "2,000 votes"]);
         assert_eq!([1.0, 0.0268, 6.51e-12, 0.0].map(bare_p), ["1", "0.027", "6.5e-12", "< 1e-99"]);
         assert_eq!(
             ([0.1, 0.05, 0.025].map(points), percent(0.525)),

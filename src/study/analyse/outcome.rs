@@ -92,7 +92,7 @@ pub fn binary<'v>(votes: &[&'v StudyVote], numbering: &Numbering, measure: Share
             }
             (Response::Real(answered_real), Response::Real(is_real)) => {
                 let is_success =
-                    if measure == ShareMeasure::TakenForReal { *answered_real } else { answered_real == is_real };
+                    if measure == ShareMeasure::JudgedReal { *answered_real } else { answered_real == is_real };
                 (vote.conditions.first()?, is_success, None)
             }
             _ => return None,

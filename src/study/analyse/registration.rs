@@ -1,8 +1,8 @@
 //! Registration: read from a sealed study, marked in the statistics, with the outcome of each hypothesis.
 
+use super::conclusions::scope;
 use super::result::{JudgedClaim, JudgedHypothesis, PairAnalysis, ShareAnalysis, TaskAnalysis};
 use super::statistic::{StatisticMethod, StatisticSet};
-use super::verdict::scope;
 use crate::file::{AnalysisSettings, ExclusionRules, HypothesisKind, StudyHypothesis};
 use crate::folder::StudyFolder;
 use crate::preregistration::{Preregistration, RegisteredHypothesis};
@@ -13,7 +13,7 @@ use anyhow::Result;
 #[derive(Clone, Debug, PartialEq)]
 pub struct Registration {
     pub title: String,
-    /// Combined hash of the sealed study; `None` if the seal does not hold.
+    /// Combined hash of the sealed study; `None` if the seal is broken.
     pub seal: Option<String>,
     /// Notes on the validity of the registration.
     pub notes: Vec<String>,
@@ -23,7 +23,7 @@ pub struct Registration {
 }
 
 impl Registration {
-    /// Reads the registration of a study folder. If the seal does not hold, a note names the files that differ, and
+    /// Reads the registration of a study folder. If the seal is broken, a note names the files that differ, and
     /// nothing counts as registered: the hypotheses may have been written after the data were seen.
     ///
     /// # Errors
@@ -33,13 +33,13 @@ impl Registration {
         let mismatch = match StudySeal::read(folder) {
             Ok(seal) => match seal.compare(folder)? {
                 mismatch if mismatch.is_empty() => Ok(seal.seal),
-                mismatch => Err(format!("files of the study are not as they were sealed ({mismatch})")),
+                mismatch => Err(format!("files were modified after sealing ({mismatch})")),
             },
             Err(error) => Err(format!("{error:#}")),
         };
         let (seal, notes) = match mismatch {
             Ok(seal) => (Some(seal), Vec::new()),
-            Err(why) => (None, vec![format!("The seal does not hold, so nothing counts as registered: {why}.")]),
+            Err(reason) => (None, vec![format!("The seal is broken, so nothing counts as registered: {reason}.")]),
         };
         Ok(Self {
             title: registered.title,
@@ -99,25 +99,28 @@ fn judged_claims(task: &mut TaskAnalysis, claim: &StudyHypothesis, level: f64) -
 
 /// Description of a hypothesis.
 fn describe_claim(claim: &StudyHypothesis) -> String {
-    let who = match (claim.per_speaker, claim.kind) {
+    let speakers = match (claim.per_speaker, claim.kind) {
         // Differences between conditions are estimated over all speakers only.
-        (true, HypothesisKind::Differs) => ", all speakers together",
-        (true, _) => ", each speaker by itself",
+        (true, HypothesisKind::Differs) => ", all speakers combined",
+        (true, _) => ", each speaker separately",
         (false, _) => "",
     };
-    let which = match &claim.conditions[..] {
+    let conditions = match &claim.conditions[..] {
         [] => String::new(),
         names => format!(" ({})", names.join(", ")),
     };
-    let what = match claim.kind {
-        HypothesisKind::DiffersFromChance => "the share of right responses differs from 50 %".to_owned(),
-        HypothesisKind::GreaterThanChance => "the share of right responses is above 50 %".to_owned(),
+    let statement = match claim.kind {
+        HypothesisKind::DiffersFromChance => "the share of correct responses differs from 50 %".to_owned(),
+        HypothesisKind::GreaterThanChance => "the share of correct responses is above 50 %".to_owned(),
         HypothesisKind::Equivalence => {
-            format!("the share of right responses lies within {} points of 50 %", claim.points.unwrap_or_default())
+            format!(
+                "the share of correct responses lies within {} percentage points of 50 %",
+                claim.points.unwrap_or_default()
+            )
         }
         HypothesisKind::Differs => "conditions differ".to_owned(),
     };
-    format!("{what}{which}{who}")
+    format!("{statement}{conditions}{speakers}")
 }
 
 fn is_about(share: &ShareAnalysis, hypothesis: &StudyHypothesis, has_conditions: bool) -> bool {

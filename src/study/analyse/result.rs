@@ -3,7 +3,7 @@
 
 use super::exclusion::ExclusionSummary;
 use super::statistic::{IntervalEstimate, StatisticOrigin, StatisticSet, TestResult};
-use super::votes::read::RefusedRow;
+use super::votes::read::RejectedRow;
 use crate::file::AnalysisSettings;
 use crate::plan::TaskDesign;
 use serde::Serialize;
@@ -19,7 +19,7 @@ pub struct StudyAnalysis {
     pub seal: Option<String>,
     pub settings: StatisticSettings,
     /// Rows of the source that are not valid votes.
-    pub refused: Vec<RefusedRow>,
+    pub rejected: Vec<RejectedRow>,
     pub exclusions: ExclusionSummary,
     /// Outcome of each registered hypothesis.
     #[serde(skip_serializing_if = "Vec::is_empty")]
@@ -111,7 +111,7 @@ pub struct TaskAnalysis {
     pub conditions: Vec<String>,
     pub speakers: Vec<String>,
     /// Sentences on what can be concluded and what cannot.
-    pub verdicts: Vec<String>,
+    pub conclusions: Vec<String>,
     /// Proportions: all votes first, then by speaker and by condition. Empty for preferences and sliders.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub shares: Vec<ShareAnalysis>,
@@ -145,7 +145,7 @@ pub enum ShareMeasure {
     /// Turing test with a single film: the response was correct.
     Correct,
     /// Turing test with a single film: the film was judged real, correctly or not.
-    TakenForReal,
+    JudgedReal,
 }
 
 /// Proportion of votes, compared with chance where chance is defined.
@@ -173,7 +173,7 @@ impl ShareAnalysis {
     pub fn right_share(&self) -> f64 {
         match self.measure {
             ShareMeasure::GeneratedChosen => 1.0 - self.share,
-            ShareMeasure::MatchedChosen | ShareMeasure::Correct | ShareMeasure::TakenForReal => self.share,
+            ShareMeasure::MatchedChosen | ShareMeasure::Correct | ShareMeasure::JudgedReal => self.share,
         }
     }
 }
@@ -253,7 +253,7 @@ pub enum Conclusion {
     /// No significant difference, and equivalence within the bound is shown.
     Equivalent,
     /// Neither a difference nor equivalence is shown.
-    Undecided,
+    Inconclusive,
     /// No test could be computed.
     Untested,
 }
@@ -268,7 +268,7 @@ impl Conclusion {
             (Some(p), false) if p < level && difference > 0.0 => Self::Above,
             (Some(p), false) if p < level => Self::Below,
             (Some(_), true) => Self::Equivalent,
-            (Some(_), false) => Self::Undecided,
+            (Some(_), false) => Self::Inconclusive,
         }
     }
 }

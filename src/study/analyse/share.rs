@@ -32,7 +32,7 @@ pub fn share(cell: &ShareCell, settings: &StatisticSettings) -> ShareAnalysis {
     add_clustered(&mut found, cell, &votes, settings);
     add_naive(&mut found, n_successes, votes.len() as u64, settings);
     found.clamp(0.0, 1.0);
-    let has_expectation = cell.measure != ShareMeasure::TakenForReal;
+    let has_expectation = cell.measure != ShareMeasure::JudgedReal;
     if !has_expectation {
         (found.tests, found.equivalence) = (Vec::new(), Vec::new());
     }
@@ -112,7 +112,9 @@ fn mixed_model(votes: &[ClipVote], found: &mut StatisticSet, confidence: f64) ->
     let model = found.ok_or_record(StatisticMethod::MixedModel, MixedLogit::fit(votes))?;
     let (share, interval) = found.ok_or_record(StatisticMethod::MixedModel, model.share(confidence))?;
     if !model.converged {
-        found.missing.push(format!("{}: the search for its maximum did not end", StatisticMethod::MixedModel.name()));
+        found
+            .missing
+            .push(format!("{}: the likelihood maximisation did not converge", StatisticMethod::MixedModel.name()));
         return None;
     }
     found.add_interval(StatisticMethod::MixedModel, Ok(interval));

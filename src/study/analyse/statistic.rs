@@ -47,7 +47,7 @@ impl StatisticMethod {
             Self::Crossed => "participants and clips crossed",
             Self::SignFlip => "sign flips of participants and clips",
             Self::Sides => "exact permutation of sides",
-            Self::Participants => "t test of participants' shares",
+            Self::Participants => "t test of participants' means",
             Self::MixedModel => "mixed logistic regression",
             Self::Wilcoxon => "Wilcoxon, participants' means",
             Self::WilcoxonVotes => "Wilcoxon, single votes",
@@ -222,14 +222,14 @@ impl StatisticSet {
         self.tests.push(TestResult::of_estimate(method, estimate, expected));
     }
 
-    /// Marks intervals and tests of a method as registered before the data were seen.
+    /// Marks intervals and tests of a method as registered before data collection.
     pub fn register(&mut self, method: StatisticMethod) {
         let intervals = self.intervals.iter_mut().map(|interval| &mut interval.origin);
         let origins = intervals.chain(self.tests.iter_mut().map(|test| &mut test.origin));
         origins.filter(|origin| origin.method == method).for_each(|origin| origin.exploratory = false);
     }
 
-    /// Marks the equivalence test of a method as registered before the data were seen.
+    /// Marks the equivalence test of a method as registered before data collection.
     pub fn register_equivalence(&mut self, method: StatisticMethod) {
         let tests = self.equivalence.iter_mut().filter(|test| test.origin.method == method);
         tests.for_each(|test| test.origin.exploratory = false);

@@ -1,12 +1,12 @@
 //! Analysis of one task: the cells of its design, its families of tests, inter-rater agreement.
 
+use super::conclusions::conclusions;
 use super::outcome::{BinaryVote, Numbering, binary, conditions, differences, measure, name_pairs, scores};
 use super::pair::{overall, pairs, score_table, single_pairs};
 use super::result::{ShareAnalysis, ShareMeasure, StatisticSettings, TaskAnalysis};
 use super::share::{ShareCell, conclude, share};
 use super::statistic::{StatisticMethod, adjust};
 use super::strength::strengths;
-use super::verdict::verdicts;
 use crate::plan::TaskDesign;
 use crate::stats::cluster::votes::ClipVote;
 use crate::stats::estimate::StatisticsError;
@@ -20,9 +20,12 @@ use std::collections::{BTreeMap, BTreeSet};
 /// # Errors
 /// There are no votes, or votes of two designs.
 pub fn task(name: &str, votes: &[&StudyVote], settings: &StatisticSettings) -> Result<TaskAnalysis> {
-    let design = votes.first().with_context(|| format!("the task {name} has no vote"))?.design;
+    let design = votes.first().with_context(|| format!("the task {name} has no votes"))?.design;
     if let Some(other) = votes.iter().find(|vote| vote.design != design) {
-        bail!("the task {name} has votes of two designs ({design:?}, {:?}); name them as two tasks", other.design)
+        bail!(
+            "the task {name} has votes of two designs ({design:?}, {:?}): give each design a task name of its own",
+            other.design
+        )
     }
     let numbering = Numbering::new(votes);
     let speakers: BTreeSet<&str> = votes.iter().map(|vote| vote.speaker.as_str()).collect();
@@ -35,7 +38,7 @@ pub fn task(name: &str, votes: &[&StudyVote], settings: &StatisticSettings) -> R
         n_clips: clips.len(),
         conditions: conditions(votes),
         speakers: speakers.into_iter().filter(|name| !name.is_empty()).map(str::to_owned).collect(),
-        verdicts: Vec::new(),
+        conclusions: Vec::new(),
         shares: Vec::new(),
         scores: Vec::new(),
         pairs: Vec::new(),
@@ -52,7 +55,7 @@ pub fn task(name: &str, votes: &[&StudyVote], settings: &StatisticSettings) -> R
         Ok(alpha) => analysis.agreement = Some(alpha),
         Err(error) => analysis.missing.push(format!("Krippendorff's alpha: {error}")),
     }
-    analysis.verdicts = verdicts(&analysis, settings);
+    analysis.conclusions = conclusions(&analysis, settings);
     Ok(analysis)
 }
 
@@ -76,7 +79,7 @@ fn binary_task(
     }
     let is_single = analysis.design == TaskDesign::TuringSingle;
     let (measure, all) = match is_single {
-        true => (ShareMeasure::TakenForReal, binary(votes, numbering, ShareMeasure::TakenForReal)),
+        true => (ShareMeasure::JudgedReal, binary(votes, numbering, ShareMeasure::JudgedReal)),
         false => (measure, all),
     };
     let shown: BTreeSet<&str> = all.iter().map(|vote| vote.condition).collect();
@@ -89,8 +92,8 @@ fn binary_task(
     }
 }
 
-fn pick<'v>(votes: &[BinaryVote<'v>], is_kept: impl Fn(&BinaryVote) -> bool) -> Vec<BinaryVote<'v>> {
-    votes.iter().filter(|vote| is_kept(vote)).cloned().collect()
+fn pick<'v>(votes: &[BinaryVote<'v>], is_included: impl Fn(&BinaryVote) -> bool) -> Vec<BinaryVote<'v>> {
+    votes.iter().filter(|vote| is_included(vote)).cloned().collect()
 }
 
 /// Adds cells whose tests are adjusted as one family.
@@ -137,7 +140,7 @@ fn agreement(votes: &[&StudyVote], numbering: &Numbering, analysis: &TaskAnalysi
         design => {
             // For single films, agreement is measured on the responses, not on their correctness.
             let measure = measure(design).filter(|measure| *measure != ShareMeasure::Correct);
-            let measure = measure.unwrap_or(ShareMeasure::TakenForReal);
+            let measure = measure.unwrap_or(ShareMeasure::JudgedReal);
             let mut groups: BTreeMap<&str, Vec<ClipVote>> = BTreeMap::new();
             let all = binary(votes, numbering, measure);
             all.iter().for_each(|vote| groups.entry(vote.condition).or_default().push(vote.vote));

@@ -1,20 +1,22 @@
 //! Summary of an analysis for the terminal.
 
-use super::number_format::{bare_p, count, p_value, percent, percents, points};
+use super::conclusions::scope;
+use super::number_format::{bare_p, count, counted, p_value, percent, percents, points};
 use super::result::{StudyAnalysis, TaskAnalysis};
 use super::statistic::{StatisticMethod, StatisticRow};
-use super::verdict::scope;
+use orator_base::text::number;
 use std::fmt::Write as _;
 
-/// Maximum number of refused rows that are listed.
-const MAX_REFUSED: usize = 20;
+/// Maximum number of rejected rows that are listed.
+const MAX_REJECTED: usize = 20;
 
-/// Summary: verdicts with the headline statistics, exclusions and notes.
+/// Summary: conclusions with the headline statistics, exclusions and notes.
 pub fn text(analysis: &StudyAnalysis) -> String {
     let mut text = String::new();
     let summary = &analysis.exclusions;
-    let [votes, participants] = [summary.n_votes_kept, summary.n_participants_kept].map(count);
-    let _ = writeln!(text, "{}: {votes} votes of {participants} participants", analysis.title);
+    let votes = counted(summary.n_votes_analysed, "vote");
+    let participants = counted(summary.n_participants_analysed, "participant");
+    let _ = writeln!(text, "{}: {votes} of {participants}", analysis.title);
     if !analysis.hypotheses.is_empty() {
         text += "\nregistered hypotheses\n";
         for hypothesis in &analysis.hypotheses {
@@ -27,25 +29,25 @@ pub fn text(analysis: &StudyAnalysis) -> String {
     }
     for task in &analysis.tasks {
         let _ = writeln!(text, "\n{}", task.task);
-        for verdict in &task.verdicts {
-            let _ = writeln!(text, "  {verdict}");
+        for conclusion in &task.conclusions {
+            let _ = writeln!(text, "  {conclusion}");
         }
         text += &rows(task);
     }
     if analysis.tasks.iter().any(|task| task.origins().any(|origin| origin.exploratory)) {
-        text += "\n* exploratory: not registered before the data were seen\n";
+        text += "\n* exploratory: not registered before data collection\n";
     }
     if summary.any_excluded() {
-        text += "\nexcluded, by each rule alone\n";
+        text += "\nexcluded by each rule alone\n";
         for rule in &summary.rules {
             let _ =
                 writeln!(text, "  {:<44} {:>6} participants {:>8} votes", rule.rule, rule.n_participants, rule.n_votes);
         }
         for (task, all) in analysis.tasks.iter().zip(&analysis.without_exclusions) {
-            if let Some((kept, all)) = task.pooled().zip(all.pooled()) {
-                let [kept, all] =
-                    [kept, all].map(|of| format!("{} of {}", percent(of.share), count(of.n_votes as usize)));
-                let _ = writeln!(text, "  {}: {kept} votes, {all} without exclusions", task.task);
+            if let Some((analysed, all)) = task.pooled().zip(all.pooled()) {
+                let [analysed, all] = [analysed, all]
+                    .map(|of| format!("{} of {}", percent(of.share), counted(of.n_votes as usize, "vote")));
+                let _ = writeln!(text, "  {}: {analysed}, {all} without exclusions", task.task);
             }
         }
     }
@@ -55,13 +57,13 @@ pub fn text(analysis: &StudyAnalysis) -> String {
             let _ = writeln!(text, "  {note}");
         }
     }
-    if !analysis.refused.is_empty() {
-        let _ = writeln!(text, "\nrows that are no votes: {}", count(analysis.refused.len()));
-        for row in analysis.refused.iter().take(MAX_REFUSED) {
+    if !analysis.rejected.is_empty() {
+        let _ = writeln!(text, "\nrejected rows: {}", count(analysis.rejected.len()));
+        for row in analysis.rejected.iter().take(MAX_REJECTED) {
             let _ = writeln!(text, "  line {}: {}", row.line, row.reason);
         }
-        if analysis.refused.len() > MAX_REFUSED {
-            text += "  ... (--json has all)\n";
+        if analysis.rejected.len() > MAX_REJECTED {
+            text += "  ... (--json lists all)\n";
         }
     }
     text
@@ -89,7 +91,7 @@ fn rows(task: &TaskAnalysis) -> String {
         }
         for test in &share.statistics.equivalence {
             let naive = if test.origin.naive { ", naive" } else { "" };
-            let name = format!("equivalence \u{b1}{} points{naive}", points(test.bound));
+            let name = format!("equivalence within \u{b1}{} points{naive}", points(test.bound));
             let outcome = if test.passes { "shown" } else { "not shown" };
             let _ =
                 writeln!(text, "    {name:<44} {outcome:>16}  p {}{}", bare_p(test.p), mark(test.origin.exploratory));
@@ -97,9 +99,9 @@ fn rows(task: &TaskAnalysis) -> String {
     }
     for row in &task.scores {
         let interval = row.statistics.interval(StatisticMethod::Median);
-        let interval = interval.map(|interval| format!("[{}, {}]", interval.low, interval.high)).unwrap_or_default();
-        let _ =
-            writeln!(text, "  {:<24} median {:>5} {interval:<12} mean {:>6.2}", row.condition, row.median, row.mean);
+        let interval = interval.map(|interval| format!("[{}, {}]", number(interval.low), number(interval.high)));
+        let (interval, median) = (interval.unwrap_or_default(), number(row.median));
+        let _ = writeln!(text, "  {:<24} median {median:>5} {interval:<12} mean {:>6.2}", row.condition, row.mean);
     }
     for row in &task.strengths {
         let _ = writeln!(text, "  {:<24} strength {:>+6.2}  Elo {:>6.0}", row.condition, row.log_strength, row.elo);

@@ -1,4 +1,4 @@
-//! Number of clips per speaker that a design needs so that no participant hears a clip twice, and their allocation to
+//! Number of clips per speaker that a design needs so that no clip is repeated in a session, and their allocation to
 //! purposes.
 
 use crate::file::{ClipReuse, StudyFile};
@@ -59,9 +59,9 @@ impl ClipNeeds {
         };
         ensure!(
             few.is_empty(),
-            "{} clips are needed of each speaker so that no participant hears one twice ({} of trials and training, {} for \
-             attention checks, {} for practice), and {}: give more recordings, shorter clips (seconds in [clips]), fewer \
-             trials{remedy}",
+            "{} clips per speaker are needed so that no clip is repeated in a session (trials and training: {}; \
+             attention checks: {}; practice: {}), but {}: use more recordings, shorter clips (seconds in [clips]), \
+             fewer trials{remedy}",
             self.total(),
             tasks.join(", "),
             self.checks,
@@ -84,10 +84,10 @@ pub struct SharedClips {
 }
 
 impl SharedClips {
-    /// Allocates `clips`, which must be at least as many as needed; spare clips go to the main trials in proportion to
+    /// Allocates `clips`, which must be at least as many as needed; surplus clips go to the main trials in proportion to
     /// their number.
     pub fn new(needs: &ClipNeeds, mut clips: Vec<String>) -> Self {
-        let n_spare = clips.len().saturating_sub(needs.total());
+        let n_surplus = clips.len().saturating_sub(needs.total());
         let mut take = |n: usize| clips.drain(..n.min(clips.len())).collect::<Vec<String>>();
         let (practice, checks) = (take(needs.practice), take(needs.checks));
         let n_tasks = needs.main.len();
@@ -95,12 +95,12 @@ impl SharedClips {
             ClipReuse::Never => {
                 let training = needs.training.iter().map(|n| take(*n)).collect();
                 let total: usize = needs.main.iter().sum::<usize>().max(1);
-                // Rounding the cumulative share of each task makes the shares add up to all spare clips.
+                // Rounding the cumulative share of each task makes the shares add up to all surplus clips.
                 let mut n_before = 0;
                 let main = needs.main.iter().map(|n| {
-                    let given = n_spare * n_before / total;
+                    let given = n_surplus * n_before / total;
                     n_before += n;
-                    take(n + n_spare * n_before / total - given)
+                    take(n + n_surplus * n_before / total - given)
                 });
                 Self { practice, checks, training, main: main.collect() }
             }

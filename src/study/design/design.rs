@@ -1,7 +1,7 @@
 //! Designs a study from its file and its clips.
 
-use super::clip_deck::{ClipDeck, stream};
 use super::clip_needs::{ClipNeeds, SharedClips};
+use super::clip_scheduler::{ClipScheduler, stream};
 use super::designer::{Designer, numbers};
 use super::latin_square::SquareRows;
 use super::task_design::{TaskBalance, TaskDesigner};
@@ -45,15 +45,15 @@ pub fn design(
     let tasks: Vec<TaskDesigner> = (0..file.task.len()).map(|at| TaskDesigner::new(file, at, &shared)).collect();
     let n_main = |at: usize| shared.iter().map(|shared| shared.main[at].len()).collect::<Vec<usize>>();
     let balance = tasks.iter().enumerate().map(|(at, task)| TaskBalance::new(task, &n_main(at))).collect();
-    let deck = |(at, shared): (usize, &SharedClips)| {
-        ClipDeck::new(shared.checks.len(), [1, 1], 0, stream(file.seed, &format!("checks {at}")))
+    let scheduler = |(at, shared): (usize, &SharedClips)| {
+        ClipScheduler::new(shared.checks.len(), [1, 1], 0, stream(file.seed, &format!("checks {at}")))
     };
-    let check_decks = shared.iter().enumerate().map(deck).collect();
+    let check_schedulers = shared.iter().enumerate().map(scheduler).collect();
     let mut rng = stream(file.seed, "numbers");
     let check_numbers = shared.iter().map(|shared| shared.checks.iter().map(|_| numbers(&mut rng)).collect()).collect();
     let task_rows = SquareRows::new(file.task.len(), stream(file.seed, "tasks"));
     let rng = stream(file.seed, "checks");
-    let mut designer = Designer { file, shared, tasks, balance, check_decks, check_numbers, task_rows, rng, film };
+    let mut designer = Designer { file, shared, tasks, balance, check_schedulers, check_numbers, task_rows, rng, film };
     let sessions = (0..file.n_sessions()).map(|session| designer.session(session)).collect::<Result<_>>()?;
     let sound_check = designer.sound_check()?;
     let planned = |at: usize| {
@@ -131,13 +131,13 @@ mod tests {
         for session in &plan.sessions {
             let trials = &session.trials;
             assert_eq!(trials.len(), plan.sessions[0].trials.len());
-            let mut heard_speech = BTreeSet::new();
+            let mut used_speech = BTreeSet::new();
             for trial in trials {
                 assert!(trial.films.iter().all(|film| films[film].clip == speech(trial)));
                 let block = if file.clips.reuse == ClipReuse::Never { 0 } else { trial.task };
-                assert!(heard_speech.insert((block, speech(trial))), "{} is heard twice", speech(trial));
-                let is_told = trial.phase == TrialPhase::Training && file.task[trial.task].feedback;
-                assert_eq!(trial.expected.is_some(), is_told || trial.phase == TrialPhase::AttentionCheck);
+                assert!(used_speech.insert((block, speech(trial))), "{} is repeated", speech(trial));
+                let has_feedback = trial.phase == TrialPhase::Training && file.task[trial.task].feedback;
+                assert_eq!(trial.expected.is_some(), has_feedback || trial.phase == TrialPhase::AttentionCheck);
             }
             assert!(trials[0].phase == TrialPhase::Practice || !file.practice);
             for (at, task) in file.task.iter().enumerate() {
@@ -182,11 +182,11 @@ mod tests {
                 *cells.entry((clip.clone(), set)).or_default() += 1;
                 *sides.entry((clip, shown)).or_default() += 1;
             }
-            let spread = |counts: &BTreeMap<_, usize>| counts.values().max().unwrap() - counts.values().min().unwrap();
+            let range = |counts: &BTreeMap<_, usize>| counts.values().max().unwrap() - counts.values().min().unwrap();
             if task.design == TaskDesign::TuringSingle && task.conditions.len() > 2 {
                 continue; // The real one is as frequent as all others.
             }
-            assert!(spread(&cells) <= 1, "{cells:?}");
+            assert!(range(&cells) <= 1, "{cells:?}");
             assert!(sides.values().max().unwrap() - sides.values().min().unwrap() <= 1, "{sides:?}");
         }
     }
@@ -201,7 +201,7 @@ mod tests {
         check(&file, &study, &films);
         assert_eq!((study.balance[0].votes, study.balance[0].arranged), ([100, 100], [50, 50]));
         assert_eq!((study.balance[1].votes, study.balance[1].arranged), ([100, 100], [50, 50]));
-        let expected_text = "t0: 100 votes of each of 20 cells, 50 in each order of films";
+        let expected_text = "t0: 100 votes in each of 20 cells, 50 in each order of films";
         assert_eq!(study.balance[0].to_string(), expected_text);
         for session in &study.plan.sessions {
             let is_left = |trial: &&Trial| {
@@ -224,8 +224,8 @@ mod tests {
         let (study, films) = designed(&file, &[ClipNeeds::of(&file).total()]).unwrap();
         let mut counts: BTreeMap<(usize, &str), usize> = BTreeMap::new();
         for session in &study.plan.sessions[..80] {
-            for (place, trial) in session.trials.iter().enumerate() {
-                *counts.entry((place, &films[&trial.films[0]].clip)).or_default() += 1;
+            for (position, trial) in session.trials.iter().enumerate() {
+                *counts.entry((position, &films[&trial.films[0]].clip)).or_default() += 1;
             }
         }
         assert_eq!(counts.len(), 64);
@@ -245,20 +245,20 @@ mod tests {
     }
 
     #[test]
-    fn too_few_clips_are_refused_with_the_number_needed() {
+    fn too_few_clips_are_rejected_with_the_number_needed() {
         let tasks = [(TaskDesign::Turing, 20, 3), (TaskDesign::Mismatch, 10, 3)];
         let file = file(&tasks, 1, 1, "participants = 10");
         let error = designed(&file, &[30]).unwrap_err().to_string();
         assert!(
-            error.starts_with("39 clips are needed of each speaker so that no participant hears one twice"),
+            error.starts_with("39 clips per speaker are needed so that no clip is repeated in a session"),
             "{error}"
         );
         assert!(
-            error.contains("20 + 3 for t0, 10 + 3 for t1 of trials and training, 2 for attention checks"),
+            error.contains("trials and training: 20 + 3 for t0, 10 + 3 for t1; attention checks: 2; practice: 1"),
             "{error}"
         );
         assert!(
-            error.contains("s0 has 30") && error.ends_with("reuse = \"other-tasks\" in [clips], which needs 26"),
+            error.contains("but s0 has 30") && error.ends_with("reuse = \"other-tasks\" in [clips], which needs 26"),
             "{error}"
         );
     }
@@ -276,7 +276,8 @@ mod tests {
             let n_main: usize = tasks.iter().map(|task| task.1).sum();
             let n_checks = n_checks.min((n_main - 2) / 2);
             let reuse = if reuse { "reuse = \"other-tasks\"" } else { "" };
-            let text = |seed: u64| format!("participants = {participants}\nseed = {seed}\nattention_checks = {n_checks}\n\
+            let text = |seed: u64| format!("participants = {participants}\nseed = {seed}\nattention_checks = \
+                {n_checks}\n\
                                             practice = {practice}\n[clips]\n{reuse}");
             let of_seed = |seed: u64| {
                 let file = file(&tasks, n_speakers, n_models, &text(seed));

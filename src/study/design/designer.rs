@@ -1,10 +1,10 @@
 //! Builds sessions one after another: task blocks with practice, training and main trials, and attention checks among
 //! the main trials.
 
-use super::clip_deck::ClipDeck;
 use super::clip_needs::SharedClips;
+use super::clip_scheduler::ClipScheduler;
 use super::latin_square::SquareRows;
-use super::task_design::{DealtTrial, TaskBalance, TaskDesigner, deal, right_response};
+use super::task_design::{AssignedTrial, TaskBalance, TaskDesigner, assign, right_response};
 use crate::file::{StudyCondition, StudyFile, StudyTask, TaskOrder};
 use crate::plan::{FilmContent, FilmSound, PlannedSession, Trial, TrialPhase};
 use crate::vote::Response;
@@ -20,8 +20,8 @@ pub(super) struct Designer<'a> {
     pub shared: Vec<SharedClips>,
     pub tasks: Vec<TaskDesigner<'a>>,
     pub balance: Vec<TaskBalance>,
-    /// Decks of the attention checks' clips, by speaker.
-    pub check_decks: Vec<ClipDeck>,
+    /// Schedulers of the attention checks' clips, by speaker.
+    pub check_schedulers: Vec<ClipScheduler>,
     /// Numbers shown, by speaker, check clip and variant.
     pub check_numbers: Vec<Vec<Vec<u16>>>,
     pub task_rows: SquareRows,
@@ -37,25 +37,27 @@ impl Designer<'_> {
     pub(super) fn session(&mut self, session: usize) -> Result<PlannedSession> {
         let order = match self.file.task_order {
             TaskOrder::Balanced => {
-                let row = self.task_rows.deal();
+                let row = self.task_rows.next_row();
                 self.task_rows.row(row).to_vec()
             }
             TaskOrder::Written => (0..self.tasks.len()).collect(),
         };
         let n_main = self.file.task.iter().map(|task| task.trials).sum();
         let check_positions = check_positions(n_main, self.file.attention_checks, &mut self.rng);
-        let mut checks = deal(&mut self.check_decks, check_positions.len(), session);
+        let mut checks = assign(&mut self.check_schedulers, check_positions.len(), session);
         checks.shuffle(&mut self.rng);
         let (mut trials, mut n_before) = (Vec::new(), 0);
         for (nth, at) in order.into_iter().enumerate() {
             if nth == 0 && self.file.practice {
                 for trial in self.tasks[at].practice(session) {
-                    let clip = self.clip(trial.speaker, self.shared[trial.speaker].practice.get(trial.dealt.clip))?;
+                    let clip =
+                        self.clip(trial.speaker, self.shared[trial.speaker].practice.get(trial.assigned.clip))?;
                     trials.push(self.trial(at, TrialPhase::Practice, clip, trial)?);
                 }
             }
             for trial in self.tasks[at].training(session) {
-                let clip = self.clip(trial.speaker, self.shared[trial.speaker].training[at].get(trial.dealt.clip))?;
+                let clip =
+                    self.clip(trial.speaker, self.shared[trial.speaker].training[at].get(trial.assigned.clip))?;
                 trials.push(self.trial(at, TrialPhase::Training, clip, trial)?);
             }
             let main = self.tasks[at].main(session);
@@ -68,7 +70,7 @@ impl Designer<'_> {
                 {
                     trials.push(self.check(at, check)?);
                 }
-                let clip = self.clip(trial.speaker, self.shared[trial.speaker].main[at].get(trial.dealt.clip))?;
+                let clip = self.clip(trial.speaker, self.shared[trial.speaker].main[at].get(trial.assigned.clip))?;
                 trials.push(self.trial(at, TrialPhase::Main, clip, trial)?);
                 n_before += 1;
             }
@@ -77,14 +79,14 @@ impl Designer<'_> {
     }
 
     fn clip(&self, speaker: usize, clip: Option<&String>) -> Result<NamedClip> {
-        let clip = clip.context("the design deals a clip that is not there")?;
+        let clip = clip.context("the design assigns a clip that does not exist")?;
         Ok([clip.clone(), self.file.speaker[speaker].name.clone()])
     }
 
-    fn trial(&mut self, at: usize, phase: TrialPhase, clip: NamedClip, trial: DealtTrial) -> Result<Trial> {
+    fn trial(&mut self, at: usize, phase: TrialPhase, clip: NamedClip, trial: AssignedTrial) -> Result<Trial> {
         let task = &self.tasks[at];
-        let comparison = &task.comparisons[trial.dealt.comparison];
-        let row = task.arrangements.row(trial.dealt.arrangement);
+        let comparison = &task.comparisons[trial.assigned.comparison];
+        let row = task.arrangements.row(trial.assigned.arrangement);
         let shown: Vec<&StudyCondition> = row.iter().map(|index| comparison[*index]).collect();
         let (design, sound) = (task.task.design, film_sound(task.task));
         let shows_feedback = phase == TrialPhase::Training && task.task.feedback;
@@ -94,9 +96,9 @@ impl Designer<'_> {
     }
 
     /// Attention check that looks like a trial of the task until one of its films shows a number.
-    fn check(&mut self, at: usize, check: DealtTrial) -> Result<Trial> {
+    fn check(&mut self, at: usize, check: AssignedTrial) -> Result<Trial> {
         let variant = self.rng.random_range(0..N_VARIANTS);
-        let number = self.check_numbers[check.speaker][check.dealt.clip][variant];
+        let number = self.check_numbers[check.speaker][check.assigned.clip][variant];
         let task = &self.tasks[at];
         let comparison = &task.comparisons[variant % task.comparisons.len()];
         let numbered = variant / task.comparisons.len() % comparison.len();
@@ -104,7 +106,7 @@ impl Designer<'_> {
         let shown = |index: &usize| (comparison[*index].name.clone(), (*index == numbered).then_some(number));
         let shown = row.iter().map(shown).collect();
         let sound = film_sound(task.task);
-        let clip = self.clip(check.speaker, self.shared[check.speaker].checks.get(check.dealt.clip))?;
+        let clip = self.clip(check.speaker, self.shared[check.speaker].checks.get(check.assigned.clip))?;
         let films = self.films(&clip, shown, sound)?;
         Ok(Trial { task: at, phase: TrialPhase::AttentionCheck, films, expected: Some(Response::Number(number)) })
     }
@@ -113,7 +115,8 @@ impl Designer<'_> {
     pub(super) fn sound_check(&mut self) -> Result<String> {
         let clip = self.clip(0, self.shared.first().and_then(|shared| shared.practice.first()))?;
         let comparison = self.tasks.first().and_then(|task| task.comparisons.first());
-        let condition = comparison.and_then(|comparison| comparison.first()).context("no task compares anything")?;
+        let condition =
+            comparison.and_then(|comparison| comparison.first()).context("the study compares no conditions")?;
         let shown = vec![(condition.name.clone(), None)];
         self.films(&clip, shown, FilmSound::Tones).map(|films| films.concat())
     }

@@ -21,14 +21,14 @@ pub(super) fn williams(n: usize) -> Vec<Vec<usize>> {
 pub struct SquareRows {
     square: Vec<Vec<usize>>,
     order: Vec<usize>,
-    n_dealt: usize,
+    n_assigned: usize,
     rng: ChaCha8Rng,
 }
 
 impl SquareRows {
     pub fn new(n: usize, rng: ChaCha8Rng) -> Self {
         let square = williams(n);
-        Self { order: (0..square.len()).collect(), square, n_dealt: 0, rng }
+        Self { order: (0..square.len()).collect(), square, n_assigned: 0, rng }
     }
 
     pub fn n_rows(&self) -> usize {
@@ -36,13 +36,13 @@ impl SquareRows {
     }
 
     /// Index of the next row.
-    pub fn deal(&mut self) -> usize {
+    pub fn next_row(&mut self) -> usize {
         let n_rows = self.square.len().max(1);
-        if self.n_dealt.is_multiple_of(n_rows) {
+        if self.n_assigned.is_multiple_of(n_rows) {
             self.order.shuffle(&mut self.rng);
         }
-        self.n_dealt += 1;
-        self.order.get((self.n_dealt - 1) % n_rows).copied().unwrap_or(0)
+        self.n_assigned += 1;
+        self.order.get((self.n_assigned - 1) % n_rows).copied().unwrap_or(0)
     }
 
     /// Row with this index, modulo the number of rows.

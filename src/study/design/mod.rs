@@ -1,8 +1,8 @@
 //! Experimental design: clips are allocated to tasks, conditions and screen sides are balanced over the sessions, and
 //! attention checks are inserted among the trials.
 
-mod clip_deck;
 mod clip_needs;
+mod clip_scheduler;
 mod design;
 mod designer;
 mod latin_square;

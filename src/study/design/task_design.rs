@@ -1,8 +1,8 @@
-//! Design of one task over all sessions: the comparisons of its trials, their correct responses, its clip decks, the
+//! Design of one task over all sessions: the comparisons of its trials, their correct responses, its clip schedulers, the
 //! order of its trials, and the balance of votes over its cells.
 
-use super::clip_deck::{ClipDeck, DealtClip, stream};
 use super::clip_needs::SharedClips;
+use super::clip_scheduler::{AssignedClip, ClipScheduler, stream};
 use super::latin_square::SquareRows;
 use crate::file::{StudyCondition, StudyFile, StudyTask};
 use crate::plan::TaskDesign;
@@ -50,9 +50,9 @@ pub fn right_response(design: TaskDesign, shown: &[&StudyCondition]) -> Option<R
 
 /// Clip of a speaker with its comparison and arrangement.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub struct DealtTrial {
+pub struct AssignedTrial {
     pub speaker: usize,
-    pub dealt: DealtClip,
+    pub assigned: AssignedClip,
 }
 
 /// State of a task between sessions.
@@ -62,9 +62,9 @@ pub struct TaskDesigner<'a> {
     /// Screen positions of a comparison's conditions.
     pub arrangements: SquareRows,
     number: usize,
-    practice: Vec<ClipDeck>,
-    training: Vec<ClipDeck>,
-    main: Vec<ClipDeck>,
+    practice: Vec<ClipScheduler>,
+    training: Vec<ClipScheduler>,
+    main: Vec<ClipScheduler>,
     group_rows: SquareRows,
     clip_rows: SquareRows,
 }
@@ -76,17 +76,22 @@ impl<'a> TaskDesigner<'a> {
         let rng = |what: &str, speaker: usize| stream(file.seed, &format!("{} {what} {speaker}", task.name));
         let n_films = comparisons.first().map_or(0, Vec::len);
         let arrangements = SquareRows::new(n_films, rng("arrangements", 0));
-        let decks = |what: &str, n_clips: &dyn Fn(&SharedClips) -> usize| -> Vec<ClipDeck> {
-            let deck = |(speaker, shared): (usize, &SharedClips)| {
-                ClipDeck::new(n_clips(shared), [comparisons.len(), arrangements.n_rows()], speaker, rng(what, speaker))
+        let schedulers = |what: &str, n_clips: &dyn Fn(&SharedClips) -> usize| -> Vec<ClipScheduler> {
+            let scheduler = |(speaker, shared): (usize, &SharedClips)| {
+                ClipScheduler::new(
+                    n_clips(shared),
+                    [comparisons.len(), arrangements.n_rows()],
+                    speaker,
+                    rng(what, speaker),
+                )
             };
-            clips.iter().enumerate().map(deck).collect()
+            clips.iter().enumerate().map(scheduler).collect()
         };
         let n_main = clips.iter().map(|shared| shared.main[number].len()).max().unwrap_or(0);
         Self {
-            practice: decks("practice", &|shared| shared.practice.len()),
-            training: decks("training", &|shared| shared.training[number].len()),
-            main: decks("main", &|shared| shared.main[number].len()),
+            practice: schedulers("practice", &|shared| shared.practice.len()),
+            training: schedulers("training", &|shared| shared.training[number].len()),
+            main: schedulers("main", &|shared| shared.main[number].len()),
             group_rows: SquareRows::new(clips.len() * comparisons.len(), rng("groups", 0)),
             clip_rows: SquareRows::new(n_main, rng("clips", 0)),
             task,
@@ -97,47 +102,46 @@ impl<'a> TaskDesigner<'a> {
     }
 
     /// Practice trial of a session.
-    pub fn practice(&mut self, session: usize) -> Vec<DealtTrial> {
-        deal(&mut self.practice, 1, session)
+    pub fn practice(&mut self, session: usize) -> Vec<AssignedTrial> {
+        assign(&mut self.practice, 1, session)
     }
 
     /// Training trials of a session.
-    pub fn training(&mut self, session: usize) -> Vec<DealtTrial> {
-        deal(&mut self.training, self.task.training, session + self.number)
+    pub fn training(&mut self, session: usize) -> Vec<AssignedTrial> {
+        assign(&mut self.training, self.task.training, session + self.number)
     }
 
     /// Main trials of a session in order. One square orders the groups (speaker, comparison), another the clips within
     /// a group.
-    pub fn main(&mut self, session: usize) -> Vec<DealtTrial> {
-        let dealt = deal(&mut self.main, self.task.trials, session + self.number);
-        let mut groups: BTreeMap<usize, VecDeque<DealtTrial>> = BTreeMap::new();
-        let clip_row = self.clip_rows.deal();
+    pub fn main(&mut self, session: usize) -> Vec<AssignedTrial> {
+        let assigned = assign(&mut self.main, self.task.trials, session + self.number);
+        let mut groups: BTreeMap<usize, VecDeque<AssignedTrial>> = BTreeMap::new();
+        let clip_row = self.clip_rows.next_row();
         let clip_row = self.clip_rows.row(clip_row);
         for clip in clip_row {
-            for trial in dealt.iter().filter(|trial| trial.dealt.clip == *clip) {
-                let group = trial.speaker * self.comparisons.len() + trial.dealt.comparison;
+            for trial in assigned.iter().filter(|trial| trial.assigned.clip == *clip) {
+                let group = trial.speaker * self.comparisons.len() + trial.assigned.comparison;
                 groups.entry(group).or_default().push_back(*trial);
             }
         }
-        let first = self.group_rows.deal();
-        let turns = (0..dealt.len()).flat_map(|turn| self.group_rows.row(first + turn));
+        let first = self.group_rows.next_row();
+        let turns = (0..assigned.len()).flat_map(|turn| self.group_rows.row(first + turn));
         turns.filter_map(|group| groups.get_mut(group)?.pop_front()).collect()
     }
 }
 
-/// Deals `n` clips, the same number of each speaker; which speakers give the remainder rotates over the sessions.
-pub(super) fn deal(decks: &mut [ClipDeck], n: usize, session: usize) -> Vec<DealtTrial> {
-    let n_speakers = decks.len().max(1);
+/// Assigns `n` clips, the same number of each speaker; which speakers give the remainder rotates over the sessions.
+pub(super) fn assign(schedulers: &mut [ClipScheduler], n: usize, session: usize) -> Vec<AssignedTrial> {
+    let n_speakers = schedulers.len().max(1);
     let (each, more) = (n / n_speakers, n % n_speakers);
     let n_of = |speaker: usize| each + usize::from((speaker + session * (n_speakers - more)) % n_speakers < more);
-    let hands = decks.iter_mut().enumerate().map(|(speaker, deck)| {
-        let hand = deck.deal(n_of(speaker));
-        hand.into_iter().map(move |dealt| DealtTrial { speaker, dealt })
+    let chosen = schedulers.iter_mut().enumerate().map(|(speaker, scheduler)| {
+        scheduler.assign(n_of(speaker)).into_iter().map(move |assigned| AssignedTrial { speaker, assigned })
     });
-    hands.flatten().collect()
+    chosen.flatten().collect()
 }
 
-/// Expected balance of the votes of one task, assuming that every wanted participant answers.
+/// Expected balance of the votes of one task, assuming that the target number of participants complete the study.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct TaskBalance {
     pub task: String,
@@ -163,10 +167,10 @@ impl TaskBalance {
         Self { task, n_cells, votes: [0; 2], arranged: [0; 2], cells }
     }
 
-    pub fn count(&mut self, trials: &[DealtTrial]) {
-        for DealtTrial { speaker, dealt } in trials {
-            let cell = self.cells.get_mut(&(*speaker, dealt.clip, dealt.comparison));
-            if let Some(votes) = cell.and_then(|cell| cell.get_mut(dealt.arrangement)) {
+    pub fn count(&mut self, trials: &[AssignedTrial]) {
+        for AssignedTrial { speaker, assigned } in trials {
+            let cell = self.cells.get_mut(&(*speaker, assigned.clip, assigned.comparison));
+            if let Some(votes) = cell.and_then(|cell| cell.get_mut(assigned.arrangement)) {
                 *votes += 1;
             }
         }
@@ -182,10 +186,10 @@ fn min_max(counts: impl Iterator<Item = usize>) -> [usize; 2] {
 
 impl fmt::Display for TaskBalance {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let range = |[least, most]: [usize; 2]| {
-            if least == most { format!("{least}") } else { format!("{least} or {most}") }
+        let range = |[min, max]: [usize; 2]| {
+            if min == max { format!("{min}") } else { format!("{min} or {max}") }
         };
         let (votes, arranged) = (range(self.votes), range(self.arranged));
-        write!(f, "{}: {votes} votes of each of {} cells, {arranged} in each order of films", self.task, self.n_cells)
+        write!(f, "{}: {votes} votes in each of {} cells, {arranged} in each order of films", self.task, self.n_cells)
     }
 }

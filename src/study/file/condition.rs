@@ -82,7 +82,8 @@ impl TryFrom<WrittenCondition> for StudyCondition {
 
     fn try_from(written: WrittenCondition) -> Result<Self, String> {
         let WrittenCondition { name, kind, checkpoint, of, files, real } = written;
-        let missing = |key: &str, example: &str| format!("condition {name}: the key {key} is missing, like {example}");
+        let missing =
+            |key: &str, example: &str| format!("condition {name}: missing key {key}: expected for example {example}");
         let source = match (kind, checkpoint, of, files) {
             (ConditionKind::Natural, None, None, None) => ConditionSource::Natural,
             (ConditionKind::MeanPose, None, None, None) => ConditionSource::MeanPose,
@@ -92,10 +93,10 @@ impl TryFrom<WrittenCondition> for StudyCondition {
             (ConditionKind::Checkpoint, None, None, None) => {
                 return Err(missing("checkpoint", "checkpoint = \"models/{speaker}\""));
             }
-            (ConditionKind::Files, None, None, None) => return Err(missing("files", "files = \"theirs/{clip}.bvh\"")),
+            (ConditionKind::Files, None, None, None) => return Err(missing("files", "files = \"other/{clip}.bvh\"")),
             _ => {
-                let rule = "checkpoint, of and files each belong to the kind checkpoint, mismatched and files alone";
-                return Err(format!("condition {name}: {rule}; remove the others"));
+                let rule = "the keys checkpoint, of and files are for the kinds checkpoint, mismatched and files";
+                return Err(format!("condition {name}: {rule}, respectively; remove the key of another kind"));
             }
         };
         let real = real.unwrap_or(source == ConditionSource::Natural);

@@ -25,7 +25,7 @@ impl StudyFile {
     /// The file cannot be read, or [`ConfigError`] lists its problems.
     pub fn read(file: &Path) -> Result<Self> {
         let text = input::read_text(file, input::MOST_TEXT).with_context(|| {
-            format!("cannot read the study file {}; `orator guide study` shows one", file.display())
+            format!("cannot read the study file {}; `orator guide study` shows an example", file.display())
         })?;
         let file = std::path::absolute(file)?;
         resolve(&text, &file).map_err(|problems| ConfigError { file, problems }.into())
@@ -80,7 +80,7 @@ fn preset_of(written: &DeTable<'_>) -> Result<Option<StudyPreset>, (usize, Strin
     let preset = StudyPreset::ALL.into_iter().find(|preset| preset.name() == &**name);
     preset.map(Some).ok_or_else(|| {
         let known = StudyPreset::ALL.map(|preset| preset.name().to_owned());
-        let message = format!("preset: {name:?} is not known: expected {}", known.join(" or "));
+        let message = format!("preset: unknown preset {name:?}: expected {}", known.join(" or "));
         (value.span().start, message + &did_you_mean(name, known.iter()))
     })
 }
@@ -96,7 +96,7 @@ fn problem_of_error(text: &str, error: &toml::de::Error, spans: &BTreeMap<String
         let (name, known) = quoted.split_first().map_or(("", &[][..]), |(name, known)| (name.as_str(), known));
         let near = did_you_mean(name, known.iter());
         let is_named = key.rsplit('.').next() == Some(name);
-        let listed = format!("the keys here are {}", known.join(", "));
+        let listed = format!("expected one of {}", known.join(", "));
         if is_named { format!("unknown key{near}; {listed}") } else { format!("unknown key {name}{near}; {listed}") }
     } else if message.starts_with("unknown variant") {
         rejection_message(&toml::Value::String(quoted.first().cloned().unwrap_or_default()), message)
@@ -157,6 +157,7 @@ mod tests {
         );
         let file = read(&text);
         assert_eq!((file.participants, file.task.len(), file.task[0].trials, file.task[0].training), (7, 1, 5, 3));
+        assert_eq!(read(&format!("spare = 0.25\n{SMALLEST}")).n_sessions(), 125, "the former name of a key");
         assert_eq!((file.exclusion.stalled_secs, file.exclusion.unfocused_secs), (Some(9.0), Some(5.0)));
     }
 
@@ -193,7 +194,7 @@ mod tests {
         assert!(one("[[task]]\nname = \"x\"\ntrials = 3\n")[0].ends_with("the key design is missing"));
         assert_eq!(
             one("[texts.en]\n\"study.titel\" = \"Hi\"\n"),
-            ["line 11: texts.en.study.titel: the page has no such text (did you mean study.title?)"]
+            ["line 11: texts.en.study.titel: unknown text of the page (did you mean study.title?)"]
         );
         let wrong = one("[[task]]\nname = \"x\"\ndesign = \"sliders\"\ntrials = 3\nscale = \"appropriate\"\n");
         assert_eq!(
@@ -206,7 +207,8 @@ mod tests {
         assert!(wrong[0].ends_with("(did you mean turing?)"), "{wrong:?}");
         assert_eq!(
             one("[[condition]]\nname = \"b\"\nkind = \"files\"\n"),
-            ["line 6: condition[model]: condition b: the key files is missing, like files = \"theirs/{clip}.bvh\""]
+            ["line 6: condition[model]: condition b: missing key files: expected for example files = \
+                 \"other/{clip}.bvh\""]
         );
         assert_eq!(
             one("[[hypothesis]]\ntask = \"real-or-generated\"\nkind = \"differs\"\n[[hypothesis]]\n\
@@ -214,7 +216,7 @@ mod tests {
             [
                 "line 12: hypothesis[0].kind: does not fit the task real-or-generated: expected differs-from-chance, \
                  greater-than-chance or equivalence",
-                "line 14: hypothesis[1].task: no task is called \"real-or-fake\"; there are: real-or-generated, \
+                "line 14: hypothesis[1].task: unknown task \"real-or-fake\": expected one of real-or-generated, \
                  matched-or-mismatched",
             ]
         );
@@ -223,9 +225,7 @@ mod tests {
         assert!(problems("title = 3\nparticipants = 4\n")[0].starts_with("line 1: title: invalid type"));
         assert!(problems("[x")[0].starts_with("line 1: not valid TOML"));
         let bare = problems("title = \"\"\npreset = \"rebol\"\nseed = 3\n").join("\n");
-        for expected in
-            ["title: expected a title", "no speaker is named", "condition[mismatched].of: expected the name"]
-        {
+        for expected in ["title: expected a title", "no speakers", "condition[mismatched].of: expected the name"] {
             assert!(bare.contains(expected), "{expected}: {bare}");
         }
     }

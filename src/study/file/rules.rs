@@ -38,13 +38,13 @@ impl StudyRules<'_> {
     }
 
     fn names<'n>(&mut self, list: &str, names: impl Iterator<Item = &'n str>) {
-        let mut seen = BTreeSet::new();
+        let mut known = BTreeSet::new();
         for name in names {
             let key = format!("{list}[{name}].name");
             if name.is_empty() || !name.chars().all(|c| c.is_ascii_alphanumeric() || c == '-' || c == '_') {
                 self.report(key, format!("{name:?}: expected letters, digits, - and _"));
-            } else if !seen.insert(name.to_ascii_lowercase()) {
-                self.report(key, format!("{name:?} is there twice: give each its own name"));
+            } else if !known.insert(name.to_ascii_lowercase()) {
+                self.report(key, format!("{name:?} is used twice: expected unique names"));
             }
         }
     }
@@ -52,22 +52,25 @@ impl StudyRules<'_> {
     fn general(&mut self) {
         let file = self.file;
         if file.title.trim().is_empty() {
-            self.report("title", "expected a title, which participants see");
+            self.report("title", "expected a title; it is shown to participants");
         }
         self.within("participants", file.participants as f64, 1.0, 10_000.0, "participants");
-        self.within("spare", file.spare, 0.0, 5.0, "(a share of the participants)");
+        self.within("extra_session_ratio", file.extra_session_ratio, 0.0, 5.0, "extra sessions per participant");
         self.within("seed", file.seed as f64, 0.0, i64::MAX as f64, "");
         self.within("clips.seconds", file.clips.seconds, 1.0, 120.0, "seconds");
         let rules = &file.exclusion;
         self.within("exclusion.stalled_secs", rules.stalled_secs.unwrap_or(0.0), 0.0, 600.0, "seconds");
         self.within("exclusion.unfocused_secs", rules.unfocused_secs.unwrap_or(0.0), 0.0, 600.0, "seconds");
         if rules.failed_checks == Some(0) {
-            self.report("exclusion.failed_checks", "0 would leave out everybody: expected 1 or more, or no such key");
+            self.report(
+                "exclusion.failed_checks",
+                "0 would exclude all participants: expected 1 or more, or remove the key",
+            );
         }
         self.within("analysis.alpha", file.analysis.alpha, 0.0001, 0.5, "");
         self.within("analysis.resamples", file.analysis.resamples as f64, 100.0, 1e7, "samples");
         if file.return_url.as_ref().is_some_and(|address| !address.starts_with("https://")) {
-            self.report("return_url", "expected an address that begins with https://");
+            self.report("return_url", "expected a URL that starts with https://");
         }
         let is_code = |code: &str| {
             let plain = code.chars().all(|c| c.is_ascii_alphanumeric() || c == '-');
@@ -79,7 +82,7 @@ impl StudyRules<'_> {
         for language in file.languages.iter().filter(|language| !is_code(language)) {
             self.report(
                 "languages",
-                format!("{language:?} is no language code: expected one like \"en\" or \"pt-BR\""),
+                format!("{language:?} is not a language code: expected one like \"en\" or \"pt-BR\""),
             );
         }
         for language in file.texts.keys().filter(|language| !file.languages.contains(language)) {
@@ -88,25 +91,28 @@ impl StudyRules<'_> {
         let known = text_keys(file.task.iter().map(|task| task.name.as_str()));
         let keys = file.texts.iter().flat_map(|(language, texts)| texts.keys().map(move |key| (language, key)));
         for (language, key) in keys.filter(|(_, key)| !known.contains(key)) {
-            let message = format!("the page has no such text{}", did_you_mean(key, known.iter()));
+            let message = format!("unknown text of the page{}", did_you_mean(key, known.iter()));
             self.report(format!("texts.{language}.{key}"), message);
         }
         if file.task.is_empty() {
-            self.report("task", "no task is left: expected a [[task]], or a preset with its tasks");
+            self.report("task", "no tasks: expected a [[task]] table or a preset");
         }
         let trials: usize = file.task.iter().map(|task| task.trials).sum();
         // At least two trials precede the first check, one separates two checks, and one follows the last.
-        let most = trials.saturating_sub(2) / 2;
-        if file.attention_checks > most && trials > 0 {
-            let message = format!("{} checks among {trials} trials: expected at most {most}", file.attention_checks);
-            self.report("attention_checks", message + ", one between two trials and none in the first two");
+        let max_checks = trials.saturating_sub(2) / 2;
+        if file.attention_checks > max_checks && trials > 0 {
+            let message = format!("{} checks in {trials} trials: expected at most {max_checks}", file.attention_checks);
+            self.report(
+                "attention_checks",
+                message + ", because checks are not adjacent and follow the first two trials",
+            );
         }
     }
 
     fn speakers(&mut self) {
         let file = self.file;
         if file.speaker.is_empty() {
-            self.report("speaker", "no speaker is named: expected a [[speaker]] with a name and a dataset or sounds");
+            self.report("speaker", "no speakers: expected a [[speaker]] table with a name and a dataset or sounds");
         }
         self.names("speaker", file.speaker.iter().map(|speaker| speaker.name.as_str()));
         for speaker in &file.speaker {
@@ -115,7 +121,7 @@ impl StudyRules<'_> {
                 (None, None) => {
                     self.report(key("dataset"), "expected dataset = \"FOLDER\" or sounds = \"FOLDER/*.wav\"");
                 }
-                (Some(_), Some(_)) => self.report(key("sounds"), "expected a dataset or sounds: remove one of the two"),
+                (Some(_), Some(_)) => self.report(key("sounds"), "dataset and sounds are both given: remove one"),
                 _ => {}
             }
             let needs = |condition: &&StudyCondition| {
@@ -123,10 +129,10 @@ impl StudyRules<'_> {
             };
             if let (None, Some(condition)) = (&speaker.dataset, file.condition.iter().find(needs)) {
                 let message = format!("the condition {} needs motion: expected dataset = \"FOLDER\"", condition.name);
-                self.report(key("dataset"), message + ", or a study without that condition");
+                self.report(key("dataset"), message + ", or remove the condition");
             }
             if speaker.clips == Some(0) {
-                self.report(key("clips"), "expected 1 or more, or no such key for as many as the design needs");
+                self.report(key("clips"), "expected 1 or more; without the key, the number that the design needs");
             }
         }
     }
@@ -137,7 +143,7 @@ impl StudyRules<'_> {
         let is_known = known.iter().any(|other| other == name);
         if !is_known {
             let near = did_you_mean(name, known.iter());
-            self.report(key, format!("no condition is called {name:?}{near}; there are: {}", known.join(", ")));
+            self.report(key, format!("unknown condition {name:?}{near}: expected one of {}", known.join(", ")));
         }
         is_known
     }
@@ -154,14 +160,20 @@ impl StudyRules<'_> {
             ConditionSource::Mismatched(of) => {
                 let chained = self.file.find_condition(of).is_some_and(|other| other.source.mismatch_of().is_some());
                 if self.is_condition(&key, of) && chained {
-                    self.report(key, format!("{of} is mismatched itself: expected a condition with motion of its own"));
+                    self.report(
+                        key,
+                        format!("{of} is itself a mismatched condition: expected a condition of another kind"),
+                    );
                 }
             }
             ConditionSource::Checkpoint(_) | ConditionSource::Files(_) => {}
             ConditionSource::Natural | ConditionSource::MeanPose => {}
         }
         if condition.real && condition.source.mismatch_of().is_some() {
-            self.report(format!("condition[{}].real", condition.name), "mismatched motion is not real: remove the key");
+            self.report(
+                format!("condition[{}].real", condition.name),
+                "a mismatched condition cannot be the real one: remove the key",
+            );
         }
     }
 
@@ -175,7 +187,7 @@ impl StudyRules<'_> {
             return;
         }
         if names.iter().collect::<BTreeSet<_>>().len() < names.len() {
-            return self.report(conditions_key, "a condition is there twice: remove one of the two");
+            return self.report(conditions_key, "a condition is listed twice: remove one");
         }
         let found: Vec<&StudyCondition> = names.iter().filter_map(|name| self.file.find_condition(name)).collect();
         let n_real = found.iter().filter(|condition| condition.real).count();
@@ -187,20 +199,27 @@ impl StudyRules<'_> {
         });
         match task.design {
             _ if names.len() < 2 => {
-                self.report(conditions_key, "expected two or more conditions to compare: add [[condition]] tables");
+                self.report(conditions_key, "expected at least two conditions to compare: add [[condition]] tables");
             }
             TaskDesign::Turing | TaskDesign::TuringSingle if n_real != 1 => {
-                let message = format!("{n_real} real conditions: expected one that is natural or has real = true");
+                let message =
+                    format!("{n_real} real conditions: expected exactly one, of kind natural or with real = true");
                 self.report(conditions_key, message);
             }
             TaskDesign::Mismatch if !has_pairs => {
-                self.report(conditions_key, "expected each mismatched condition beside the one that it is of");
+                self.report(
+                    conditions_key,
+                    "expected pairs of a mismatched condition and the condition in its key `of`",
+                );
             }
             TaskDesign::Sliders if names.len() > 16 => {
                 self.report(conditions_key, format!("{} conditions on one page: expected at most 16", names.len()));
             }
             TaskDesign::Sliders if !task.sound && found.iter().any(is_mismatched) => {
-                self.report(conditions_key, "without sound nothing is mismatched: expected conditions of other kinds");
+                self.report(
+                    conditions_key,
+                    "a mismatched condition has no meaning without sound: remove it or set sound = true",
+                );
             }
             _ => {}
         }
@@ -211,14 +230,16 @@ impl StudyRules<'_> {
                 self.report(key("scale"), format!("{:?}: expected {}{near}", task.scale, scales.join(" or ")));
             }
             TaskDesign::Sliders => {}
-            _ if !task.scale.is_empty() => self.report(key("scale"), "a scale belongs to sliders: remove the key"),
+            _ if !task.scale.is_empty() => {
+                self.report(key("scale"), "only the design sliders has a scale: remove the key")
+            }
             _ => {}
         }
         if task.feedback && matches!(task.design, TaskDesign::Preference | TaskDesign::Sliders) {
-            self.report(key("feedback"), "this design has no right response to tell: remove the key");
+            self.report(key("feedback"), "this design has no correct response to show: remove the key");
         }
         if task.design == TaskDesign::Mismatch && !task.sound {
-            self.report(key("sound"), "without sound no speech is heard that motion could fit: remove the key");
+            self.report(key("sound"), "the design mismatch requires sound: remove the key");
         }
     }
 
@@ -227,7 +248,7 @@ impl StudyRules<'_> {
         let known: Vec<String> = self.file.task.iter().map(|task| task.name.clone()).collect();
         let Some(task) = self.file.task.iter().find(|task| task.name == hypothesis.task) else {
             let near = did_you_mean(&hypothesis.task, known.iter());
-            let message = format!("no task is called {:?}{near}; there are: {}", hypothesis.task, known.join(", "));
+            let message = format!("unknown task {:?}{near}: expected one of {}", hypothesis.task, known.join(", "));
             return self.report(key("task"), message);
         };
         let fits = match hypothesis.kind {
@@ -237,27 +258,33 @@ impl StudyRules<'_> {
         if !fits {
             let others = match hypothesis.kind {
                 HypothesisKind::Differs => "differs-from-chance, greater-than-chance or equivalence",
-                _ => "differs, this design having no response by chance",
+                _ => "differs, because this design has no chance level",
             };
             self.report(key("kind"), format!("does not fit the task {}: expected {others}", task.name));
         }
         match hypothesis.points {
             None if hypothesis.kind == HypothesisKind::Equivalence => {
-                self.report(key("points"), "an equivalence needs a bound in percentage points, like points = 10.0");
+                self.report(
+                    key("points"),
+                    "missing: equivalence requires a bound in percentage points, like points = 10.0",
+                );
             }
             Some(_) if hypothesis.kind != HypothesisKind::Equivalence => {
-                self.report(key("points"), "a bound belongs to an equivalence: remove the key");
+                self.report(key("points"), "only the kind equivalence has a bound: remove the key");
             }
             Some(points) => self.within(key("points"), points, 0.1, 49.0, "percentage points"),
             None => {}
         }
         let names = &hypothesis.conditions;
         if !names.is_empty() && (names.len() != 2 || names[0] == names[1]) {
-            self.report(key("conditions"), "expected two different conditions, or none for every pair of the task");
+            self.report(
+                key("conditions"),
+                "expected two different conditions, or an empty list for all pairs of the task",
+            );
         }
         for name in names.iter().filter(|name| !task.conditions.contains(name)) {
-            let message = format!("{name:?} is not compared in the task {}", task.name);
-            self.report(key("conditions"), format!("{message}; there are: {}", task.conditions.join(", ")));
+            let message = format!("{name:?} is not a condition of the task {}", task.name);
+            self.report(key("conditions"), format!("{message}: expected one of {}", task.conditions.join(", ")));
         }
     }
 }

@@ -22,9 +22,10 @@ pub struct StudyFile {
     pub seed: u64,
     /// Target number of participants.
     pub participants: usize,
-    /// Spare sessions for replacing participants who withdraw or are excluded, as a proportion of the participants.
-    #[serde(default = "half")]
-    pub spare: f64,
+    /// Number of extra sessions, for replacing participants who withdraw or are excluded, divided by the number of
+    /// participants.
+    #[serde(default = "half", alias = "spare")]
+    pub extra_session_ratio: f64,
     /// Languages of the page; the first is the fallback for participants who prefer none of them.
     #[serde(default = "english")]
     pub languages: Vec<String>,
@@ -108,7 +109,7 @@ impl Default for ClipSettings {
     }
 }
 
-/// Whether a participant may hear the same speech again.
+/// Whether the same speech may occur again in a session.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum ClipReuse {
@@ -244,9 +245,9 @@ pub enum HypothesisKind {
 }
 
 impl StudyFile {
-    /// Number of planned sessions: one per participant, plus spare ones.
+    /// Number of planned sessions: one per participant, plus the extra ones.
     pub fn n_sessions(&self) -> usize {
-        self.participants + (self.participants as f64 * self.spare).ceil() as usize
+        self.participants + (self.participants as f64 * self.extra_session_ratio).ceil() as usize
     }
 
     pub fn find_condition(&self, name: &str) -> Option<&StudyCondition> {

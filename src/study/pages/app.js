@@ -1,7 +1,7 @@
 // Steps of a session: consent, instructions, sound check, trials, completion.
 
-import { backend, patiently, Refusal } from "./backend.js";
-import { button, byId, el, paragraphs, say, show } from "./dom.js";
+import { backend, ServerError, withRetries } from "./backend.js";
+import { announce, button, byId, el, paragraphs, show } from "./dom.js";
 import { forget, keep, recall, takeLinkedToken } from "./memory.js";
 import { checkSound } from "./sound.js";
 import { currentLanguage, firstText, has, nameOfLanguage, preferredLanguage, t, useLanguage, useTexts } from "./texts.js";
@@ -13,7 +13,7 @@ let instructed = null;
 
 const text = (words) => el("div", { class: "text" }, ...paragraphs(words));
 const row = (...nodes) => el("p", { class: "row" }, ...nodes);
-const waits = (secs) => say(t("answer.offline", { seconds: Math.round(secs) }));
+const onWait = (secs) => announce(t("answer.offline", { seconds: Math.round(secs) }));
 
 // Shows a step with one button and resolves when it is pressed.
 function step(heading, nodes, label) {
@@ -26,20 +26,21 @@ async function start() {
     study = await backend.study();
   } catch {
     // The texts are part of the study, so this message cannot be translated.
-    show("The study cannot be reached.", [row(button("Try again", start))]);
+    const advice = el("p", {}, "Please check your internet connection and try again.");
+    show("The study cannot be reached", [advice, row(button("Try again", start))]);
     return;
   }
   useTexts(study.texts);
-  const kept = recall("language");
-  useLanguage(study.languages.includes(kept) ? kept : preferredLanguage(study.languages));
-  entitle();
-  // From a link of the researcher, for participants who can no longer use the browser in which they began.
+  const stored = recall("language");
+  useLanguage(study.languages.includes(stored) ? stored : preferredLanguage(study.languages));
+  updateTitle();
+  // From a link of the researcher, for participants who can no longer use the browser in which they started.
   takeLinkedToken();
   if (recall("token")) await resume();
   else consent();
 }
 
-function entitle() {
+function updateTitle() {
   const title = has("study.title") ? t("study.title") : study.title;
   document.title = title;
   byId("title").textContent = title;
@@ -53,7 +54,7 @@ function languageChoice() {
   const onchange = (event) => {
     useLanguage(event.target.value);
     keep("language", event.target.value);
-    entitle();
+    updateTitle();
     consent();
     byId("language").focus();
   };
@@ -81,15 +82,15 @@ async function instructions() {
 }
 
 async function begin() {
-  // Another tab may have begun in the meantime.
+  // Another tab may have started the session in the meantime.
   if (recall("token")) return resume();
   let begun;
   try {
-    begun = await patiently(() => backend.begin(currentLanguage()), waits);
+    begun = await withRetries(() => backend.begin(currentLanguage()), onWait);
   } catch (error) {
     const { reason } = error;
     if (["full", "known", "id-missing"].includes(reason)) show(t(`${reason}.title`), [text(t(`${reason}.text`))]);
-    else refused(error);
+    else showError(error);
     return;
   }
   keep("token", begun.token);
@@ -99,13 +100,13 @@ async function begin() {
 // Resumes after a reload: a pending answer is sent first.
 async function resume() {
   try {
-    let state = await patiently(() => backend.state(), waits);
+    let state = await withRetries(() => backend.state(), onWait);
     if (!state.completion) await step(t("resume.title"), [text(t("resume.text"))], t("resume.go"));
     const pending = recall("pending");
     if (pending && pending.position === state.position) state = (await send(pending)).state;
     await proceed(state);
   } catch (error) {
-    refused(error);
+    showError(error);
   }
 }
 
@@ -114,7 +115,7 @@ async function proceed(state) {
     while (!state.completion) state = await oneTrial(state);
     complete(state.completion);
   } catch (error) {
-    refused(error);
+    showError(error);
   }
 }
 
@@ -139,35 +140,35 @@ async function oneTrial({ position, n_trials: total, trial }) {
     onplay: (n) => keep("plays", { position, n }),
   });
   const { feedback, state } = await send({ position, ...answer });
-  if (feedback) await tell(task, answer.response, feedback);
+  if (feedback) await showFeedback(task, answer.response, feedback);
   return state;
 }
 
 // Sends an answer until it is stored. If the server has a different answer or state, that of the server is used.
 async function send(answer) {
   keep("pending", answer);
-  say(t("answer.saving"));
+  announce(t("answer.saving"));
   let reply;
   try {
-    reply = await patiently(() => backend.answer(answer), waits);
+    reply = await withRetries(() => backend.answer(answer), onWait);
   } catch (error) {
     if (error.status !== 409 && error.status !== 400) throw error;
     keep("pending", null);
-    reply = { state: await patiently(() => backend.state(), waits) };
+    reply = { state: await withRetries(() => backend.state(), onWait) };
     if (error.status === 400 && reply.state.position === answer.position) throw error;
   }
   keep("pending", null);
-  say("");
+  announce("");
   return reply;
 }
 
 // Shows the correct response of a training trial.
-async function tell(task, given, right) {
+async function showFeedback(task, given, right) {
   const isRight = JSON.stringify(given) === JSON.stringify(right);
   const [[, value]] = Object.entries(right);
   const words = firstText(`feedback.${task.design}.${value}`, "feedback.none");
-  const verdict = el("p", { class: isRight ? "right" : "wrong" }, t(isRight ? "feedback.right" : "feedback.wrong"));
-  await step(t("feedback.title"), [verdict, el("p", {}, words)], t("continue"));
+  const result = el("p", { class: isRight ? "right" : "wrong" }, t(isRight ? "feedback.right" : "feedback.wrong"));
+  await step(t("feedback.title"), [result, el("p", {}, words)], t("continue"));
 }
 
 function complete({ code, return_url: address }) {
@@ -181,7 +182,7 @@ function complete({ code, return_url: address }) {
     } catch {
       document.execCommand("copy");
     }
-    say(t("done.copied"));
+    announce(t("done.copied"));
   });
   const isLink = address && ["https:", "http:"].includes(new URL(address, location.href).protocol);
   const back = isLink ? row(el("a", { class: "button main", href: address, rel: "noreferrer" }, t("done.return"))) : null;
@@ -200,7 +201,7 @@ function confirmWithdrawal() {
   const confirm = button(t("withdraw.confirm"), async () => {
     confirm.disabled = true;
     try {
-      await patiently(() => backend.withdraw(), (secs) => (note.textContent = t("answer.offline", { seconds: Math.round(secs) })));
+      await withRetries(() => backend.withdraw(), (secs) => (note.textContent = t("answer.offline", { seconds: Math.round(secs) })));
     } catch (error) {
       // There is no data to delete.
       if (![401, 410].includes(error.status)) {
@@ -222,15 +223,15 @@ function confirmWithdrawal() {
 }
 
 // Shows an error that stops the session. A session that has ended is forgotten.
-function refused(error) {
-  const isOver = error instanceof Refusal && [401, 404, 410].includes(error.status);
+function showError(error) {
+  const isOver = error instanceof ServerError && [401, 404, 410].includes(error.status);
   withdrawal(!isOver && Boolean(recall("token")));
   if (isOver) {
     forget();
     show(t("gone.title"), [text(t("gone.text")), row(button(t("gone.again"), () => location.reload()))]);
     return;
   }
-  const sentence = error instanceof Refusal ? error.message : t("error.unknown");
+  const sentence = error instanceof ServerError ? error.message : t("error.unknown");
   show(t("error.title"), [text(t("error.text", { sentence })), row(button(t("error.retry"), () => location.reload()))]);
 }
 

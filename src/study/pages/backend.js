@@ -4,10 +4,10 @@ import { keep, recall } from "./memory.js";
 
 const PARAMETERS = ["PROLIFIC_PID", "STUDY_ID", "SESSION_ID", "workerId", "assignmentId", "hitId"];
 const REQUEST_MS = 20_000;
-const LONGEST_WAIT_SECS = 30;
+const MAX_WAIT_SECS = 30;
 
 // Error reply of the server, with its sentence.
-export class Refusal extends Error {
+export class ServerError extends Error {
   constructor(status, { error, reason }, retrySecs) {
     super(error ?? `${status}`);
     this.status = status;
@@ -15,26 +15,26 @@ export class Refusal extends Error {
     this.retrySecs = retrySecs;
   }
 
-  get isPassing() {
+  get isTemporary() {
     return [408, 425, 429].includes(this.status) || this.status >= 500;
   }
 }
 
-async function ask(url, options = {}) {
+async function request(url, options = {}) {
   const reply = await fetch(url, { signal: AbortSignal.timeout(REQUEST_MS), referrerPolicy: "no-referrer", ...options });
   const value = await reply.json().catch(() => ({}));
-  if (!reply.ok) throw new Refusal(reply.status, value, Number(reply.headers.get("Retry-After")));
+  if (!reply.ok) throw new ServerError(reply.status, value, Number(reply.headers.get("Retry-After")));
   return value;
 }
 
-// Retries `work` until it succeeds or is refused permanently; calls `onwait(secs)` before each retry.
-export async function patiently(work, onwait) {
+// Retries `work` until it succeeds or fails permanently; calls `onwait(secs)` before each retry.
+export async function withRetries(work, onwait) {
   for (let attempt = 0; ; attempt += 1) {
     try {
       return await work();
     } catch (error) {
-      if (error instanceof Refusal && !error.isPassing) throw error;
-      const secs = Math.max(error.retrySecs || 0, Math.min(LONGEST_WAIT_SECS, 2 ** attempt));
+      if (error instanceof ServerError && !error.isTemporary) throw error;
+      const secs = Math.max(error.retrySecs || 0, Math.min(MAX_WAIT_SECS, 2 ** attempt));
       onwait(secs, error);
       await new Promise((resolve) => {
         const timer = setTimeout(resolve, 1000 * secs);
@@ -61,13 +61,13 @@ function attempt() {
 async function post(path, body) {
   const headers = { "Content-Type": "application/json" };
   if (recall("token")) headers.Authorization = `Bearer ${recall("token")}`;
-  return ask(path, { method: "POST", headers, body: JSON.stringify(body) });
+  return request(path, { method: "POST", headers, body: JSON.stringify(body) });
 }
 
 export const backend = {
-  study: () => ask("api/study"),
+  study: () => request("api/study"),
   begin: (language) => post("api/begin", { consent: true, language, parameters: parameters(), attempt: attempt() }),
-  state: () => ask("api/state", { headers: { Authorization: `Bearer ${recall("token")}` } }),
+  state: () => request("api/state", { headers: { Authorization: `Bearer ${recall("token")}` } }),
   answer: (answer) => post("api/answer", answer),
   withdraw: () => post("api/withdraw", {}),
 };

@@ -19,7 +19,7 @@ export const paragraphs = (text) => text.split(/\n\s*\n/).map((part) => el("p", 
 export const byId = (id) => document.getElementById(id);
 
 // Shows a status message, which screen readers announce.
-export function say(sentence) {
+export function announce(sentence) {
   byId("status").textContent = sentence;
 }
 
@@ -27,7 +27,7 @@ export function say(sentence) {
 export function show(heading, nodes, focus) {
   const h1 = el("h1", { tabindex: "-1" }, heading);
   byId("main").replaceChildren(h1, ...nodes.filter(Boolean));
-  say("");
+  announce("");
   window.scrollTo(0, 0);
   (focus ?? h1).focus({ preventScroll: true });
   return h1;

@@ -11,20 +11,20 @@ function read() {
   }
 }
 
-let kept = read();
+let stored = read();
 // Other tabs of the same browser share the session.
-window.addEventListener("storage", () => (kept = read()));
+window.addEventListener("storage", () => (stored = read()));
 
-export const recall = (key) => kept[key];
+export const recall = (key) => stored[key];
 
 const linkOf = (token) => `#resume=${token}`;
 const setFragment = (fragment) => history.replaceState(null, "", location.pathname + location.search + fragment);
 
 // Stores a value; returns false where storage is unavailable. The address then holds the token, which survives a reload.
 export function keep(key, value) {
-  kept = { ...kept, [key]: value };
+  stored = { ...stored, [key]: value };
   try {
-    localStorage.setItem(name, JSON.stringify(kept));
+    localStorage.setItem(name, JSON.stringify(stored));
     return true;
   } catch {
     if (key === "token") setFragment(linkOf(value));
@@ -35,15 +35,15 @@ export function keep(key, value) {
 // Takes the token out of a link to resume a session. The address keeps it where it cannot be stored.
 export function takeLinkedToken() {
   const token = new URLSearchParams(location.hash.slice(1)).get("resume");
-  if (token && !kept.token && keep("token", token)) setFragment("");
+  if (token && !stored.token && keep("token", token)) setFragment("");
 }
 
 export function forget() {
-  if (location.hash === linkOf(kept.token)) setFragment("");
-  kept = {};
+  if (location.hash === linkOf(stored.token)) setFragment("");
+  stored = {};
   try {
     localStorage.removeItem(name);
   } catch {
-    // Nothing was stored.
+    // Storage is unavailable.
   }
 }

@@ -1,17 +1,17 @@
 // Operator's page: number and progress of the participants. No answers are shown.
 
-import { byId, button, el, say, show } from "./dom.js";
+import { announce, byId, button, el, show } from "./dom.js";
 
 const REFRESH_MS = 10_000;
 const KEY = "orator-operator";
 const COUNTS = {
-  wanted: "Participants wanted",
+  target: "Target number of participants",
   completed: "Completed",
-  active: "Taking part now",
-  abandoned: "Without an answer for too long; their places are free",
-  excluded: "Completed with too many failed attention checks",
-  replaced: "Whose place was given to another",
-  withdrawn: "Withdrawn, their data deleted",
+  active: "In progress",
+  abandoned: "Abandoned: no answer for too long, session can be reassigned",
+  excluded: "Completed, excluded for failed attention checks",
+  replaced: "Session reassigned to another participant",
+  withdrawn: "Withdrawn, data deleted",
 };
 let timer = null;
 
@@ -23,9 +23,9 @@ function askForToken(sentence) {
     sessionStorage.setItem(KEY, input.value.trim());
     refresh();
   };
-  const line = el("p", { class: "row" }, el("label", { for: "token" }, "The operator's token"), input, el("button", { type: "submit", class: "main" }, "Open"));
+  const line = el("p", { class: "row" }, el("label", { for: "token" }, "Operator token"), input, el("button", { type: "submit", class: "main" }, "Open"));
   show("Progress", [el("form", { onsubmit }, line)], input);
-  say(sentence);
+  announce(sentence);
 }
 
 async function refresh() {
@@ -36,13 +36,13 @@ async function refresh() {
     const reply = await fetch("api/operator", { headers: { Authorization: `Bearer ${token}` } });
     if (reply.status === 401 || reply.status === 403) {
       sessionStorage.removeItem(KEY);
-      return askForToken("That token is not this study's.");
+      return askForToken("This is not the operator token of this study.");
     }
     if (!reply.ok) throw new Error(`${reply.status}`);
     draw(await reply.json());
-    say(`As of ${new Date().toLocaleTimeString()}; looked up anew every ${REFRESH_MS / 1000} s.`);
+    announce(`Updated at ${new Date().toLocaleTimeString()}; refreshes every ${REFRESH_MS / 1000} s.`);
   } catch {
-    say("The server cannot be reached; the page tries again.");
+    announce("The server cannot be reached; retrying.");
   }
   timer = setTimeout(refresh, REFRESH_MS);
 }
@@ -66,25 +66,25 @@ function duration(secs) {
 
 // Link by which a participant can resume in another browser, or see the completion code again.
 const resumeLink = (token) =>
-  token ? el("a", { href: new URL(`./#resume=${token}`, location.href).href }, "Link to the session") : "";
+  token ? el("a", { href: new URL(`./#resume=${token}`, location.href).href }, "Link to resume") : "";
 
 function draw(progress) {
   const { title, quota, answers, participants, stalls } = progress;
   byId("title").textContent = title;
   document.title = `Progress: ${title}`;
   byId("tools").replaceChildren(
-    button("Forget the token", () => {
+    button("Sign out", () => {
       sessionStorage.removeItem(KEY);
       askForToken("");
     }, "quiet"),
   );
   const counts = Object.entries(COUNTS).map(([key, label]) => [label, quota[key]]);
-  counts.push(["Answers stored", answers]);
-  counts.push(["Trials with a stalled film", stalls.trials], ["Seconds stalled in all", Math.round(stalls.secs)]);
-  const done = el("progress", { max: `${quota.wanted}`, value: `${Math.min(quota.completed, quota.wanted)}`, "aria-label": "Completed of the wanted" });
-  const nodes = [el("p", {}, `${quota.completed} of ${quota.wanted} participants have completed the study.`), done, el("h2", {}, "Quota"), table(["What", "Number"], counts, "Quota")];
-  const places = participants.map((one) => [one.place, one.status, `${one.position} of ${one.n_trials}`, duration(one.idle_secs), resumeLink(one.token)]);
-  nodes.push(el("h2", {}, "Places"), table(["Place", "State", "Trials answered", "Since the last", "For the participant"], places, "Places"));
+  counts.push(["Stored answers", answers]);
+  counts.push(["Trials with stalled playback", stalls.trials], ["Total stalled time, s", Math.round(stalls.secs)]);
+  const done = el("progress", { max: `${quota.target}`, value: `${Math.min(quota.completed, quota.target)}`, "aria-label": "Participants who completed the study" });
+  const nodes = [el("p", {}, `${quota.completed} of ${quota.target} participants have completed the study.`), done, el("h2", {}, "Participants"), table(["Status", "Number"], counts, "Participants")];
+  const sessions = participants.map((one) => [one.session, one.status, `${one.position} of ${one.n_trials}`, duration(one.idle_secs), resumeLink(one.token)]);
+  nodes.push(el("h2", {}, "Sessions"), table(["Session", "Status", "Answered trials", "Last activity", "For the participant"], sessions, "Sessions"));
   if (document.querySelector("h1")?.textContent === "Progress" && !byId("token")) byId("main").replaceChildren(document.querySelector("h1"), ...nodes);
   else show("Progress", nodes);
 }

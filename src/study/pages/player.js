@@ -2,17 +2,17 @@
 
 // Asynchrony in seconds above which the mute film's rate is adjusted (half a frame at 30 fps), and below which the rate
 // returns to normal.
-const MOST_APART = 1 / 60;
-const NEAR = 1 / 200;
+const MAX_OFFSET = 1 / 60;
+const SYNCED_OFFSET = 1 / 200;
 // Seconds after the start during which films that are far apart are restarted, and the maximum number of restarts.
 const START = 0.4;
-const MOST_RESTARTS = 2;
+const MAX_RESTARTS = 2;
 // Asynchrony in seconds that is too large to correct by the playback rate.
-const FAR = 0.12;
+const LARGE_OFFSET = 0.12;
 const TICK_MS = 40;
 const LOAD_MS = 60_000;
 // Time without progress, while the page is visible, after which films count as broken.
-const STAND_MS = 30_000;
+const STUCK_MS = 30_000;
 
 // Total duration of a condition.
 class Stopwatch {
@@ -44,15 +44,15 @@ export class Screening {
   // Position of the film that lags behind, the time of its last progress, and whether playback made no progress for too
   // long.
   #progress = { at: 0, since: 0 };
-  #hasStood = false;
+  #wasStuck = false;
 
   constructor(urls) {
     // Callbacks: playback stalled (true) or continued (false); playback begins.
-    this.onstall = (_stands) => {};
+    this.onstall = (_isStalled) => {};
     this.onbegin = () => {};
     this.plays = 0;
     // Maximum asynchrony in seconds right after the start, and later.
-    this.apart = { start: 0, most: 0 };
+    this.offset = { start: 0, max: 0 };
     this.videos = urls.map((url, at) => {
       const video = document.createElement("video");
       video.preload = "auto";
@@ -71,7 +71,7 @@ export class Screening {
       video.src = url;
       return video;
     });
-    this.watch = () => this.#look();
+    this.watch = () => this.#checkVisibility();
     for (const event of ["blur", "focus"]) window.addEventListener(event, this.watch);
     document.addEventListener("visibilitychange", this.watch);
   }
@@ -90,8 +90,8 @@ export class Screening {
 
   // Resolves when every film can be played through; rejects if one cannot be loaded.
   load() {
-    if (this.#hasStood) for (const video of this.videos) video.load();
-    this.#hasStood = false;
+    if (this.#wasStuck) for (const video of this.videos) video.load();
+    this.#wasStuck = false;
     return Promise.all(this.videos.map((video) => this.#loaded(video)));
   }
 
@@ -122,13 +122,13 @@ export class Screening {
       this.#settle = { resolve: () => this.#stop(resolve), reject: (error) => this.#stop(() => reject(error)) };
       this.#timer = setInterval(() => this.#tick(), TICK_MS);
       this.#start().catch((error) => this.#settle?.reject(error));
-      this.#look();
+      this.#checkVisibility();
     });
   }
 
   async #start() {
     this.#starting = true;
-    this.apart = { start: 0, most: 0 };
+    this.offset = { start: 0, max: 0 };
     await Promise.all(
       this.videos.map((video) => {
         video.pause();
@@ -147,12 +147,12 @@ export class Screening {
   }
 
   // Whether the films have made no progress for too long although the page is visible.
-  #stands() {
+  #isStuck() {
     const at = Math.min(...this.videos.filter((video) => !video.ended).map((video) => video.currentTime));
     const now = performance.now();
     if (at !== this.#progress.at || document.hidden) this.#progress = { at, since: now };
-    this.#hasStood = now - this.#progress.since > STAND_MS;
-    return this.#hasStood;
+    this.#wasStuck = now - this.#progress.since > STUCK_MS;
+    return this.#wasStuck;
   }
 
   #stop(after) {
@@ -178,7 +178,7 @@ export class Screening {
   }
 
   // Records whether the page is in front, and pauses the films while it is hidden.
-  #look() {
+  #checkVisibility() {
     this.#unfocused.set(this.playing && !isInFront());
     if (!this.playing || this.#starting || this.#waiting.size > 0) return;
     for (const video of this.videos) {
@@ -200,7 +200,7 @@ export class Screening {
     if (!this.playing) return;
     // The page has replaced its content.
     if (!this.videos[0].isConnected) return this.close();
-    if (this.#stands()) return this.#settle.reject(new Error("film"));
+    if (this.#isStuck()) return this.#settle.reject(new Error("film"));
     if (this.#starting) return;
     if (this.videos.every((video) => video.ended)) return this.#settle.resolve();
     const hasWaited = this.#waiting.size > 0;
@@ -210,23 +210,23 @@ export class Screening {
       this.#stalled.set(false);
       this.onstall(false);
     }
-    this.#look();
-    this.#holdTogether();
+    this.#checkVisibility();
+    this.#synchronise();
   }
 
-  #holdTogether() {
-    const [heard, mute] = this.videos;
-    if (!mute || [heard, mute].some((video) => video.ended || video.paused || video.seeking)) return;
-    const lead = mute.currentTime - heard.currentTime;
-    const apart = Math.abs(lead);
-    if (heard.currentTime < START) this.apart.start = Math.max(this.apart.start, apart);
-    else this.apart.most = Math.max(this.apart.most, apart);
-    if (apart > FAR) {
-      if (heard.currentTime < START && this.#restarts < MOST_RESTARTS) {
+  #synchronise() {
+    const [audible, muted] = this.videos;
+    if (!muted || [audible, muted].some((video) => video.ended || video.paused || video.seeking)) return;
+    const lead = muted.currentTime - audible.currentTime;
+    const offset = Math.abs(lead);
+    if (audible.currentTime < START) this.offset.start = Math.max(this.offset.start, offset);
+    else this.offset.max = Math.max(this.offset.max, offset);
+    if (offset > LARGE_OFFSET) {
+      if (audible.currentTime < START && this.#restarts < MAX_RESTARTS) {
         this.#restarts += 1;
         this.#start().catch((error) => this.#settle?.reject(error));
-      } else mute.currentTime = heard.currentTime;
-    } else if (apart > MOST_APART) mute.playbackRate = lead > 0 ? 0.9 : 1.1;
-    else if (apart < NEAR) mute.playbackRate = 1;
+      } else muted.currentTime = audible.currentTime;
+    } else if (offset > MAX_OFFSET) muted.playbackRate = lead > 0 ? 0.9 : 1.1;
+    else if (offset < SYNCED_OFFSET) muted.playbackRate = 1;
   }
 }

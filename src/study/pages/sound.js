@@ -1,6 +1,6 @@
 // Sound check: a film with some tones, which the participant counts.
 
-import { button, el, say, show } from "./dom.js";
+import { announce, button, el, show } from "./dom.js";
 import { Screening } from "./player.js";
 import { t } from "./texts.js";
 
@@ -23,18 +23,18 @@ export function checkSound(film) {
     );
     const play = button(t("sound.play"), async () => {
       play.disabled = true;
-      say(t("films.playing"));
+      announce(t("films.playing"));
       try {
         await screening.play();
       } catch {
         play.disabled = false;
-        say(t("films.failed"));
+        announce(t("films.failed"));
         return;
       }
       play.disabled = false;
       play.textContent = t("sound.again");
       asked.disabled = false;
-      say("");
+      announce("");
       input.focus({ preventScroll: true });
     });
     const onsubmit = (event) => {
@@ -43,7 +43,7 @@ export function checkSound(film) {
       if (Number(input.value) !== TONES) {
         input.value = "";
         go.disabled = true;
-        say(t("sound.wrong"));
+        announce(t("sound.wrong"));
         play.focus();
         return;
       }

@@ -1,6 +1,6 @@
 // Trial: its films, its question, and measurements up to the answer.
 
-import { button, el, say, show } from "./dom.js";
+import { announce, button, el, show } from "./dom.js";
 import { Screening } from "./player.js";
 import { question, questionKeys, slider } from "./questions.js";
 import { firstText, t } from "./texts.js";
@@ -52,18 +52,18 @@ const captioned = (video, label) => {
 
 // Button that plays a screening; calls `onseen` after the first complete play. Without `replay` the films play once.
 function playButton(screening, labels, replay, { onstart, onbegin, onseen, onend }) {
-  let wasSeen = false;
+  let wasPlayed = false;
   const press = async () => {
     play.disabled = true;
     play.textContent = t("films.loading");
-    say(t("films.loading"));
+    announce(t("films.loading"));
     try {
       onstart();
       await screening.play();
     } catch (error) {
       play.disabled = false;
       play.textContent = labels.play;
-      say(t(error?.name === "NotAllowedError" ? "films.again-please" : "films.failed"));
+      announce(t(error?.name === "NotAllowedError" ? "films.again-please" : "films.failed"));
       play.focus();
       onend();
       return;
@@ -71,17 +71,17 @@ function playButton(screening, labels, replay, { onstart, onbegin, onseen, onend
     play.dataset.seen = "yes";
     play.disabled = !replay;
     play.textContent = replay ? labels.again : labels.seen;
-    say(t("films.ended"));
-    if (!wasSeen) onseen();
-    wasSeen = true;
+    announce(t("films.ended"));
+    if (!wasPlayed) onseen();
+    wasPlayed = true;
     onend();
   };
   const play = button(labels.play, press);
   screening.onbegin = onbegin;
-  screening.onstall = (stands) => say(stands ? t("films.stalled") : "");
+  screening.onstall = (isStalled) => announce(isStalled ? t("films.stalled") : "");
   screening.videos[0].addEventListener("playing", () => {
     play.textContent = t("films.playing");
-    say(t("films.playing"));
+    announce(t("films.playing"));
   });
   return play;
 }
@@ -105,8 +105,8 @@ function filmsTogether(task, trial) {
     onend() {
       view.onend();
       // Measured asynchrony of the two films, for tests of the page.
-      stage.dataset.startApartMs = Math.round(1000 * screening.apart.start);
-      stage.dataset.mostApartMs = Math.round(1000 * screening.apart.most);
+      stage.dataset.startOffsetMs = Math.round(1000 * screening.offset.start);
+      stage.dataset.maxOffsetMs = Math.round(1000 * screening.offset.max);
     },
   });
   const hint = el("p", { class: "note" }, t(task.replay ? "films.often" : "films.once"));

@@ -17,14 +17,14 @@ const MAX_PLAYS: u32 = 1000;
 /// The response does not fit the design, or a number is out of range.
 pub fn check(answer: &SubmittedAnswer, trial: &Trial, task: &PlannedTask) -> Result<(), ApiError> {
     if !fits(&answer.response, trial, task) {
-        return Err(ApiError::bad_request("The response does not fit the trial's task."));
+        return Err(ApiError::bad_request("The response does not match the design of the task."));
     }
     if !(1..=MAX_PLAYS).contains(&answer.plays) {
-        return Err(ApiError::bad_request("The films must be played before an answer."));
+        return Err(ApiError::bad_request("The films must be played before the answer."));
     }
     let secs = [answer.stalled_secs, answer.unfocused_secs, answer.response_secs];
     if !secs.iter().all(|secs| (0.0..=MAX_SECS).contains(secs)) {
-        return Err(ApiError::bad_request("A time must lie between 0 and 86400 seconds."));
+        return Err(ApiError::bad_request("Durations must be between 0 and 86400 seconds."));
     }
     Ok(())
 }

@@ -2,7 +2,7 @@
 //! of all participants. Films are served in full or in byte ranges.
 
 use super::answer::{check, fails_check, feedback};
-use super::reply::{ApiError, JsonBody, bearer, header_text, json_reply, not_found, unauthorized};
+use super::reply::{ApiError, JsonBody, bearer_token, header_text, json_reply, not_found, unauthorized};
 use super::secret::{completion_code, is_attempt, participant_id};
 use super::served_study::ServedStudy;
 use super::study_server::App;
@@ -78,20 +78,18 @@ impl FromRequestParts<Arc<App>> for AuthenticatedSession {
     type Rejection = ApiError;
 
     async fn from_request_parts(parts: &mut Parts, app: &Arc<App>) -> Result<Self, ApiError> {
-        let (session, id) = app.secret.verify(bearer(&parts.headers)?).ok_or_else(unauthorized)?;
+        let (session, id) = app.secret.verify(bearer_token(&parts.headers)?).ok_or_else(unauthorized)?;
         if app.limits.allow_participant(&id) { Ok(Self { session, id }) } else { Err(ApiError::too_many_requests()) }
     }
 }
 
 fn gone() -> ApiError {
-    let sentence =
-        "This session has ended: too much time passed and its place was given to another, or it was begun anew.";
+    let sentence = "This session has ended: it was reassigned after too long a pause, or restarted in another browser.";
     ApiError::new(StatusCode::GONE, sentence)
 }
 
 fn unknown() -> ApiError {
-    let sentence =
-        "Nothing of this session is stored: it was withdrawn, or had no answer when its place was given away.";
+    let sentence = "This session is not stored: it was withdrawn, or was reassigned before its first answer.";
     ApiError::new(StatusCode::GONE, sentence)
 }
 
@@ -117,25 +115,26 @@ pub async fn begin(State(app): Shared, JsonBody(body): JsonBody<StartRequest>) -
         return Err(ApiError::too_many_requests());
     }
     if !body.consent {
-        return Err(ApiError::bad_request("Nobody takes part without consent."));
+        return Err(ApiError::bad_request("Consent is required to take part."));
     }
     if !app.study.languages.contains(&body.language) {
-        return Err(ApiError::bad_request("The study does not have that language."));
+        return Err(ApiError::bad_request("The study is not available in this language."));
     }
     if !body.parameters.iter().all(|(name, value)| is_parameter(name, value)) {
         return Err(ApiError::bad_request(
-            "A parameter is unknown, too long, or holds other than letters, digits and -_.:@.",
+            "A parameter is unknown, too long, or contains characters other than letters, digits and -_.:@.",
         ));
     }
     if body.attempt.as_deref().is_some_and(|attempt| !is_attempt(attempt)) {
-        return Err(ApiError::bad_request("The attempt must be 32 hexadecimal digits."));
+        return Err(ApiError::bad_request("The field attempt must be 32 hexadecimal digits."));
     }
     let id_of = |attempt: &String| Ok(app.secret.id_of_attempt(attempt));
     let named = || anyhow::Ok((body.attempt.as_ref().map_or_else(participant_id, id_of)?, completion_code()?));
     let (id, code) = named().map_err(|_| ApiError::not_stored())?;
     let new_participant = NewParticipant { id, language: body.language, parameters: body.parameters, code };
     if app.study.requires_id && !new_participant.has_id() {
-        let sentence = "The address lacks the participant ID of a recruiting site; open the study by its link there.";
+        let sentence = "The participant ID of the recruiting site is missing from the address; open the study with \
+            the link on that site.";
         return Err(ApiError::new(StatusCode::FORBIDDEN, sentence).with_reason("id-missing"));
     }
     let (quota, clock) = (app.study.quota, app.clock);
@@ -144,12 +143,12 @@ pub async fn begin(State(app): Shared, JsonBody(body): JsonBody<StartRequest>) -
             BeginOutcome::Begun(participant) => participant,
             BeginOutcome::Replaced => return Err(gone()),
             BeginOutcome::Known => {
-                let sentence = "This participant ID has been used already; go on in the browser where you began. \
-                    Without an answer there you can begin here some minutes later.";
+                let sentence = "This participant ID is already in use; continue in the browser in which you started. \
+                    If you have not answered anything yet, you can start here in a few minutes.";
                 return Err(ApiError::conflict(sentence).with_reason("known"));
             }
             BeginOutcome::Full => {
-                return Err(ApiError::conflict("The study has all its participants. Thank you.").with_reason("full"));
+                return Err(ApiError::conflict("The study has enough participants. Thank you.").with_reason("full"));
             }
         };
     let token = app.secret.token(participant.session, &participant.id);
@@ -185,12 +184,12 @@ pub async fn answer(
     JsonBody(answer): JsonBody<SubmittedAnswer>,
 ) -> Result<HttpResponse, ApiError> {
     let trials = app.study.trials(session);
-    let out_of_turn = || ApiError::conflict("That trial has not been given out.");
+    let out_of_turn = || ApiError::conflict("This trial has not been presented yet.");
     let trial = trials.get(answer.position as usize).ok_or_else(out_of_turn)?;
     check(&answer, trial, app.study.task(trial))?;
     let terms = TrialTerms {
         session,
-        least_ms: app.study.least_ms(trial),
+        min_ms: app.study.min_ms(trial),
         is_last: answer.position as usize + 1 == trials.len(),
         fails_check: fails_check(&answer.response, trial),
     };
@@ -201,10 +200,10 @@ pub async fn answer(
         }
         RecordOutcome::Unknown => Err(unknown()),
         RecordOutcome::Replaced => Err(gone()),
-        RecordOutcome::Differs => Err(ApiError::conflict("That trial has another answer already.")),
+        RecordOutcome::Differs => Err(ApiError::conflict("A different answer to this trial is already stored.")),
         RecordOutcome::OutOfTurn => Err(out_of_turn()),
-        RecordOutcome::TooSoon(left_ms) => {
-            let sentence = "The films cannot have been seen yet.";
+        RecordOutcome::TooEarly(left_ms) => {
+            let sentence = "The films cannot have been played to the end yet.";
             Err(ApiError::new(StatusCode::TOO_EARLY, sentence).retry_after(left_ms / 1000 + 1))
         }
     }
@@ -229,7 +228,7 @@ pub async fn withdraw(
 
 /// `GET /api/operator`
 pub async fn operator(State(app): Shared, headers: HeaderMap) -> Result<HttpResponse, ApiError> {
-    if !app.secret.is_operator(bearer(&headers)?) {
+    if !app.secret.is_operator(bearer_token(&headers)?) {
         return Err(unauthorized());
     }
     let read = |db: &_| Ok((participants::all(db)?, participants::n_withdrawn(db)?, answers::stalls(db)?));
@@ -239,12 +238,12 @@ pub async fn operator(State(app): Shared, headers: HeaderMap) -> Result<HttpResp
         // A completed session still shows its completion code.
         let is_open = participant.status != Status::Replaced;
         json!({
-            "place": participant.session + 1,
+            "session": participant.session + 1,
             "status": participant.status,
             "position": participant.position,
             "n_trials": app.study.trials(participant.session).len(),
             "idle_secs": (now_ms - participant.given_ms).max(0) / 1000,
-            // For participants who can no longer use the browser in which they began.
+            // For participants who can no longer use the browser in which they started.
             "token": is_open.then(|| app.secret.token(participant.session, &participant.id)),
         })
     };

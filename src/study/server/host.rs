@@ -11,9 +11,9 @@ use axum::response::{IntoResponse, Response as HttpResponse};
 use std::net::IpAddr;
 use std::sync::Arc;
 
-const MISDIRECTED: &str = "This server is not known under the host name of this request.\n\
-    Open it at the address that `orator study serve` printed. To serve it under another name, or through a proxy that \
-    passes one on, start it with --host-name NAME.\n";
+const MISDIRECTED: &str = "This server does not accept the host name of this request.\n\
+    Open the address that `orator study serve` printed. To allow another host name, such as that of a proxy, start the \
+    server with --host-name NAME.\n";
 
 /// Hosts under which the study is served: the listening address and any public names.
 #[derive(Debug)]
@@ -26,13 +26,13 @@ impl AllowedHosts {
     /// Hosts of a server that listens on `listened` and is known by `names`.
     ///
     /// # Errors
-    /// A name has a scheme, port or path, or letters outside ASCII.
+    /// A name has a scheme, port or path, or non-ASCII characters.
     pub fn new(listened: IpAddr, names: &[String]) -> Result<Self> {
         for name in names {
-            let hint = "write it in punycode (xn--...), as browsers send it";
-            ensure!(name.is_ascii(), "--host-name {name:?}: the name has letters outside ASCII; {hint}");
+            let hint = "use its punycode form (xn--...), as browsers send it";
+            ensure!(name.is_ascii(), "--host-name {name:?}: the name contains non-ASCII characters; {hint}");
             let is_host = name.parse::<Authority>().is_ok_and(|authority| authority.host() == name);
-            ensure!(is_host, "--host-name {name:?}: expected a name alone, such as study.example.org");
+            ensure!(is_host, "--host-name {name:?}: expected a host name only, such as study.example.org");
         }
         let names = names.iter().map(|name| without_dot(name).to_owned()).collect();
         Ok(Self { listened, names })

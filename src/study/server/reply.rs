@@ -70,7 +70,7 @@ impl ApiError {
     }
 
     pub fn not_stored() -> Self {
-        let sentence = "The server cannot store anything at the moment; try again.";
+        let sentence = "The server cannot store data at the moment; try again.";
         Self::new(StatusCode::SERVICE_UNAVAILABLE, sentence).retry_after(5)
     }
 }
@@ -115,12 +115,12 @@ pub fn text_reply(content_type: &'static str, text: &'static str) -> HttpRespons
 
 /// Reply for unknown paths.
 pub async fn not_found() -> ApiError {
-    ApiError::new(StatusCode::NOT_FOUND, "There is nothing at this address.")
+    ApiError::new(StatusCode::NOT_FOUND, "This address does not exist.")
 }
 
 /// Reply for unsupported methods of a path.
-pub async fn wrong_method() -> ApiError {
-    ApiError::new(StatusCode::METHOD_NOT_ALLOWED, "This address does not take that method.")
+pub async fn method_not_allowed() -> ApiError {
+    ApiError::new(StatusCode::METHOD_NOT_ALLOWED, "This address does not accept the method of the request.")
 }
 
 /// JSON body of a request. Requiring the content type `application/json` rejects HTML forms of other sites.
@@ -136,9 +136,9 @@ impl<T: DeserializeOwned, S: Send + Sync> FromRequest<S> for JsonBody<T> {
             return Err(ApiError::new(StatusCode::UNSUPPORTED_MEDIA_TYPE, "The body must be application/json."));
         }
         let bytes = Bytes::from_request(request, state).await;
-        let bytes = bytes.map_err(|error| ApiError::new(error.status(), "The body is too large, or broke off."))?;
+        let bytes = bytes.map_err(|error| ApiError::new(error.status(), "The body is too large or incomplete."))?;
         let value = serde_json::from_slice(&bytes);
-        value.map(Self).map_err(|_| ApiError::bad_request("The body is not the JSON that this address takes."))
+        value.map(Self).map_err(|_| ApiError::bad_request("The body is not valid JSON for this address."))
     }
 }
 
@@ -146,14 +146,14 @@ impl<T: DeserializeOwned, S: Send + Sync> FromRequest<S> for JsonBody<T> {
 ///
 /// # Errors
 /// The header is missing or malformed.
-pub fn bearer(headers: &HeaderMap) -> Result<&str, ApiError> {
+pub fn bearer_token(headers: &HeaderMap) -> Result<&str, ApiError> {
     let token = header_text(headers, header::AUTHORIZATION).and_then(|text| text.strip_prefix("Bearer "));
     token.ok_or_else(unauthorized)
 }
 
 /// Reply for a missing or invalid token.
 pub fn unauthorized() -> ApiError {
-    ApiError::new(StatusCode::UNAUTHORIZED, "A valid token is needed.")
+    ApiError::new(StatusCode::UNAUTHORIZED, "A valid token is required.")
 }
 
 /// Header as text; `None` if it is missing or contains bytes other than visible ASCII.

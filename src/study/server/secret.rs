@@ -67,7 +67,7 @@ impl StudySecret {
         let read = || -> Result<Self> {
             let mode = path.metadata()?.permissions().mode();
             let group_and_other_bits = mode & 0o077;
-            ensure!(group_and_other_bits == 0, "others than its owner can read it; `chmod 600` it");
+            ensure!(group_and_other_bits == 0, "users other than its owner can read it; run `chmod 600`");
             Ok(serde_json::from_slice(&fs::read(path)?)?)
         };
         read().with_context(|| format!("cannot use {}", path.display()))
@@ -129,7 +129,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn altered_and_truncated_tokens_are_refused() {
+    fn altered_and_truncated_tokens_are_rejected() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("secret.json");
         let secret = StudySecret::open(&path).unwrap();

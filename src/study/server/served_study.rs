@@ -55,14 +55,18 @@ impl ServedStudy {
         let plan_hash = hash_file(&folder.plan())?;
         let trials = || plan.sessions.iter().flat_map(|session| &session.trials);
         let is_known = |trial: &Trial| trial.task < plan.tasks.len() && !trial.films.is_empty();
-        ensure!(trials().all(is_known), "{}: a trial without a film or a task", folder.plan().display());
+        ensure!(
+            trials().all(is_known),
+            "{}: a trial has no films or refers to an unknown task",
+            folder.plan().display()
+        );
         let sound_check = Some(&plan.sound_check).filter(|film| !film.is_empty());
         let names: BTreeSet<&String> = trials().flat_map(|trial| &trial.films).chain(sound_check).collect();
         let films = names.into_iter().map(|name| Ok((name.clone(), open_film(&folder.film(name), name)?)));
         let films = films.collect::<Result<_>>()?;
         let quota = Quota {
             n_sessions: u32::try_from(plan.sessions.len()).context("too many sessions")?,
-            wanted: u32::try_from(file.participants).context("too many participants")?,
+            target: u32::try_from(file.participants).context("too many participants")?,
             excluded_from: file.exclusion.failed_checks,
             abandoned_ms: (1000.0 * abandoned_secs) as i64,
             unanswered_ms: UNANSWERED_MS,
@@ -79,7 +83,7 @@ impl ServedStudy {
         let requires_id = file.require_id;
         let mut study = Self { title, languages, plan, plan_hash, quota, requires_id, return_url, page, films };
         let first_trials = study.plan.sessions.iter().filter_map(|session| session.trials.first());
-        let first_ms = first_trials.map(|trial| study.least_ms(trial)).max().unwrap_or(0);
+        let first_ms = first_trials.map(|trial| study.min_ms(trial)).max().unwrap_or(0);
         study.quota.unanswered_ms += 2 * first_ms;
         Ok(study)
     }
@@ -106,7 +110,7 @@ impl ServedStudy {
 
     /// Minimum time to watch the films of a trial, milliseconds: up to two films play together; those of sliders, and
     /// more than two, play one after another.
-    pub fn least_ms(&self, trial: &Trial) -> i64 {
+    pub fn min_ms(&self, trial: &Trial) -> i64 {
         let is_rated = self.task(trial).design == TaskDesign::Sliders && trial.phase != TrialPhase::AttentionCheck;
         let secs = trial.films.iter().filter_map(|film| self.film(film)).map(|film| film.secs);
         let secs = if is_rated || trial.films.len() > 2 { secs.sum() } else { secs.fold(0.0, f64::max) };
@@ -116,7 +120,7 @@ impl ServedStudy {
 
 fn open_film(path: &Path, name: &str) -> Result<ServedFilm> {
     let is_opaque = name.len() == 16 && name.bytes().all(|b| matches!(b, b'0'..=b'9' | b'a'..=b'f'));
-    ensure!(is_opaque, "the plan names a film {name:?}, which is not 16 hexadecimal digits");
-    let secs = probe(path)?.duration_secs.with_context(|| format!("{} does not state its length", path.display()))?;
+    ensure!(is_opaque, "invalid film name {name:?} in the plan: expected 16 hexadecimal digits");
+    let secs = probe(path)?.duration_secs.with_context(|| format!("{} does not state its duration", path.display()))?;
     Ok(ServedFilm { path: path.to_owned(), secs })
 }

@@ -3,7 +3,7 @@
 use super::clock::Clock;
 use super::host::{AllowedHosts, check_host};
 use super::limits::RateLimits;
-use super::reply::{HEADERS, not_found, text_reply, wrong_method};
+use super::reply::{HEADERS, method_not_allowed, not_found, text_reply};
 use super::secret::StudySecret;
 use super::served_study::ServedStudy;
 use super::{api, listen};
@@ -84,9 +84,9 @@ impl StudyServer {
             tokio::runtime::Builder::new_multi_thread().enable_all().build().context("cannot start threads")?;
         let router = router(self.app, hosts);
         runtime.block_on(async {
-            let mut terminated = signal(SignalKind::terminate()).context("cannot wait for a signal")?;
+            let mut terminated = signal(SignalKind::terminate()).context("cannot install the SIGTERM handler")?;
             let listener = TcpListener::bind(address).await;
-            let listener = listener.with_context(|| format!("cannot listen at {address}; choose another --port"))?;
+            let listener = listener.with_context(|| format!("cannot listen on {address}; use another --port"))?;
             on_listening(listener.local_addr()?);
             let stop = async {
                 tokio::select! {
@@ -120,7 +120,7 @@ fn router(app: App, hosts: AllowedHosts) -> Router {
     let no_store = HeaderValue::from_static("no-store");
     let mut router = router
         .fallback(not_found)
-        .method_not_allowed_fallback(wrong_method)
+        .method_not_allowed_fallback(method_not_allowed)
         .layer(DefaultBodyLimit::max(MAX_BODY_BYTES))
         .layer(TimeoutLayer::with_status_code(StatusCode::REQUEST_TIMEOUT, REQUEST_TIMEOUT))
         .layer(middleware::from_fn_with_state(Arc::new(hosts), check_host))

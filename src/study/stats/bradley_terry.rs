@@ -185,7 +185,7 @@ mod tests {
     }
 
     #[test]
-    fn votes_without_finite_strengths_are_refused() {
+    fn votes_without_finite_strengths_are_rejected() {
         let vote = |first, second, share| PairedVote { participant: 0, first, second, share };
         let fit = |votes: &[PairedVote], n| strengths(votes, n).unwrap_err();
         assert!(matches!(fit(&[], 2), StatisticsError::TooFew { .. }));

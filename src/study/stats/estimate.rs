@@ -11,27 +11,27 @@ use std::ops::RangeInclusive;
 /// Reason why a statistic cannot be computed.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum StatisticsError {
-    #[error("{found} {what}, at least {least} are needed")]
-    TooFew { what: &'static str, least: usize, found: usize },
-    #[error("{what} are all the same: their spread cannot be estimated")]
-    NoSpread { what: &'static str },
-    #[error("{what} is {value}, expected {least} to {most}")]
-    OutOfRange { what: &'static str, value: f64, least: f64, most: f64 },
-    #[error("{what} hold a number that is not finite")]
+    #[error("{found} {what}: at least {min} are required")]
+    TooFew { what: &'static str, min: usize, found: usize },
+    #[error("all {what} are equal: their variance cannot be estimated")]
+    NoVariation { what: &'static str },
+    #[error("invalid {what} {value}: expected {min} to {max}")]
+    OutOfRange { what: &'static str, value: f64, min: f64, max: f64 },
+    #[error("{what} contain a number that is not finite")]
     NotFinite { what: &'static str },
-    #[error("{what} fall into groups of which one never loses to the other: their difference is not finite")]
+    #[error("one group of {what} never loses to the others: their strengths are not finite")]
     Unconnected { what: &'static str },
 }
 
-/// Returns an error if `found` is less than `least`.
-pub fn at_least(what: &'static str, least: usize, found: usize) -> Result<(), StatisticsError> {
-    if found < least { Err(StatisticsError::TooFew { what, least, found }) } else { Ok(()) }
+/// Returns an error if `found` is less than `min`.
+pub fn at_least(what: &'static str, min: usize, found: usize) -> Result<(), StatisticsError> {
+    if found < min { Err(StatisticsError::TooFew { what, min, found }) } else { Ok(()) }
 }
 
 /// Returns an error if `value` is outside `range` or NaN.
 pub fn within(what: &'static str, value: f64, range: RangeInclusive<f64>) -> Result<(), StatisticsError> {
-    let (least, most) = (*range.start(), *range.end());
-    if range.contains(&value) { Ok(()) } else { Err(StatisticsError::OutOfRange { what, value, least, most }) }
+    let (min, max) = (*range.start(), *range.end());
+    if range.contains(&value) { Ok(()) } else { Err(StatisticsError::OutOfRange { what, value, min, max }) }
 }
 
 /// Returns an error if a value is NaN or infinite.
@@ -51,7 +51,7 @@ pub fn interval_of_draws(
     confidence: f64,
 ) -> Result<ConfidenceInterval, StatisticsError> {
     let (tail, sorted) = (tail(confidence)?, Ordered::new(draws));
-    let at = |share| sorted.quantile(share).ok_or(StatisticsError::TooFew { what: "draws", least: 1, found: 0 });
+    let at = |share| sorted.quantile(share).ok_or(StatisticsError::TooFew { what: "draws", min: 1, found: 0 });
     Ok(ConfidenceInterval { low: at(tail)?, high: at(1.0 - tail)? })
 }
 
@@ -73,10 +73,10 @@ impl StudentEstimate {
     pub fn new(value: f64, standard_error: f64, degrees_of_freedom: f64) -> Result<Self, StatisticsError> {
         finite("values", &[value, standard_error])?;
         if standard_error <= 0.0 {
-            return Err(StatisticsError::NoSpread { what: "values" });
+            return Err(StatisticsError::NoVariation { what: "values" });
         }
         if degrees_of_freedom.is_nan() || degrees_of_freedom <= 0.0 {
-            return Err(StatisticsError::TooFew { what: "degrees of freedom", least: 1, found: 0 });
+            return Err(StatisticsError::TooFew { what: "degrees of freedom", min: 1, found: 0 });
         }
         Ok(Self { value, standard_error, degrees_of_freedom })
     }
@@ -152,7 +152,7 @@ mod tests {
 
     #[test]
     fn values_without_spread_have_no_estimate() {
-        assert_eq!(StudentEstimate::of_mean(&[0.3; 7]), Err(StatisticsError::NoSpread { what: "values" }));
+        assert_eq!(StudentEstimate::of_mean(&[0.3; 7]), Err(StatisticsError::NoVariation { what: "values" }));
         assert!(matches!(StudentEstimate::of_mean(&[0.5]), Err(StatisticsError::TooFew { .. })));
         assert!(matches!(StudentEstimate::of_mean(&[0.5, f64::NAN]), Err(StatisticsError::NotFinite { .. })));
         assert!(StudentEstimate::new(0.0, 1.0, 0.0).is_err() && StudentEstimate::new(0.0, 1.0, f64::NAN).is_err());

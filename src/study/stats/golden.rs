@@ -19,10 +19,10 @@ fn of<T: DeserializeOwned>(case: &Value, name: &str) -> T {
 }
 
 /// Asserts that the computed values are near those with these names in the case.
-fn assert_near<const N: usize>(case: &Value, names: [&str; N], found: [f64; N], relative: f64, least: f64) {
+fn assert_near<const N: usize>(case: &Value, names: [&str; N], found: [f64; N], relative: f64, min_scale: f64) {
     for (found, name) in found.into_iter().zip(names) {
         let expected: f64 = of(case, name);
-        assert!((found - expected).abs() <= relative * expected.abs().max(least), "{name} {found}: {case}");
+        assert!((found - expected).abs() <= relative * expected.abs().max(min_scale), "{name} {found}: {case}");
     }
 }
 

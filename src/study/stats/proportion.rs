@@ -85,8 +85,8 @@ impl BinomialCount {
 
     fn distribution(&self, probability: f64) -> Result<Binomial, StatisticsError> {
         within("probability", probability, 0.0..=1.0)?;
-        let refused = StatisticsError::OutOfRange { what: "probability", value: probability, least: 0.0, most: 1.0 };
-        Binomial::new(probability, self.trials).map_err(|_| refused)
+        let invalid = StatisticsError::OutOfRange { what: "probability", value: probability, min: 0.0, max: 1.0 };
+        Binomial::new(probability, self.trials).map_err(|_| invalid)
     }
 }
 

@@ -89,7 +89,7 @@ pub fn friedman(blocks: &[Vec<f64>]) -> Result<RankTest, StatisticsError> {
     for block in blocks {
         finite("scores", block)?;
         if block.len() != k {
-            return Err(StatisticsError::TooFew { what: "scores of a participant", least: k, found: block.len() });
+            return Err(StatisticsError::TooFew { what: "scores of a participant", min: k, found: block.len() });
         }
         let (ranks, ties) = ranks(block);
         sums.iter_mut().zip(ranks).for_each(|(sum, rank)| *sum += rank);
@@ -98,7 +98,7 @@ pub fn friedman(blocks: &[Vec<f64>]) -> Result<RankTest, StatisticsError> {
     let (n, k) = (blocks.len() as f64, k as f64);
     let correction = 1.0 - of_ties / (n * k * (k * k - 1.0));
     if correction <= 0.0 {
-        return Err(StatisticsError::NoSpread { what: "scores of every participant" });
+        return Err(StatisticsError::NoVariation { what: "scores of every participant" });
     }
     let squares: f64 = sums.iter().map(|sum| sum * sum).sum();
     let statistic = (12.0 / (n * k * (k + 1.0)) * squares - 3.0 * n * (k + 1.0)) / correction;
@@ -117,7 +117,7 @@ pub fn median_interval(values: &[f64], confidence: f64) -> Result<ConfidenceInte
     let tail = tail(confidence)?;
     finite("values", values)?;
     let n = values.len();
-    let too_few = |least| StatisticsError::TooFew { what: "values", least, found: n };
+    let too_few = |min| StatisticsError::TooFew { what: "values", min, found: n };
     let below = Binomial::new(0.5, n as u64).map_err(|_| too_few(1))?;
     // `outside` values are excluded at each end: it is the largest rank whose cumulative probability does not exceed
     // the tail.
@@ -161,7 +161,7 @@ pub fn alpha(units: &[Vec<f64>], scale: MeasurementScale) -> Result<f64, Statist
     };
     let observed: f64 = counts.iter().map(|unit| disagreement(unit) / (unit.iter().sum::<f64>() - 1.0)).sum();
     let expected = disagreement(&totals) / (totals.iter().sum::<f64>() - 1.0);
-    if expected > 0.0 { Ok(1.0 - observed / expected) } else { Err(StatisticsError::NoSpread { what: "ratings" }) }
+    if expected > 0.0 { Ok(1.0 - observed / expected) } else { Err(StatisticsError::NoVariation { what: "ratings" }) }
 }
 
 /// Squared distance between two of the ascending `values`, given by index; `totals` holds the frequency of each value.
@@ -184,20 +184,20 @@ mod tests {
     use super::*;
 
     #[test]
-    fn invalid_arguments_are_refused() {
+    fn invalid_arguments_are_rejected() {
         assert!(matches!(signed_rank(&[0.0; 4]), Err(StatisticsError::TooFew { .. })));
         assert!(signed_rank(&[]).is_err() && signed_rank(&[1.0, f64::NAN]).is_err());
         assert_eq!(signed_rank(&[3.0]), Ok(RankTest { statistic: 0.0, p: 1.0 }));
         assert!(friedman(&[]).is_err() && friedman(&[vec![1.0, 2.0], vec![2.0, 1.0]]).is_err());
         assert!(friedman(&[vec![1.0, 2.0, 3.0], vec![1.0]]).is_err());
-        assert!(matches!(friedman(&vec![vec![1.0; 3]; 5]), Err(StatisticsError::NoSpread { .. })));
+        assert!(matches!(friedman(&vec![vec![1.0; 3]; 5]), Err(StatisticsError::NoVariation { .. })));
     }
 
     #[test]
     fn six_values_are_needed() {
         let six = [3.0, 1.0, 6.0, 2.0, 5.0, 4.0];
         assert_eq!(median_interval(&six, 0.95), Ok(ConfidenceInterval { low: 1.0, high: 6.0 }));
-        let few = Err(StatisticsError::TooFew { what: "values", least: 6, found: 5 });
+        let few = Err(StatisticsError::TooFew { what: "values", min: 6, found: 5 });
         assert_eq!(median_interval(&six[..5], 0.95), few);
         assert!(median_interval(&[], 0.95).is_err() && median_interval(&[f64::NAN; 9], 0.95).is_err());
         assert_eq!(median_interval(&[2.0; 9], 0.95), Ok(ConfidenceInterval { low: 2.0, high: 2.0 }));
@@ -208,7 +208,7 @@ mod tests {
         let same = vec![vec![2.0, 2.0], vec![5.0, 5.0]];
         assert_eq!(alpha(&same, MeasurementScale::Interval), Ok(1.0));
         let constant = vec![vec![2.0, 2.0]; 3];
-        assert!(matches!(alpha(&constant, MeasurementScale::Nominal), Err(StatisticsError::NoSpread { .. })));
+        assert!(matches!(alpha(&constant, MeasurementScale::Nominal), Err(StatisticsError::NoVariation { .. })));
         let lone = vec![vec![2.0], vec![1.0]];
         assert!(matches!(alpha(&lone, MeasurementScale::Nominal), Err(StatisticsError::TooFew { .. })));
         assert!(alpha(&[], MeasurementScale::Ordinal).is_err());

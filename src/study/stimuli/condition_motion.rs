@@ -6,6 +6,7 @@ use crate::file::{ConditionSource, StudyCondition, fill_pattern};
 use anyhow::{Context, Result, ensure};
 use ndarray::{Array2, Array3, Axis, s};
 use orator_base::motion::{resample, units};
+use orator_base::text::counted;
 use orator_base::types::pose3d::Motion;
 use orator_base::types::posture::{Posture, PostureChannel};
 use orator_base::types::sound::samples_of;
@@ -17,7 +18,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 /// Tolerance for the length of another system's motion file, frames.
-const SPARE_FRAMES: usize = 2;
+const LENGTH_TOLERANCE_FRAMES: usize = 2;
 
 /// Motion that a condition shows for a clip.
 #[derive(Clone, Debug)]
@@ -95,10 +96,11 @@ pub fn motions(
         let (name, n) = (&source.name, clips.len());
         ensure!(
             n > 1,
-            "the speaker {name} has {n} clip, and the condition {} shows another's motion: 2 are needed",
+            "the speaker {name} has {}, but the mismatched condition {} needs at least 2",
+            counted(n, "clip"),
             condition.name
         );
-        let matched = shown.get(of).with_context(|| format!("condition {}: no condition {of}", condition.name))?;
+        let matched = shown.get(of).with_context(|| format!("condition {}: unknown condition {of}", condition.name))?;
         let mismatched = others.iter().map(|other| matched[*other].clone()).collect();
         shown.insert(condition.name.clone(), mismatched);
     }
@@ -114,11 +116,11 @@ fn whole_motion(
 ) -> Result<Option<(Motion, Option<Posture>)>> {
     match &condition.source {
         ConditionSource::Natural => {
-            let natural = segment.natural.clone().context("it has no natural motion: give the speaker a dataset")?;
+            let natural = segment.natural.clone().context("no natural motion: expected a speaker with a dataset")?;
             Ok(Some(natural))
         }
         ConditionSource::Checkpoint(_) => {
-            let model = models.0.get(&condition.name).context("no model is open")?;
+            let model = models.0.get(&condition.name).context("the model is not loaded")?;
             Ok(Some(generated(model, segment, source.fps)?))
         }
         ConditionSource::MeanPose | ConditionSource::Files(_) | ConditionSource::Mismatched(_) => Ok(None),
@@ -157,7 +159,7 @@ fn cut(of: usize, motion: &Motion, posture: Option<&Posture>, clip: &StudyClip) 
 
 /// Static mean pose of the training split.
 fn constant(of: usize, source: &SpeakerSource, n_frames: usize) -> Result<ShownMotion> {
-    let dataset: &Dataset = source.dataset.as_ref().context("a mean pose needs a dataset: give the speaker one")?;
+    let dataset: &Dataset = source.dataset.as_ref().context("no mean pose: expected a speaker with a dataset")?;
     let stats = dataset.stats();
     let mean = stats.mean();
     let pose = |joint: usize, k: usize| if stats.n_seen[joint] > 0 { mean[[joint, k]] } else { f32::NAN };
@@ -175,15 +177,16 @@ fn constant(of: usize, source: &SpeakerSource, n_frames: usize) -> Result<ShownM
     Ok(ShownMotion { of, motion: Motion::from_joints(source.fps, joints), posture })
 }
 
-/// Reads the motion file of another system, which must be as long as its clip up to [`SPARE_FRAMES`].
+/// Reads the motion file of another system, which must be as long as its clip up to [`LENGTH_TOLERANCE_FRAMES`].
 fn of_file(path: &Path, fps: FrameRate, n_frames: usize) -> Result<Motion> {
     let read = motion_file::read(path, Some(fps))?.motion;
     units::check(&read).with_context(|| path.display().to_string())?;
     let motion = resample::at_rate(&read, fps);
     let (n, path) = (motion.n_frames(), path.display());
     ensure!(
-        n.abs_diff(n_frames) <= SPARE_FRAMES,
-        "{path} lasts {:.2} s and its clip {:.2} s: make the motion of the clip's own sound, in the folder clips",
+        n.abs_diff(n_frames) <= LENGTH_TOLERANCE_FRAMES,
+        "{path} lasts {:.2} s, but its clip lasts {:.2} s: generate the motion from the audio of the clip in the \
+         folder clips",
         fps.secs(n),
         fps.secs(n_frames)
     );
@@ -214,7 +217,8 @@ mod tests {
 
     #[test]
     fn mismatched_clips_differ_and_come_from_other_segments_if_possible() {
-        let clip = |segment: usize| StudyClip { name: String::new(), segment, frames: 0..9, cut_db: 0.0, unseen: 0.0 };
+        let clip =
+            |segment: usize| StudyClip { name: String::new(), segment, frames: 0..9, cut_db: 0.0, hidden_share: 0.0 };
         let of =
             |segments: &[usize]| mismatched_clips(&segments.iter().map(|segment| clip(*segment)).collect::<Vec<_>>());
         assert_eq!(of(&[0, 0, 1, 1]), [2, 3, 0, 1]);

@@ -1,5 +1,5 @@
 //! Cuts clips of equal length from a speaker's speech: they start and end in pauses, contain speech, and have visible
-//! joints. Better clips come first; segments without any acceptable clip are refused with a reason.
+//! joints. Better clips come first; segments without any acceptable clip are rejected with a reason.
 
 use super::speaker_source::{SpeakerSource, SpeechSegment};
 use anyhow::Result;
@@ -31,7 +31,8 @@ pub struct StudyClip {
     /// Sound level at the louder end, dB relative to the speech level.
     pub cut_db: f32,
     /// Proportion of joints that were not detected; they are hidden in every film of the clip.
-    pub unseen: f64,
+    #[serde(alias = "unseen")]
+    pub hidden_share: f64,
 }
 
 impl StudyClip {
@@ -43,7 +44,7 @@ impl StudyClip {
 
 /// Segment of speech without a clip.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct RefusedSegment {
+pub struct RejectedSegment {
     pub name: String,
     pub reason: String,
 }
@@ -54,59 +55,59 @@ pub struct CutSpeech {
     pub clips: Vec<StudyClip>,
     /// Names of the clips, best first.
     pub best_first: Vec<String>,
-    pub refused: Vec<RefusedSegment>,
+    pub rejected: Vec<RejectedSegment>,
 }
 
 /// Candidate for a clip.
 struct CutCandidate {
     start: usize,
     cut_db: f32,
-    unseen: f64,
+    hidden_share: f64,
 }
 
-/// Cuts `n_wanted` clips of `n_frames`, or fewer if there are no more; `rank` orders clips of equal grade.
-pub fn cut(source: &SpeakerSource, n_frames: usize, n_wanted: usize, rank: impl Fn(&str) -> u64) -> Result<CutSpeech> {
-    let looked_at = (0..source.n_segments()).into_par_iter().map(|segment| {
+/// Cuts `n_clips` clips of `n_frames`, or fewer if there are no more; `rank` orders clips of equal grade.
+pub fn cut(source: &SpeakerSource, n_frames: usize, n_clips: usize, rank: impl Fn(&str) -> u64) -> Result<CutSpeech> {
+    let found = (0..source.n_segments()).into_par_iter().map(|segment| {
         let segment = source.read(segment)?;
         let found = candidates(&segment, source.fps, n_frames);
         Ok((segment.name, found))
     });
-    let (mut segments, mut refused) = (Vec::new(), Vec::new());
-    for (at, (name, found)) in looked_at.collect::<Result<Vec<_>>>()?.into_iter().enumerate() {
+    let (mut segments, mut rejected) = (Vec::new(), Vec::new());
+    for (at, (name, found)) in found.collect::<Result<Vec<_>>>()?.into_iter().enumerate() {
         match found {
             Ok(candidates) => segments.push((at, name, candidates)),
-            Err(reason) => refused.push(RefusedSegment { name, reason }),
+            Err(reason) => rejected.push(RejectedSegment { name, reason }),
         }
     }
     let mut clips: Vec<StudyClip> = Vec::new();
-    for (most_db, most_unseen) in GRADES {
+    for (max_db, max_hidden) in GRADES {
         let mut more: Vec<StudyClip> = Vec::new();
         for (segment, name, candidates) in &segments {
-            let taken = clips.iter().filter(|clip| clip.segment == *segment).map(|clip| clip.frames.clone());
-            let mut taken: Vec<Range<usize>> = taken.collect();
+            let used = clips.iter().filter(|clip| clip.segment == *segment).map(|clip| clip.frames.clone());
+            let mut used: Vec<Range<usize>> = used.collect();
             // Greedy choice by earliest end maximises the number of disjoint clips of equal length.
-            for &CutCandidate { start, cut_db, unseen } in candidates {
+            for &CutCandidate { start, cut_db, hidden_share } in candidates {
                 let frames = start..start + n_frames;
-                let is_free = taken.iter().all(|other| other.end <= frames.start || frames.end <= other.start);
-                if is_free && cut_db <= most_db && unseen <= most_unseen {
-                    taken.push(frames.clone());
+                let is_free = used.iter().all(|other| other.end <= frames.start || frames.end <= other.start);
+                if is_free && cut_db <= max_db && hidden_share <= max_hidden {
+                    used.push(frames.clone());
                     more.push(StudyClip {
                         name: format!("{name}-{start:05}"),
                         segment: *segment,
                         frames,
                         cut_db,
-                        unseen,
+                        hidden_share,
                     });
                 }
             }
         }
         more.sort_by_cached_key(|clip| (rank(&clip.name), clip.name.clone()));
-        more.truncate(n_wanted - clips.len());
+        more.truncate(n_clips - clips.len());
         clips.extend(more);
     }
     let best_first = clips.iter().map(|clip| clip.name.clone()).collect();
     clips.sort_by_key(|clip| (clip.segment, clip.frames.start));
-    Ok(CutSpeech { clips, best_first, refused })
+    Ok(CutSpeech { clips, best_first, rejected })
 }
 
 /// Candidate clips of a segment, or the reason why there is none.
@@ -117,30 +118,36 @@ fn candidates(
 ) -> std::result::Result<Vec<CutCandidate>, String> {
     let secs = |frames: usize| fps.secs(frames);
     if segment.n_frames < n_frames {
-        return Err(format!("{:.1} s long, shorter than a film of {:.1} s", secs(segment.n_frames), secs(n_frames)));
+        return Err(format!("{:.1} s long, but a clip needs {:.1} s", secs(segment.n_frames), secs(n_frames)));
     }
     let level = SpeechLevel::of(&segment.sound);
     let at_ends: Vec<f32> = (0..=segment.n_frames).map(|frame| level.around(secs(frame))).collect();
-    let unseen = cumulative_hidden(segment);
+    let n_hidden = cumulative_hidden(segment);
     let n_joints = counted_joints().count() as f64;
     let all: Vec<CutCandidate> = (0..=segment.n_frames - n_frames)
         .map(|start| {
             let end = start + n_frames;
-            let unseen = (unseen[end] - unseen[start]) as f64 / (n_joints * n_frames as f64);
-            CutCandidate { start, cut_db: at_ends[start].max(at_ends[end]), unseen }
+            let hidden_share = (n_hidden[end] - n_hidden[start]) as f64 / (n_joints * n_frames as f64);
+            CutCandidate { start, cut_db: at_ends[start].max(at_ends[end]), hidden_share }
         })
         .collect();
-    let least = all.iter().map(|candidate| candidate.unseen).fold(f64::INFINITY, f64::min);
-    if least > MAX_HIDDEN {
-        let (least, most) = (100.0 * least, 100.0 * MAX_HIDDEN);
-        return Err(format!("{least:.0} % of the joints or more are not seen in any stretch: at most {most:.0} %"));
+    let min_hidden = all.iter().map(|candidate| candidate.hidden_share).fold(f64::INFINITY, f64::min);
+    if min_hidden > MAX_HIDDEN {
+        let [min, max] = [min_hidden, MAX_HIDDEN].map(|share| 100.0 * share);
+        return Err(format!(
+            "at least {min:.0} % of the joints are missing in every possible clip; the limit is {max:.0} %"
+        ));
     }
     let is_spoken = |candidate: &CutCandidate| {
         level.speech_share(secs(candidate.start)..secs(candidate.start + n_frames)) >= MIN_SPEECH
     };
     let spoken: Vec<CutCandidate> = all.into_iter().filter(is_spoken).collect();
-    let least = 100.0 * MIN_SPEECH;
-    if spoken.is_empty() { Err(format!("no stretch in which {least:.0} % is speech")) } else { Ok(spoken) }
+    let min_speech = 100.0 * MIN_SPEECH;
+    if spoken.is_empty() {
+        Err(format!("no possible clip contains at least {min_speech:.0} % speech"))
+    } else {
+        Ok(spoken)
+    }
 }
 
 /// Cumulative number of undetected joints before each frame, with the total as the last element.

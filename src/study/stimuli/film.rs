@@ -61,7 +61,8 @@ pub fn film_name(seed: u64, content: &FilmContent) -> String {
 pub fn check_encoder() -> Result<()> {
     ensure!(
         has_h264(),
-        "this ffmpeg has no libx264, and browsers do not play what it writes instead: install an ffmpeg with libx264 (`orator doctor` shows which one is used)"
+        "ffmpeg has no libx264 encoder, and browsers cannot play its other formats: install ffmpeg with libx264 \
+         (`orator doctor` shows which ffmpeg is used)"
     );
     Ok(())
 }

@@ -107,7 +107,7 @@ impl CutSpeaker {
         let body = CommonBody::of(&source.bone_lengths, &all);
         let visibility = |clip: usize| {
             let of_clip: Vec<&ShownMotion> = motions.values().map(|of_condition| &of_condition[clip]).collect();
-            CommonVisibility::of(&of_clip).context("the study has no condition")
+            CommonVisibility::of(&of_clip).context("the study has no conditions")
         };
         let visibilities: Vec<CommonVisibility> = (0..cut.clips.len()).map(visibility).collect::<Result<_>>()?;
         let task = progress.begin(&format!("avatar of {}", source.name), all.len() as u64);
@@ -125,7 +125,7 @@ impl CutSpeaker {
         drop(task);
         let shown: Vec<&Performance> = performances.values().flatten().map(|(_, performance)| performance).collect();
         let stage = AvatarStage::new(&shown, &Appearance::faceless(), size, CAMERA);
-        let stage = stage.with_context(|| format!("the speaker {} has no clip", source.name))?;
+        let stage = stage.with_context(|| format!("the speaker {} has no clips", source.name))?;
         let (clips, film_fps) = (cut.clips, smooth_rate(source.fps));
         Ok(FilmedSpeaker { clips, sounds, tones, film_fps, performances, stage })
     }
@@ -164,7 +164,7 @@ impl FilmedSpeaker {
     }
 
     fn shown(&self, content: &FilmContent) -> Result<&(usize, Performance)> {
-        let missing = || format!("no motion of {} by {}", content.clip, content.condition);
+        let missing = || format!("no motion for the clip {} in the condition {}", content.clip, content.condition);
         let clip = self.find(&content.clip).with_context(missing)?;
         self.performances.get(&content.condition).and_then(|of_condition| of_condition.get(clip)).with_context(missing)
     }

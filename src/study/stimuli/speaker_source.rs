@@ -59,7 +59,7 @@ impl SpeakerSource {
             let others: Vec<&str> = others.map(Split::name).collect();
             let (dir, split) = (dataset.dir().display(), split.name());
             bail!(
-                "{dir} has no interval in the {split} split; it has {}: say so by `split` of the speaker {name}",
+                "{dir} has no interval in the {split} split: set `split` of the speaker {name} to one of {}",
                 others.join(", ")
             );
         }
@@ -80,8 +80,8 @@ impl SpeakerSource {
         let (mut missing, entry) = (Vec::new(), pattern.to_string_lossy());
         let root = SearchRoot::new(Path::new("/"), &[]);
         let found = expand(&entry, &root, ("sound", &SOUND_EXTENSIONS), &mut missing).map_err(anyhow::Error::msg);
-        let mut files = found.with_context(|| format!("sounds of the speaker {name}"))?;
-        ensure!(missing.is_empty(), "sounds of the speaker {name}: {}", missing.join("; "));
+        let mut files = found.with_context(|| format!("audio files of the speaker {name}"))?;
+        ensure!(missing.is_empty(), "audio files of the speaker {name}: {}", missing.join("; "));
         files.sort();
         let mut segments: Vec<SourceSegment> = Vec::new();
         for file in files {
@@ -89,7 +89,7 @@ impl SpeakerSource {
             let is_duplicate = segments.iter().any(|segment| segment.name == stem);
             ensure!(
                 !is_duplicate,
-                "{}: two sounds of the speaker {name} are called {stem}; rename one",
+                "{}: two audio files of the speaker {name} have the name {stem}: rename one",
                 file.display()
             );
             segments.push(SourceSegment { name: stem, location: SegmentLocation::File(file) });
@@ -126,7 +126,7 @@ impl SpeakerSource {
                 let words = words.map(|transcript| transcript.words).unwrap_or_default();
                 Ok(SpeechSegment { name: name.clone(), sound, words, n_frames, natural: None })
             }
-            (SegmentLocation::Sample(_), None) => bail!("{name}: its dataset is closed"),
+            (SegmentLocation::Sample(_), None) => bail!("{name}: the dataset is closed"),
         }
     }
 }

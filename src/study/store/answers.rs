@@ -29,7 +29,7 @@ pub struct TrialTerms {
     pub session: u32,
     /// Minimum time from the first presentation of the trial to its answer, milliseconds: before, its films cannot have
     /// been watched.
-    pub least_ms: i64,
+    pub min_ms: i64,
     /// Whether the trial is the last of its session.
     pub is_last: bool,
     /// Whether the answer fails an attention check.
@@ -50,7 +50,7 @@ pub enum RecordOutcome {
     /// The trial has not been presented yet.
     OutOfTurn,
     /// The films cannot have been watched yet; remaining milliseconds.
-    TooSoon(i64),
+    TooEarly(i64),
 }
 
 /// Stores `answer` of the participant `id`.
@@ -76,9 +76,9 @@ pub fn record(
     if answer.position > participant.position || participant.status == Status::Completed {
         return Ok(RecordOutcome::OutOfTurn);
     }
-    let left_ms = terms.least_ms - (now_ms - participant.given_ms);
+    let left_ms = terms.min_ms - (now_ms - participant.given_ms);
     if left_ms > 0 {
-        return Ok(RecordOutcome::TooSoon(left_ms));
+        return Ok(RecordOutcome::TooEarly(left_ms));
     }
     insert(db, id, answer)?;
     let after = Participant {

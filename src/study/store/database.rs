@@ -36,13 +36,19 @@ pub fn open(path: &Path, plan: &str) -> Result<Connection> {
         db.pragma_update(None, "secure_delete", true)?;
         db.pragma_update(None, "temp_store", "memory")?;
         let mode: String = db.query_row("PRAGMA journal_mode = wal", [], |row| row.get(0))?;
-        ensure!(mode == "wal", "its file system cannot hold a write-ahead log (mode {mode}); use a local disk");
+        ensure!(
+            mode == "wal",
+            "its file system does not support a write-ahead log (journal mode {mode}); use a local disk"
+        );
         // A commit returns after its data have been flushed to disk.
         db.pragma_update(None, "synchronous", "full")?;
         db.execute_batch(TABLES)?;
         db.execute("INSERT OR IGNORE INTO about VALUES ('plan', ?1)", [plan])?;
         let of: String = db.query_row("SELECT value FROM about WHERE name = 'plan'", [], |row| row.get(0))?;
-        ensure!(of == plan, "its responses belong to another plan than plan.json; move it away to begin anew");
+        ensure!(
+            of == plan,
+            "its responses belong to a different plan than plan.json; move the file away to start with no responses"
+        );
         // Completes the erasure of a withdrawal that was interrupted by a kill.
         erase_deleted(&db)?;
         Ok(db)
@@ -55,7 +61,7 @@ pub fn open(path: &Path, plan: &str) -> Result<Connection> {
 /// # Errors
 /// There is no database at `path`.
 pub fn open_for_reading(path: &Path) -> Result<Connection> {
-    ensure!(path.is_file(), "{} is not there: nobody has taken part yet", path.display());
+    ensure!(path.is_file(), "{} does not exist: no participant has started yet", path.display());
     // Writable, because a reader also has to recover the write-ahead log of a killed server.
     let flags = OpenFlags::SQLITE_OPEN_READ_WRITE | OpenFlags::SQLITE_OPEN_NO_MUTEX;
     let opened = || -> rusqlite::Result<Connection> {

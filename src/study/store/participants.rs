@@ -99,7 +99,7 @@ pub struct Quota {
     /// Number of sessions of the plan.
     pub n_sessions: u32,
     /// Target number of participants who complete the study and are not excluded for failed checks.
-    pub wanted: u32,
+    pub target: u32,
     /// Minimum number of failed attention checks that excludes a participant; `None`: no exclusion.
     pub excluded_from: Option<u32>,
     /// Time without a further answer after which a session may be reassigned, milliseconds.
@@ -112,7 +112,7 @@ pub struct Quota {
 /// Number of participants by status.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
 pub struct QuotaCounts {
-    pub wanted: u32,
+    pub target: u32,
     /// Completed and not excluded.
     pub completed: u32,
     /// Completed, but excluded for failed checks.
@@ -132,17 +132,17 @@ impl Quota {
         match participant.status {
             Status::Active => {
                 let is_unanswered = participant.position == 0;
-                let most_ms = if is_unanswered { self.unanswered_ms } else { i64::MAX }.min(self.abandoned_ms);
-                now_ms - participant.given_ms < most_ms
+                let max_ms = if is_unanswered { self.unanswered_ms } else { i64::MAX }.min(self.abandoned_ms);
+                now_ms - participant.given_ms < max_ms
             }
-            Status::Completed => self.excluded_from.is_none_or(|least| participant.failed_checks < least),
+            Status::Completed => self.excluded_from.is_none_or(|n| participant.failed_checks < n),
             Status::Replaced => false,
         }
     }
 
     /// Counts `participants` by status; `withdrawn` participants are no longer among them.
     pub fn count(&self, participants: &[Participant], withdrawn: u32, now_ms: i64) -> QuotaCounts {
-        let mut counts = QuotaCounts { wanted: self.wanted, withdrawn, ..QuotaCounts::default() };
+        let mut counts = QuotaCounts { target: self.target, withdrawn, ..QuotaCounts::default() };
         for participant in participants {
             let holds = self.holds(participant, now_ms);
             *match participant.status {
@@ -223,7 +223,7 @@ pub fn begin(
     let holders = others.into_iter().filter(|participant| quota.holds(participant, now_ms));
     let taken: BTreeSet<u32> = holders.map(|participant| participant.session).collect();
     let free = (0..quota.n_sessions).find(|session| !taken.contains(session));
-    let Some(session) = free.filter(|_| taken.len() < quota.wanted as usize) else { return Ok(BeginOutcome::Full) };
+    let Some(session) = free.filter(|_| taken.len() < quota.target as usize) else { return Ok(BeginOutcome::Full) };
     for given_up in own.iter().map(|participant| participant.session).chain([session]) {
         db.execute(
             "DELETE FROM participant WHERE session = ?1 AND status = ?2 AND position = 0",
@@ -298,7 +298,7 @@ mod tests {
     use crate::vote::Response;
 
     const QUOTA: Quota =
-        Quota { n_sessions: 3, wanted: 2, excluded_from: None, abandoned_ms: 3_600_000, unanswered_ms: 300_000 };
+        Quota { n_sessions: 3, target: 2, excluded_from: None, abandoned_ms: 3_600_000, unanswered_ms: 300_000 };
 
     /// Begins the session `name` with this ID of a recruiting site.
     fn begin_as(db: &Connection, name: &str, pid: &str, now_ms: i64) -> BeginOutcome {
@@ -317,8 +317,7 @@ mod tests {
         let [stalled_secs, unfocused_secs, response_secs] = [0.0; 3];
         let given = SubmittedAnswer { position: 0, response, plays: 1, stalled_secs, unfocused_secs, response_secs };
         let session = find(db, name).unwrap().map_or(0, |participant| participant.session);
-        record(db, name, &given, TrialTerms { session, least_ms: 0, is_last: false, fails_check: false }, now_ms)
-            .unwrap()
+        record(db, name, &given, TrialTerms { session, min_ms: 0, is_last: false, fails_check: false }, now_ms).unwrap()
     }
 
     fn status(db: &Connection, name: &str) -> Option<Status> {
@@ -332,16 +331,16 @@ mod tests {
         assert_eq!(session(&begin_as(&db, "first", "p", 1000)), Some(0));
         assert_eq!(session(&begin_as(&db, "first", "p", 2000)), Some(0), "the reply was lost");
         assert_eq!(begin_as(&db, "second", "p", 300_999), BeginOutcome::Known, "in time for the first answer");
-        assert_eq!(session(&begin_as(&db, "second", "p", 301_000)), Some(0), "no place more for the same person");
+        assert_eq!(session(&begin_as(&db, "second", "p", 301_000)), Some(0), "the same session for the same person");
         assert_eq!((status(&db, "first"), answer(&db, "first", 302_000)), (None, RecordOutcome::Unknown));
         assert!(matches!(answer(&db, "second", 303_000), RecordOutcome::Stored(_)));
         assert_eq!(begin_as(&db, "third", "p", 304_000), BeginOutcome::Known);
         assert_eq!(begin_as(&db, "third", "p", 4_000_000), BeginOutcome::Known, "abandoned, but not replaced");
-        assert_eq!(session(&begin_as(&db, "other", "q", 4_000_000)), Some(0), "the abandoned place");
+        assert_eq!(session(&begin_as(&db, "other", "q", 4_000_000)), Some(0), "the abandoned session");
         assert_eq!(status(&db, "second"), Some(Status::Replaced), "its answer stays");
         assert_eq!(begin_as(&db, "second", "p", 4_000_000), BeginOutcome::Replaced);
-        assert_eq!(session(&begin_as(&db, "third", "p", 4_000_001)), Some(1), "after the place was given away");
-        assert_eq!(status(&db, "other"), Some(Status::Active), "who has that place now keeps it");
+        assert_eq!(session(&begin_as(&db, "third", "p", 4_000_001)), Some(1), "after the session was reassigned");
+        assert_eq!(status(&db, "other"), Some(Status::Active), "the new participant keeps the session");
         assert_eq!(begin_as(&db, "last", "r", 4_000_002), BeginOutcome::Full);
         assert_eq!(latest_ms(&db).unwrap(), 4_000_001);
     }
@@ -365,7 +364,7 @@ mod tests {
         let response = Response::Number(42);
         let [stalled_secs, unfocused_secs, response_secs] = [0.0; 3];
         let given = SubmittedAnswer { position: 0, response, plays: 1, stalled_secs, unfocused_secs, response_secs };
-        let terms = TrialTerms { session: 0, least_ms: 0, is_last: false, fails_check: false };
+        let terms = TrialTerms { session: 0, min_ms: 0, is_last: false, fails_check: false };
         assert_eq!(record(&db, "own-0", &given, terms, 29_700_002).unwrap(), RecordOutcome::Unknown);
     }
 
@@ -383,7 +382,7 @@ mod tests {
         assert_eq!((counts.active, counts.abandoned), (1, 1));
         assert!(
             matches!(answer(&db, "silent", 300_000), RecordOutcome::Stored(_)),
-            "late, but the place is not given away"
+            "late, but the session was not reassigned"
         );
         assert_eq!(begin_as(&db, "later", "", 3_609_999), BeginOutcome::Full, "an answer holds it for an hour");
         assert_eq!(session(&begin_as(&db, "last", "", 3_610_000)), Some(1));

@@ -154,6 +154,6 @@ mod tests {
         drop(store);
         thread.join().unwrap();
         let error = ResponseStore::open(&path, "another").unwrap_err();
-        assert!(format!("{error:#}").contains("another plan"), "{error:#}");
+        assert!(format!("{error:#}").contains("a different plan"), "{error:#}");
     }
 }

@@ -62,9 +62,9 @@ fn counts_of_a_published_study_come_out_as_known() {
     }
     let methods = analysis["methods"].as_str().unwrap();
     assert!(methods.contains("100 participants gave 3,000 votes in 2 tasks") && methods.contains("Schuirmann 1987"));
-    assert!(methods.contains("all figures are exploratory"), "{methods}");
-    let verdict = analysis["tasks"][0]["verdicts"][0].as_str().unwrap();
-    assert!(verdict.contains("52.5 % of 2,000 votes"), "{verdict}");
+    assert!(methods.contains("all statistics are exploratory"), "{methods}");
+    let sentence = analysis["tasks"][0]["conclusions"][0].as_str().unwrap();
+    assert!(sentence.contains("52.5 % of 2,000 votes"), "{sentence}");
     // the narrower bound
     let answer = project.answer(&["study", "analyse", "votes.csv", "--draws", "100", "--bound", "5"]);
     let pooled = &answer.json["analysis"]["tasks"][0]["shares"][0];
@@ -81,7 +81,7 @@ fn a_known_preference_is_found_in_every_design_and_its_page_is_whole() {
     assert_eq!(answer.code, 0, "{}", answer.errors);
     let tasks = &answer.json["analysis"]["tasks"];
     let conclusion = |task: usize| tasks[task]["shares"][0]["conclusion"].as_str().unwrap_or_default().to_owned();
-    assert_eq!([0, 1, 2].map(conclusion), ["below", "above", "above"], "{}", tasks[0]["verdicts"]);
+    assert_eq!([0, 1, 2].map(conclusion), ["below", "above", "above"], "{}", tasks[0]["conclusions"]);
     // exact permutation of sides: the table says who was on which
     assert!(by(&tasks[0]["shares"][0]["tests"], "sides")["p"].as_f64().unwrap() < 0.05);
     // the mixed model agrees, and says how much participants and clips differ
@@ -123,7 +123,7 @@ fn a_known_preference_is_found_in_every_design_and_its_page_is_whole() {
     assert_eq!((again.json == answer.json, std::fs::read_to_string(&page).unwrap() == html), (true, true));
     let Some(mut browser) = Browser::open(&page, [1280, 900]) else { return };
     let mut count = |selector: &str| browser.value(&format!("document.querySelectorAll('{selector}').length"));
-    assert_eq!((count(".verdict"), count(".steps")), (5.into(), 3.into()));
+    assert_eq!((count(".conclusion"), count(".steps")), (5.into(), 3.into()));
     assert!(count("svg.forest").as_u64().unwrap() >= 7 && count(".figures tbody tr").as_u64().unwrap() > 60);
     assert_eq!(count(".registered"), 0, "nothing was registered");
     for (width, scheme) in [(360, "dark"), (360, "light"), (1280, "dark"), (1280, "light")] {
@@ -233,9 +233,9 @@ fn damaged_tables_are_told_by_line_and_never_end_the_program_otherwise() {
     std::fs::write(project.dir().join("bad.csv"), &with_bad).unwrap();
     let answer = project.answer(&["study", "analyse", "bad.csv", "--draws", "100", "--report", "p.html"]);
     assert_eq!(answer.code, 2, "{}", answer.errors);
-    let refused = &answer.json["analysis"]["refused"];
-    assert_eq!((&refused[0]["line"], &refused[1]["line"]), (&202.into(), &203.into()));
-    assert!(refused[0]["reason"].as_str().unwrap().contains("correct is \"maybe\""), "{refused}");
+    let rejected = &answer.json["analysis"]["rejected"];
+    assert_eq!((&rejected[0]["line"], &rejected[1]["line"]), (&202.into(), &203.into()));
+    assert!(rejected[0]["reason"].as_str().unwrap().contains("correct is \"maybe\""), "{rejected}");
     assert_eq!(answer.json["analysis"]["tasks"][0]["n_votes"], 200);
     let html = std::fs::read_to_string(project.dir().join("p.html")).unwrap();
     assert!(!html.contains("<script>alert"));
@@ -256,8 +256,8 @@ fn damaged_tables_are_told_by_line_and_never_end_the_program_otherwise() {
     }
     for (args, told) in [
         (vec!["study", "analyse", "none.csv"], "none.csv"),
-        (vec!["study", "analyse", "bad.csv", "--columns", "who=x"], "no field \"who\""),
-        (vec!["study", "analyse", "bad.csv", "--columns", "clip=film"], "no column \"film\""),
+        (vec!["study", "analyse", "bad.csv", "--columns", "who=x"], "unknown field \"who\""),
+        (vec!["study", "analyse", "bad.csv", "--columns", "clip=film"], "column \"film\" not found"),
         (vec!["study", "analyse", "bad.csv", "--bound", "70"], "--bound 70:"),
         (vec!["study", "analyse", "bad.csv", "--report", "p.txt"], "ends in .html"),
     ] {

@@ -182,7 +182,7 @@ fn what_is_missing_is_said() {
         format!("{:#}", build(&changed, &dir.join("out"), SIZE, &Silent).unwrap_err())
     };
     let cases: [(&str, String); 5] = [
-        ("clips are needed", say(&|file| file.task[0].trials = 400)),
+        ("clips per speaker are needed", say(&|file| file.task[0].trials = 400)),
         ("shorter clips", say(&|file| file.clips.seconds = 30.0)),
         ("no dataset", say(&|file| file.speaker[0].dataset = Some(dir.join("nowhere")))),
         (

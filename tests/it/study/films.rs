@@ -60,7 +60,7 @@ fn films_of_all_conditions_differ_in_motion_alone() {
     let mut host = cut();
     assert!(host.cut.clips.len() == 4 && host.cut.refused.is_empty());
     for clip in &host.cut.clips {
-        assert!(clip.cut_db < -15.0 && clip.unseen == 0.0 && clip.frames.len() == 30, "{clip:?}");
+        assert!(clip.cut_db < -15.0 && clip.hidden_share == 0.0 && clip.frames.len() == 30, "{clip:?}");
     }
     let missing = format!("{:#}", cut().filmed(&file, SIZE, &Silent).map(drop).unwrap_err());
     assert!(missing.contains("theirs") && missing.contains(".npy"), "{missing}");

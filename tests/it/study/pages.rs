@@ -158,7 +158,7 @@ fn a_browser_resumes_by_its_token_and_another_by_the_operators_link() {
     let token = progress["participants"][0]["token"].as_str().unwrap().to_owned();
     let first = Client { token, ..Client::new() };
     assert_eq!(first.answer(&served.address, 0, &fitting(0, true)).unwrap().0, 200);
-    assert_eq!(visit(&recruited), seen(["You have begun already", "Taking part"], 1));
+    assert_eq!(visit(&recruited), seen(["You have already started", "Taking part"], 1));
 
     // Another participant, who fails the attention check.
     let mut inattentive = Client::new();
@@ -169,21 +169,21 @@ fn a_browser_resumes_by_its_token_and_another_by_the_operators_link() {
     let shown = script(&driver, "operator", &["--url", &page("operator"), "--token", &served.operator_token]);
     assert_eq!((&shown["findings"], &shown["problems"]), (&json!([]), &json!([])));
     let quota = [
-        ["Participants wanted", "3"],
+        ["Target number of participants", "3"],
         ["Completed", "0"],
-        ["Taking part now", "1"],
-        ["Without an answer for too long; their places are free", "0"],
-        ["Completed with too many failed attention checks", "1"],
-        ["Whose place was given to another", "0"],
-        ["Withdrawn, their data deleted", "0"],
-        ["Answers stored", "5"],
-        ["Trials with a stalled film", "5"],
-        ["Seconds stalled in all", "1"],
+        ["In progress", "1"],
+        ["Abandoned: no answer for too long, session can be reassigned", "0"],
+        ["Completed, excluded for failed attention checks", "1"],
+        ["Session reassigned to another participant", "0"],
+        ["Withdrawn, data deleted", "0"],
+        ["Stored answers", "5"],
+        ["Trials with stalled playback", "5"],
+        ["Total stalled time, s", "1"],
     ];
     assert_eq!(shown["quota"], json!(quota));
     let places = shown["places"].as_array().unwrap();
     assert_eq!((&places[0][0], &places[0][1], &places[0][2]), (&json!("1"), &json!("active"), &json!("1 of 4")));
-    assert_eq!((&places[1][1], &places[1][4]), (&json!("completed"), &json!("Link to the session")), "to its code");
+    assert_eq!((&places[1][1], &places[1][4]), (&json!("completed"), &json!("Link to resume")), "to its code");
     let link = shown["links"][0].as_str().unwrap();
     assert_eq!(visit(link), seen(["Welcome back", "Welcome back"], 0));
 

@@ -45,7 +45,7 @@ fn a_session_from_consent_to_code_and_tables() {
     let operator = Client { token: served.operator_token.clone(), ..Client::new() };
     let (status, progress) = operator.get(&address, "/api/operator").unwrap();
     assert_eq!((status, &progress["answers"]), (200, &json!(4)));
-    assert_eq!((&progress["quota"]["completed"], &progress["quota"]["wanted"]), (&json!(1), &json!(2)));
+    assert_eq!((&progress["quota"]["completed"], &progress["quota"]["target"]), (&json!(1), &json!(2)));
     assert_eq!(client.get(&address, "/api/operator").unwrap().0, 401);
     assert_eq!(operator.get(&address, "/api/state").unwrap().0, 401);
 

@@ -11,7 +11,7 @@ use std::process::Command;
 const STUDY: &str = r#"
 title = "Small"
 participants = 3
-spare = 0.0
+extra_session_ratio = 0.0
 attention_checks = 1
 task_order = "written"
 practice = false

@@ -1,16 +1,17 @@
 //! Charts of a task: proportions and differences with intervals, scores, preference steps, strengths.
 
-use crate::analyse::number_format::bare_p;
+use crate::analyse::conclusions::scope;
+use crate::analyse::number_format::{bare_p, counted};
 use crate::analyse::result::{PairAnalysis, ShareAnalysis, ShareMeasure, StudyAnalysis, TaskAnalysis};
 use crate::analyse::statistic::StatisticMethod;
-use crate::analyse::verdict::scope;
 use crate::plan::TaskDesign;
 use crate::stats::estimate::ConfidenceInterval;
+use orator_base::text::number;
 use orator_report::html::chart::forest::{ForestRow, ForestScale, forest};
 use orator_report::html::{Node, legend, node, table};
 
 /// Names of the five preference steps, from the second condition to the first.
-const STEPS: [&str; 5] = ["second clearly", "second", "neither", "first", "first clearly"];
+const STEPS: [&str; 5] = ["second, clearly", "second, slightly", "no preference", "first, slightly", "first, clearly"];
 
 /// Charts of a task.
 pub(super) fn task(task: &TaskAnalysis, analysis: &StudyAnalysis) -> Vec<Node> {
@@ -58,14 +59,14 @@ fn shares(task: &TaskAnalysis, analysis: &StudyAnalysis) -> Vec<Node> {
         }
     };
     let mut rows = Vec::new();
-    let chance = task.shares.iter().filter(|share| share.measure != ShareMeasure::TakenForReal);
+    let chance = task.shares.iter().filter(|share| share.measure != ShareMeasure::JudgedReal);
     for (index, share) in chance.enumerate() {
         rows.push(row(share, if index == 0 { "own" } else { "part" }, "", StatisticMethod::Crossed));
         if index == 0 {
             rows.push(row(share, "naive", ", naive", StatisticMethod::Wilson));
             let other = analysis.without_exclusions.iter().find(|other| other.task == task.task);
             let other = other.and_then(TaskAnalysis::pooled);
-            rows.extend(other.map(|other| row(other, "beside", ", nobody excluded", StatisticMethod::Crossed)));
+            rows.extend(other.map(|other| row(other, "unfiltered", ", without exclusions", StatisticMethod::Crossed)));
         }
     }
     let bound =
@@ -75,27 +76,27 @@ fn shares(task: &TaskAnalysis, analysis: &StudyAnalysis) -> Vec<Node> {
     let [low, high] = ends(values);
     let scale = ForestScale { low, high, middle: Some(50.0), band, unit: "% of votes" };
     let (what, label) = match task.design {
-        TaskDesign::Turing => ("Share of votes that took the generated motion for the real one.", "Generated chosen"),
-        TaskDesign::Mismatch => ("Share of votes for the motion of the heard speech.", "Matched chosen"),
-        _ => ("Share of right answers.", "Right answers"),
+        TaskDesign::Turing => ("Share of votes that chose the generated motion as the real one.", "Generated chosen"),
+        TaskDesign::Mismatch => ("Share of votes for the matching motion.", "Matched chosen"),
+        _ => ("Share of correct responses.", "Correct responses"),
     };
-    let about = format!("{what} Dashed: chance. Shaded: differences within the bound, which count as none.");
+    let about = format!("{what} Dashed: chance. Shaded: equivalence bound around chance.");
     let mut keys =
-        vec![("line own", "participants and clips crossed"), ("line naive", "votes taken for independent (Wilson)")];
-    keys.extend((task.shares.len() > 1).then_some(("line part", "parts, p after Holm")));
-    keys.extend((!analysis.without_exclusions.is_empty()).then_some(("line beside", "nobody excluded")));
-    keys.extend(band.map(|_| ("band", "bound of equivalence")));
+        vec![("line own", "participants and clips crossed"), ("line naive", "votes treated as independent (Wilson)")];
+    keys.extend((task.shares.len() > 1).then_some(("line part", "speakers or conditions, p after Holm")));
+    keys.extend((!analysis.without_exclusions.is_empty()).then_some(("line unfiltered", "without exclusions")));
+    keys.extend(band.map(|_| ("band", "equivalence bound")));
     let mut body = vec![node("p").text(about), legend(keys), card(forest(label, &rows, &scale))];
     let single: Vec<ForestRow> = task
         .shares
         .iter()
-        .filter(|share| share.measure == ShareMeasure::TakenForReal)
+        .filter(|share| share.measure == ShareMeasure::JudgedReal)
         .map(|share| row(share, "part", "", StatisticMethod::Crossed))
         .collect();
     if !single.is_empty() {
         let scale = ForestScale { low: 0.0, high: 100.0, middle: None, band: None, unit: "% of votes" };
-        body.push(node("p").text("How often the films of each condition were taken for real."));
-        body.push(card(forest("Taken for real", &single, &scale)));
+        body.push(node("p").text("Share of votes that judged the films of each condition real."));
+        body.push(card(forest("Judged real", &single, &scale)));
     }
     body
 }
@@ -110,14 +111,16 @@ fn scores(task: &TaskAnalysis) -> Vec<Node> {
             value: row.mean,
             interval: scaled(row.statistics.interval(StatisticMethod::Crossed), 1.0),
             value_text: match row.statistics.interval(StatisticMethod::Median) {
-                Some(interval) => format!("median {} [{}, {}]", row.median, interval.low, interval.high),
-                None => format!("median {}", row.median),
+                Some(interval) => {
+                    format!("median {} [{}, {}]", number(row.median), number(interval.low), number(interval.high))
+                }
+                None => format!("median {}", number(row.median)),
             },
         })
         .collect();
     let scale = ForestScale { low: 0.0, high: 100.0, middle: None, band: None, unit: "mean score" };
-    let about = "Mean scores with intervals for other participants and clips; at the right medians with the intervals that \
-                 the GENEA challenges print, which take scores for independent.";
+    let about = "Mean scores, with intervals that generalise to other participants and clips. Right: medians with the \
+        intervals of the GENEA challenges, which treat scores as independent.";
     vec![node("p").text(about), card(forest("Scores", &rows, &scale))]
 }
 
@@ -138,12 +141,12 @@ fn pairs(task: &TaskAnalysis) -> Vec<Node> {
     let [low, high] = ends(values.chain([0.0]));
     let unit = match task.design {
         TaskDesign::Sliders => "points of 100",
-        TaskDesign::TuringSingle => "points of percent",
+        TaskDesign::TuringSingle => "percentage points",
         _ => "steps",
     };
     let scale = ForestScale { low, high, middle: Some(0.0), band: None, unit };
-    let about = "Differences between conditions, the first less the second, with intervals for other participants and clips; \
-                 p after Holm's adjustment where there are several.";
+    let about = "Differences between conditions (first minus second), with intervals that generalise to other \
+        participants and clips; p values of several pairs are adjusted by Holm's method.";
     vec![node("p").text(about), card(forest("Differences", &rows, &scale))]
 }
 
@@ -153,18 +156,18 @@ fn steps(task: &TaskAnalysis) -> Vec<Node> {
         let total = steps.iter().sum::<u64>().max(1) as f64;
         let parts = steps.iter().enumerate().map(|(step, n)| {
             let share = 100.0 * *n as f64 / total;
-            let said = if share >= 8.0 { format!("{share:.0} %") } else { String::new() };
+            let label = if share >= 8.0 { format!("{share:.0} %") } else { String::new() };
             let part = node("span").class(format!("step{step}")).attr("style", format!("width:{share:.3}%"));
-            part.attr("title", format!("{}: {n} votes, {share:.1} %", STEPS[step])).text(said)
+            part.attr("title", format!("{}: {}, {share:.1} %", STEPS[step], counted(*n as usize, "vote"))).text(label)
         });
         let name = node("th").attr("scope", "row").text(format!("{} (first), {}", pair.first, pair.second));
         node("tr").child(name).child(node("td").child(node("div").class("steps").children(parts)))
     };
     let keys = STEPS.iter().enumerate().map(|(step, name)| (format!("step{step}"), *name));
-    let head = ["Pair", "Votes by step"].map(|text| node("th").attr("scope", "col").text(text));
+    let head = ["Pair", "Votes per step"].map(|text| node("th").attr("scope", "col").text(text));
     let chart = table("preference", head, task.pairs.iter().map(row));
     vec![
-        node("p").text("Votes of each step of the preference scale."),
+        node("p").text("Distribution of the votes over the steps of the preference scale."),
         legend(keys),
         node("div").class("scroll").child(chart),
     ]
@@ -184,8 +187,8 @@ fn strengths(task: &TaskAnalysis) -> Vec<Node> {
         .collect();
     let [low, high] = ends(rows.iter().flat_map(|row| row.interval.unwrap_or([row.value; 2])));
     let scale = ForestScale { low, high, middle: Some(0.0), band: None, unit: "log odds" };
-    let about =
-        "Strength of each condition: log odds of being put above one of mean strength (Bradley-Terry), and Elo rating.";
+    let about = "Strength of each condition: log odds of being preferred to a condition of mean strength \
+        (Bradley-Terry), and Elo rating.";
     vec![node("p").text(about), card(forest("Strengths", &rows, &scale))]
 }
 

@@ -1,7 +1,7 @@
 //! Assembles the page. The output depends on the analysis only.
 
 use super::{charts, tables};
-use crate::analyse::number_format::{count, list};
+use crate::analyse::number_format::{counted, list};
 use crate::analyse::result::{Conclusion, StudyAnalysis, TaskAnalysis};
 use orator_report::html::{Node, Page, Section, node};
 use serde_json::Value;
@@ -9,13 +9,13 @@ use serde_json::Value;
 /// HTML of the page.
 pub fn html(analysis: &StudyAnalysis) -> String {
     let section = |id, title, body| Section { id, title, body };
-    let mut sections = vec![section("meaning", "What can be concluded", meaning(analysis))];
+    let mut sections = vec![section("meaning", "Conclusions", meaning(analysis))];
     if !analysis.hypotheses.is_empty() {
         sections.push(section("hypotheses", "Registered hypotheses", tables::hypotheses(analysis)));
     }
     sections.extend([
         section("charts", "Estimates and intervals", per_task(&analysis.tasks, |task| charts::task(task, analysis))),
-        section("figures", "All figures", statistics(analysis)),
+        section("figures", "All statistics", statistics(analysis)),
         section("exclusions", "Exclusions", tables::exclusions(analysis)),
         section("methods", "Methods paragraph", methods(analysis)),
     ]);
@@ -34,13 +34,13 @@ fn lead(analysis: &StudyAnalysis) -> String {
     let summary = &analysis.exclusions;
     let tasks: Vec<String> = analysis.tasks.iter().map(|task| task.task.clone()).collect();
     let left_out = match summary.any_excluded() {
-        true => format!(" ({} votes were excluded)", count(summary.n_votes - summary.n_votes_kept)),
+        true => format!(" ({} excluded)", counted(summary.n_votes - summary.n_votes_analysed, "vote")),
         false => String::new(),
     };
     format!(
-        "{} votes of {} participants{left_out}: {}.",
-        count(summary.n_votes_kept),
-        count(summary.n_participants_kept),
+        "{} of {}{left_out}: {}.",
+        counted(summary.n_votes_analysed, "vote"),
+        counted(summary.n_participants_analysed, "participant"),
         list(&tasks)
     )
 }
@@ -51,20 +51,20 @@ fn per_task(tasks: &[TaskAnalysis], body: impl Fn(&TaskAnalysis) -> Vec<Node>) -
     tasks.iter().flat_map(|task| title(task).into_iter().chain(body(task))).collect()
 }
 
-/// Verdicts and notes.
+/// Conclusions and notes.
 fn meaning(analysis: &StudyAnalysis) -> Vec<Node> {
     let card = |task: &TaskAnalysis| {
         let conclusion = task.pooled().map(|share| share.conclusion);
         let conclusion = conclusion.or(task.pairs.first().map(|pair| pair.conclusion)).unwrap_or(Conclusion::Untested);
         let class = match conclusion {
-            Conclusion::Equivalent => "card verdict equivalent",
-            Conclusion::Undecided | Conclusion::Untested => "card verdict",
-            _ => "card verdict found",
+            Conclusion::Equivalent => "card conclusion equivalent",
+            Conclusion::Inconclusive | Conclusion::Untested => "card conclusion",
+            _ => "card conclusion found",
         };
-        let verdicts = task.verdicts.iter().map(|verdict| node("p").text(verdict));
-        node("div").class(class).child(node("h3").text(&task.task)).children(verdicts)
+        let sentences = task.conclusions.iter().map(|sentence| node("p").text(sentence));
+        node("div").class(class).child(node("h3").text(&task.task)).children(sentences)
     };
-    let mut body = vec![node("div").class("verdicts").children(analysis.tasks.iter().map(card))];
+    let mut body = vec![node("div").class("conclusions").children(analysis.tasks.iter().map(card))];
     if !analysis.notes.is_empty() {
         body.push(node("h3").text("Notes"));
         body.push(node("ul").class("notes").children(analysis.notes.iter().map(|note| node("li").text(note))));
@@ -73,20 +73,20 @@ fn meaning(analysis: &StudyAnalysis) -> Vec<Node> {
 }
 
 fn statistics(analysis: &StudyAnalysis) -> Vec<Node> {
-    let about = "Registered: written down and sealed before the first participant. Exploratory: everything else; it can \
-                 suggest, not show. Naive: votes are taken for independent, which votes of one participant or about one clip \
-                 are not; such figures are here because others print them.";
+    let about = "Registered: fixed and sealed before the first participant. Exploratory: all other statistics; they \
+        can suggest a hypothesis, but not confirm one. Naive: the method treats votes as independent, although votes \
+        of one participant or about one clip are correlated; listed for comparison with other publications.";
     let mut body = vec![node("p").text(about)];
     body.extend(per_task(&analysis.tasks, tables::task));
     if !analysis.without_exclusions.is_empty() {
         body.push(node("h3").text("Without exclusions"));
-        body.push(node("p").text("The votes of everybody, by the same methods; nothing of it was registered."));
+        body.push(node("p").text("All votes, by the same methods; none of these statistics is registered."));
         body.extend(per_task(&analysis.without_exclusions, tables::task));
     }
     body
 }
 
 fn methods(analysis: &StudyAnalysis) -> Vec<Node> {
-    let about = "Ready to paste; a click selects all of it.";
+    let about = "Ready to paste; a click selects the complete text.";
     vec![node("p").text(about), node("div").class("methods").attr("tabindex", "0").text(&analysis.methods)]
 }

@@ -1,15 +1,16 @@
 //! Tables of all statistics of a task with their registration status, of the hypotheses and of the exclusions.
 
-use crate::analyse::number_format::{bare_p, count, percent};
+use crate::analyse::conclusions::scope;
+use crate::analyse::number_format::{bare_p, count, counted, percent, points};
 use crate::analyse::result::{ShareAnalysis, ShareMeasure, StudyAnalysis, TaskAnalysis};
 use crate::analyse::statistic::{StatisticOrigin, StatisticRow, StatisticSet, TestResult};
-use crate::analyse::verdict::scope;
-use crate::analyse::votes::read::RefusedRow;
+use crate::analyse::votes::read::RejectedRow;
 use crate::stats::estimate::ConfidenceInterval;
+use orator_base::text::number;
 use orator_report::html::{Node, node, table};
 
 /// Columns of the table of statistics.
-const COLUMNS: [&str; 6] = ["Method", "Interval", "Statistic", "p", "p after Holm", "Mark"];
+const COLUMNS: [&str; 6] = ["Method", "Interval", "Statistic", "p", "p after Holm", "Status"];
 
 /// Table of a task's statistics, grouped by quantity.
 pub(super) fn task(task: &TaskAnalysis) -> Vec<Node> {
@@ -22,24 +23,29 @@ pub(super) fn task(task: &TaskAnalysis) -> Vec<Node> {
                 "log odds {:.3} \u{b1} {:.3}; standard deviations of participants {:.2}, of clips {:.2}",
                 model.log_odds, model.standard_error, model.sd_participants, model.sd_clips
             );
-            let name = node("th").attr("scope", "row").text("mixed model's estimates");
+            let name = node("th").attr("scope", "row").text("estimates of the mixed model");
             node("tr").child(name).child(node("td").attr("colspan", 4).text(details)).child(node("td"))
         }));
     }
     for row in &task.scores {
-        let [scores, participants, clips] = [row.n_scores, row.n_participants, row.n_clips].map(count);
         rows.push(group(&format!(
-            "{}: median {}, mean {:.2} of {scores} scores ({participants} participants, {clips} clips)",
-            row.condition, row.median, row.mean
+            "{}: median {}, mean {:.2} of {} ({})",
+            row.condition,
+            number(row.median),
+            row.mean,
+            counted(row.n_scores, "score"),
+            sizes([row.n_participants, row.n_clips])
         )));
         rows.extend(statistic_rows(&row.statistics, 1.0, ""));
     }
     for pair in &task.pairs {
-        let orders = pair.orders.map(|[above, tied, below]| format!("; {above} above, {tied} neither, {below} below"));
+        let orders = pair
+            .orders
+            .map(|[above, tied, below]| format!("; {above} for the first, {tied} tied, {below} for the second"));
         let orders = orders.unwrap_or_default();
-        let [votes, participants, clips] = [pair.n_votes, pair.n_participants, pair.n_clips].map(count);
+        let (votes, sizes) = (counted(pair.n_votes, "vote"), sizes([pair.n_participants, pair.n_clips]));
         rows.push(group(&format!(
-            "{} less {}: {:+.3} in {votes} votes ({participants} participants, {clips} clips{orders})",
+            "{} minus {}: {:+.3} in {votes} ({sizes}{orders})",
             pair.first, pair.second, pair.difference
         )));
         rows.extend(statistic_rows(&pair.statistics, 1.0, ""));
@@ -49,7 +55,7 @@ pub(super) fn task(task: &TaskAnalysis) -> Vec<Node> {
         rows.push(statistic_row(test.origin, None, Some(test), None));
     }
     let head = COLUMNS.iter().map(|title| {
-        let class = if ["Method", "Mark"].contains(title) { "" } else { "num" };
+        let class = if ["Method", "Status"].contains(title) { "" } else { "num" };
         node("th").attr("scope", "col").class(class).text(title)
     });
     let mut body = vec![node("div").class("scroll").attr("tabindex", "0").child(table("figures", head, rows))];
@@ -62,15 +68,20 @@ pub(super) fn task(task: &TaskAnalysis) -> Vec<Node> {
 
 fn share_title(share: &ShareAnalysis) -> String {
     let what = match share.measure {
-        ShareMeasure::GeneratedChosen => "generated chosen",
-        ShareMeasure::MatchedChosen => "matched chosen",
-        ShareMeasure::Correct => "right",
-        ShareMeasure::TakenForReal => "taken for real",
+        ShareMeasure::GeneratedChosen => "generated film chosen",
+        ShareMeasure::MatchedChosen => "matching film chosen",
+        ShareMeasure::Correct => "correct",
+        ShareMeasure::JudgedReal => "judged real",
     };
     let (scope, percent) = (scope(share), percent(share.share));
-    let [successes, votes] = [share.n_successes, share.n_votes].map(|n| count(n as usize));
-    let [participants, clips] = [share.n_participants, share.n_clips].map(count);
-    format!("{scope}: {what} in {successes} of {votes} votes, {percent} ({participants} participants, {clips} clips)")
+    let (successes, votes) = (count(share.n_successes as usize), counted(share.n_votes as usize, "vote"));
+    let sizes = sizes([share.n_participants, share.n_clips]);
+    format!("{scope}: {what} in {successes} of {votes}, {percent} ({sizes})")
+}
+
+/// Numbers of participants and of clips.
+fn sizes([participants, clips]: [usize; 2]) -> String {
+    format!("{}, {}", counted(participants, "participant"), counted(clips, "clip"))
 }
 
 fn group(title: &str) -> Node {
@@ -85,8 +96,8 @@ fn statistic_rows(set: &StatisticSet, factor: f64, unit: &str) -> Vec<Node> {
     rows.extend(set.equivalence.iter().map(|test| {
         let shown = TestResult { origin: test.origin, ..TestResult::new(test.origin.method, test.p) };
         let outcome = if test.passes { "shown" } else { "not shown" };
-        let (points, method) = (100.0 * test.bound, test.origin.method.name());
-        let name = format!("equivalence within \u{b1}{points} points ({method}): {outcome}");
+        let (points, method) = (points(test.bound), test.origin.method.name());
+        let name = format!("equivalence within \u{b1}{points} percentage points ({method}): {outcome}");
         let interval = format!("90 %: {}", ends(test.ends));
         statistic_row(test.origin, Some(interval), Some(&shown), Some(name))
     }));
@@ -99,7 +110,7 @@ fn statistic_row(
     test: Option<&TestResult>,
     name: Option<String>,
 ) -> Node {
-    let number = |text: String| node("td").class("num").text(text);
+    let cell = |text: String| node("td").class("num").text(text);
     let statistic = test.and_then(|test| {
         let freedom = test.degrees_of_freedom.map(|freedom| format!(" ({freedom:.1})")).unwrap_or_default();
         test.statistic.map(|statistic| format!("{statistic:.2}{freedom}"))
@@ -111,10 +122,10 @@ fn statistic_row(
     };
     let row = if origin.naive { node("tr").class("is-naive") } else { node("tr") };
     row.child(node("th").attr("scope", "row").text(name.unwrap_or_else(|| origin.method.name().to_owned())))
-        .child(number(interval.unwrap_or_default()))
-        .child(number(statistic.unwrap_or_default()))
-        .child(number(test.map(|test| bare_p(test.p)).unwrap_or_default()))
-        .child(number(test.and_then(|test| test.adjusted_p).map(bare_p).unwrap_or_default()))
+        .child(cell(interval.unwrap_or_default()))
+        .child(cell(statistic.unwrap_or_default()))
+        .child(cell(test.map(|test| bare_p(test.p)).unwrap_or_default()))
+        .child(cell(test.and_then(|test| test.adjusted_p).map(bare_p).unwrap_or_default()))
         .child(node("td").class("mark").child(mark))
 }
 
@@ -129,42 +140,52 @@ pub(super) fn hypotheses(analysis: &StudyAnalysis) -> Vec<Node> {
         });
         std::iter::once(title).chain(rows).collect::<Vec<_>>()
     });
-    let head = [("About", ""), ("p", "num"), ("Outcome", "")]
+    let head = [("Scope", ""), ("p", "num"), ("Outcome", "")]
         .map(|(title, class)| node("th").attr("scope", "col").class(class).text(title));
-    let about = "Written down and sealed before the first participant. What is not shown is not refuted: a test that does \
-                 not reject says nothing.";
+    let about = "Fixed and sealed before the first participant. \"Not shown\" does not mean refuted: a test that is \
+        not significant shows nothing.";
     vec![node("p").text(about), node("div").class("scroll").attr("tabindex", "0").child(table("figures", head, rows))]
 }
 
-/// Rules with what each alone excludes, and refused rows.
+/// Number of votes that each rule alone excludes, and rejected rows.
 pub(super) fn exclusions(analysis: &StudyAnalysis) -> Vec<Node> {
     let summary = &analysis.exclusions;
-    let number = |n: usize| node("td").class("num").text(count(n));
+    let number_cell = |n: usize| node("td").class("num").text(count(n));
     let cells = |name: &str, participants: usize, votes: usize, details: &str| {
         let name = node("th").attr("scope", "row").text(name);
-        node("tr").child(name).child(number(participants)).child(number(votes)).child(node("td").text(details))
+        node("tr")
+            .child(name)
+            .child(number_cell(participants))
+            .child(number_cell(votes))
+            .child(node("td").text(details))
     };
-    let mut rows = vec![cells("answered", summary.n_participants, summary.n_votes, "")];
+    let mut rows = vec![cells("recorded", summary.n_participants, summary.n_votes, "")];
     for rule in &summary.rules {
         let unknown = rule.unknown.as_deref().unwrap_or_default();
         rows.push(cells(&rule.rule, rule.n_participants, rule.n_votes, unknown));
     }
-    rows.push(cells("analysed", summary.n_participants_kept, summary.n_votes_kept, ""));
+    rows.push(cells("analysed", summary.n_participants_analysed, summary.n_votes_analysed, ""));
     let head = ["", "Participants", "Votes", ""]
         .map(|title| node("th").attr("scope", "col").class(if title.is_empty() { "" } else { "num" }).text(title));
     let about = match (summary.registered, summary.rules.is_empty()) {
-        (true, _) => "Rules that were registered, with what each leaves out by itself; a vote may fall under several.",
-        (false, false) => "Rules of the study, which do not count as registered, with what each leaves out by itself.",
-        (false, true) => "No rules were registered; every vote is analysed.",
+        (true, _) => {
+            "Registered rules, with the number that each excludes by itself; a vote may be excluded by several."
+        }
+        (false, false) => {
+            "Rules of the study, which do not count as registered, with the number that each excludes by itself."
+        }
+        (false, true) => "No exclusion rules were registered; all votes are analysed.",
     };
     let mut body = vec![node("p").text(about), node("div").class("scroll").child(table("figures", head, rows))];
-    if !analysis.refused.is_empty() {
-        let most = 200;
-        body.push(node("h3").text(format!("{} rows that are no votes", count(analysis.refused.len()))));
-        let line = |row: &RefusedRow| node("li").text(format!("line {}: {}", row.line, row.reason));
-        body.push(node("ul").class("notes").children(analysis.refused.iter().take(most).map(line)));
-        if analysis.refused.len() > most {
-            body.push(node("p").class("small").text(format!("The first {most} are shown; the JSON result has all.")));
+    if !analysis.rejected.is_empty() {
+        let max_shown = 200;
+        body.push(node("h3").text(counted(analysis.rejected.len(), "rejected row")));
+        let line = |row: &RejectedRow| node("li").text(format!("line {}: {}", row.line, row.reason));
+        body.push(node("ul").class("notes").children(analysis.rejected.iter().take(max_shown).map(line)));
+        if analysis.rejected.len() > max_shown {
+            body.push(
+                node("p").class("small").text(format!("The first {max_shown} are listed; the JSON result lists all.")),
+            );
         }
     }
     body

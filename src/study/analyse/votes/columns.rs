@@ -28,16 +28,19 @@ impl ColumnNames {
         let mut names = BTreeMap::new();
         for pair in text.split(',').map(str::trim).filter(|pair| !pair.is_empty()) {
             let Some((field, name)) = pair.split_once('=').map(|(field, name)| (field.trim(), name.trim())) else {
-                bail!("--columns: \"{pair}\" is no pair; expected like participant=worker,clip=stimulus")
+                bail!(
+                    "--columns: invalid pair \"{pair}\": expected FIELD=NAME pairs such as \
+                     participant=worker,clip=stimulus"
+                )
             };
             let Some(known) = fields().find(|known| *known == field) else {
                 bail!(
-                    "--columns: there is no field \"{field}\"; fields are {}",
+                    "--columns: unknown field \"{field}\": expected one of {}",
                     fields().collect::<Vec<_>>().join(", ")
                 )
             };
-            ensure!(!name.is_empty(), "--columns: {field} has no name behind the sign =");
-            ensure!(names.insert(known, name.to_owned()).is_none(), "--columns: {field} is named twice");
+            ensure!(!name.is_empty(), "--columns: no column name after {field}=");
+            ensure!(names.insert(known, name.to_owned()).is_none(), "--columns: {field} is given twice");
         }
         Ok(Self(names))
     }
@@ -49,16 +52,15 @@ impl ColumnNames {
 
     /// Column indices of the fields in a header. Names are compared ignoring case and surrounding whitespace.
     fn indices(&self, header: &[String]) -> Result<BTreeMap<&'static str, usize>> {
-        let is = |name: &str, cell: &String| cell.trim().to_lowercase() == name.to_lowercase();
         let mut indices = BTreeMap::new();
         for field in fields() {
             let name = self.of(field);
-            let mut found = (0..header.len()).filter(|index| is(name, &header[*index]));
+            let mut found = (0..header.len()).filter(|index| is_named(&header[*index], name));
             match (found.next(), found.next()) {
                 (Some(index), None) => drop(indices.insert(field, index)),
-                (Some(_), Some(_)) => bail!("two columns are called \"{name}\"; rename one of them"),
+                (Some(_), Some(_)) => bail!("two columns are named \"{name}\": rename one"),
                 (None, _) if self.0.contains_key(field) => {
-                    bail!("there is no column \"{name}\"; the columns are {}", shown(header))
+                    bail!("column \"{name}\" not found: the columns are {}", shown(header))
                 }
                 (None, _) => {}
             }
@@ -73,21 +75,29 @@ impl ColumnNames {
         for field in ["participant", "clip"] {
             if lacks(field) {
                 let nearest = header.iter().max_by(|a, b| similarity(field, a).total_cmp(&similarity(field, b)));
-                let example =
-                    nearest.map(|name| format!(", such as --columns {field}={}", name.trim())).unwrap_or_default();
-                bail!("there is no column \"{field}\"; the columns are {}. Name it{example}", shown(header));
+                let example = nearest.map_or("NAME", |name| name.trim());
+                let columns = shown(header);
+                bail!(
+                    "column \"{field}\" not found: the columns are {columns}; map it, such as --columns \
+                     {field}={example}"
+                );
             }
         }
         let answers = ["response", "correct", "score", "step"];
         if answers.iter().all(|answer| lacks(answer)) {
             bail!(
-                "there is no answer: none of the columns {}; the columns are {}. Name it, such as --columns correct=NAME",
+                "no column with answers: expected one of {}, found {}; map it, such as --columns correct=NAME",
                 answers.join(", "),
                 shown(header)
             );
         }
         Ok(())
     }
+}
+
+/// Whether a column or key has this name, ignoring case and surrounding whitespace.
+fn is_named(found: &str, name: &str) -> bool {
+    found.trim().chars().flat_map(char::to_lowercase).eq(name.chars().flat_map(char::to_lowercase))
 }
 
 /// Similarity of two names, 0 to 1.
@@ -110,13 +120,16 @@ pub type NumberedRows = Vec<(u64, std::result::Result<RowCells, String>)>;
 /// # Errors
 /// The text is UTF-16 or empty, required columns are missing, or there are too many rows.
 pub fn delimited_rows(bytes: &[u8], names: &ColumnNames) -> Result<NumberedRows> {
-    ensure!(!bytes.starts_with(&[0xff, 0xfe]) && !bytes.starts_with(&[0xfe, 0xff]), "it is UTF-16; save it as UTF-8");
+    ensure!(
+        !bytes.starts_with(&[0xff, 0xfe]) && !bytes.starts_with(&[0xfe, 0xff]),
+        "the file is UTF-16: save it as UTF-8"
+    );
     let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
     let delimiter = delimiter(bytes);
     let mut reader = csv::ReaderBuilder::new();
     let mut reader = reader.delimiter(delimiter).flexible(true).has_headers(false).from_reader(bytes);
     let mut record = csv::ByteRecord::new();
-    ensure!(reader.read_byte_record(&mut record)?, "it is empty; the first line names the columns");
+    ensure!(reader.read_byte_record(&mut record)?, "the file is empty: expected column names in the first line");
     let header: Vec<String> = record.iter().map(|cell| String::from_utf8_lossy(cell).into_owned()).collect();
     let indices = names.indices(&header)?;
     let mut rows = Vec::new();
@@ -125,7 +138,7 @@ pub fn delimited_rows(bytes: &[u8], names: &ColumnNames) -> Result<NumberedRows>
         if record.iter().all(<[u8]>::is_empty) {
             continue;
         }
-        ensure!(rows.len() < MAX_ROWS, "it has more than {MAX_ROWS} rows");
+        ensure!(rows.len() < MAX_ROWS, "the file has more than {MAX_ROWS} rows");
         rows.push((line, cells(&record, header.len(), &indices, delimiter == b';')));
     }
     Ok(rows)
@@ -138,11 +151,11 @@ fn cells(
     has_decimal_comma: bool,
 ) -> std::result::Result<RowCells, String> {
     if record.len() != width {
-        return Err(format!("it has {} cells where the header has {width}", record.len()));
+        return Err(format!("{} cells, but the header has {width}", record.len()));
     }
     let mut values = BTreeMap::new();
     for (field, index) in indices {
-        let cell = std::str::from_utf8(&record[*index]).map_err(|_| format!("{field} is no UTF-8"))?;
+        let cell = std::str::from_utf8(&record[*index]).map_err(|_| format!("{field} is not valid UTF-8"))?;
         values.insert(*field, cell.trim().to_owned());
     }
     Ok(RowCells { values, has_decimal_comma })
@@ -170,26 +183,34 @@ pub fn json_rows(bytes: &[u8], names: &ColumnNames) -> Result<NumberedRows> {
         if text.iter().all(u8::is_ascii_whitespace) {
             continue;
         }
-        ensure!(rows.len() < MAX_ROWS, "it has more than {MAX_ROWS} rows");
+        ensure!(rows.len() < MAX_ROWS, "the file has more than {MAX_ROWS} rows");
         let object = serde_json::from_slice::<Map<String, Value>>(text);
         let row = match object {
             Ok(object) if rows.is_empty() => {
                 names.indices(&object.keys().cloned().collect::<Vec<_>>())?;
-                Ok(json_cells(&object, names))
+                json_cells(&object, names)
             }
-            Ok(object) => Ok(json_cells(&object, names)),
-            Err(error) => Err(format!("it is no JSON object: {error}")),
+            Ok(object) => json_cells(&object, names),
+            Err(error) => Err(format!("not a JSON object: {error}")),
         };
         rows.push((line as u64 + 1, row));
     }
-    ensure!(!rows.is_empty(), "it is empty");
+    ensure!(!rows.is_empty(), "the file is empty: expected a JSON object per line");
     Ok(rows)
 }
 
-fn json_cells(object: &Map<String, Value>, names: &ColumnNames) -> RowCells {
-    let value = |field| object.get(names.of(field)).map(|value| (field, text(value)));
-    let values: BTreeMap<_, _> = fields().filter_map(value).collect();
-    RowCells { values, has_decimal_comma: false }
+fn json_cells(object: &Map<String, Value>, names: &ColumnNames) -> std::result::Result<RowCells, String> {
+    let mut values = BTreeMap::new();
+    for field in fields() {
+        let name = names.of(field);
+        let mut found = object.iter().filter(|(key, _)| is_named(key, name));
+        let Some((_, value)) = found.next() else { continue };
+        if found.next().is_some() {
+            return Err(format!("two keys are named \"{name}\""));
+        }
+        values.insert(field, text(value));
+    }
+    Ok(RowCells { values, has_decimal_comma: false })
 }
 
 /// JSON value as text of a table cell.

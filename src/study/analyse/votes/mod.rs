@@ -1,5 +1,5 @@
 //! Reads votes from tables of this or other programs: `columns` finds the required columns and splits a file into rows,
-//! `row` converts each row to a vote or gives the reason for refusing it, `read` opens a file and merges slider scores
+//! `row` converts each row to a vote or gives the reason for rejecting it, `read` opens a file and merges slider scores
 //! into pages.
 
 pub mod columns;

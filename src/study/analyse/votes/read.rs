@@ -7,6 +7,7 @@ use crate::plan::TaskDesign;
 use crate::vote::{Response, StudyVote, VOTE_COLUMNS};
 use anyhow::{Context, Result, bail};
 use orator_base::input;
+use orator_base::text::counted;
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
@@ -18,14 +19,14 @@ const MAX_BYTES: u64 = 1 << 30;
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct VotesRead {
     pub votes: Vec<StudyVote>,
-    pub refused: Vec<RefusedRow>,
+    pub rejected: Vec<RejectedRow>,
     /// Fields of exported votes that the source lacks; exclusion rules that need them cannot be applied.
     pub absent: Vec<&'static str>,
 }
 
 /// Row of a table that is not a valid vote.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct RefusedRow {
+pub struct RejectedRow {
     /// Line in the file, from 1.
     pub line: u64,
     pub reason: String,
@@ -38,7 +39,7 @@ impl VotesRead {
         for (row, vote) in votes.into_iter().enumerate() {
             match check(&vote) {
                 Ok(()) => read.votes.push(vote),
-                Err(reason) => read.refused.push(RefusedRow { line: row as u64 + 1, reason }),
+                Err(reason) => read.rejected.push(RejectedRow { line: row as u64 + 1, reason }),
             }
         }
         read
@@ -70,7 +71,10 @@ impl VotesRead {
                 let trial_key = (vote.participant.clone(), vote.task.clone(), vote.trial);
                 match is_score || vote.trial == 0 || seen.insert(trial_key) {
                     true => Ok(vote),
-                    false => Err(format!("{} answered trial {} of {} above", vote.participant, vote.trial, vote.task)),
+                    false => Err(format!(
+                        "duplicate: {} already answered trial {} of {}",
+                        vote.participant, vote.trial, vote.task
+                    )),
                 }
             });
             let added = read_vote.and_then(|vote| match is_score {
@@ -80,12 +84,11 @@ impl VotesRead {
                     Ok(())
                 }
             });
-            read.refused.extend(added.err().map(|reason| RefusedRow { line, reason }));
+            read.rejected.extend(added.err().map(|reason| RejectedRow { line, reason }));
         }
         if read.votes.is_empty() {
-            let why =
-                read.refused.first().map(|row| format!(": line {}: {}", row.line, row.reason)).unwrap_or_default();
-            bail!("none of {n_rows} rows is a vote{why}");
+            let first = read.rejected.first().map(|row| format!("; line {}: {}", row.line, row.reason));
+            bail!("no valid votes in {}{}", counted(n_rows, "row"), first.unwrap_or_default());
         }
         number_trials(&mut read.votes);
         read.absent = VOTE_COLUMNS.into_iter().filter(|field| !present.contains(field)).collect();
@@ -108,7 +111,7 @@ impl SliderPages {
         };
         if vote.conditions.iter().any(|condition| page_vote.conditions.contains(condition)) {
             let StudyVote { participant, conditions, clip, .. } = vote;
-            return Err(format!("{participant} gave {} of {clip} a score above", conditions.join(", ")));
+            return Err(format!("duplicate: {participant} already scored {} of {clip}", conditions.join(", ")));
         }
         if let (Response::Scores(all), Response::Scores(one)) = (&mut page_vote.response, vote.response) {
             all.extend(one);
@@ -144,7 +147,7 @@ mod tests {
         let names = ColumnNames::parse("participant=worker, clip=Stimulus ID,correct=ok").unwrap();
         let text = "\u{feff}Worker;stimulus id;ok;response_secs\r\nw1;c1;1;2,5\r\n\"w;2\";c1;no;3\r\n\r\n";
         let read = VotesRead::of_bytes(text.as_bytes(), false, &names, None).unwrap();
-        assert_eq!(read.votes.len(), 2, "{:?}", read.refused);
+        assert_eq!(read.votes.len(), 2, "{:?}", read.rejected);
         let vote = &read.votes[1];
         assert_eq!((vote.participant.as_str(), vote.trial, vote.task.as_str()), ("w;2", 1, "real-or-generated"));
         assert_eq!(
@@ -162,8 +165,11 @@ mod tests {
         assert_eq!(read.votes.len(), 3);
         assert_eq!(read.votes[0].response, Response::Scores(vec![80, 20]));
         assert_eq!((read.votes[0].conditions.join(" "), read.votes[1].trial), ("N M".to_owned(), 2));
-        assert_eq!(read.refused.len(), 1);
-        assert_eq!((read.refused[0].line, read.refused[0].reason.as_str()), (6, "b gave M of 1 a score above"));
+        assert_eq!(read.rejected.len(), 1);
+        assert_eq!(
+            (read.rejected[0].line, read.rejected[0].reason.as_str()),
+            (6, "duplicate: b already scored M of 1")
+        );
     }
 
     #[test]
@@ -180,38 +186,38 @@ mod tests {
     }
 
     #[test]
-    fn refused_rows_state_line_and_reason() {
+    fn rejected_rows_state_line_and_reason() {
         let head = "participant,clip,design,conditions,response,expected,trial\n";
         let rows = [
             ("a,1,turing,x|y,left,right,1", ""),
-            ("a,1,turing,x|y,left,right,1", "a answered trial 1 of real-or-generated above"),
+            ("a,1,turing,x|y,left,right,1", "duplicate: a already answered trial 1 of real-or-generated"),
             ("a,1,turing,x|y,up,right,2", "response is \"up\"; expected left or right"),
-            ("a,1,turing,x,left,right,3", "two conditions, a side and the expected side are needed"),
-            ("a,1,sliders,x|y,60|101,,4", "a score from 0 to 100 is needed for each condition"),
-            ("a,1,preference,x|x,1,,5", "two different conditions and a step from -2 to 2 are needed"),
+            ("a,1,turing,x,left,right,3", "expected two conditions, a response side and an expected side"),
+            ("a,1,sliders,x|y,60|101,,4", "expected a score from 0 to 100 for each condition"),
+            ("a,1,preference,x|x,1,,5", "expected two different conditions and a step from -2 to 2"),
             ("a,1,tuning,x|y,left,right,6", "design is \"tuning\"; expected turing, turing-single"),
             (",1,turing,x|y,left,right,7", "participant is empty"),
             ("a,,turing,x|y,left,right,8", "clip is empty"),
-            ("a,1,turing,x|y,left,right,1.5", "trial is 1.5; expected a whole number"),
-            ("a,1,turing,x|y,left", "it has 5 cells where the header has 7"),
+            ("a,1,turing,x|y,left,right,1.5", "trial is 1.5; expected an integer"),
+            ("a,1,turing,x|y,left", "5 cells, but the header has 7"),
             ("a,1,turing,x|y,\"{\"\"side\"\":\"\"up\"\"}\",right,9", "expected an answer like"),
         ];
         let text: String = rows.iter().map(|(row, _)| format!("{row}\n")).collect();
         let read = read(&format!("{head}{text}")).unwrap();
-        assert_eq!((read.votes.len(), read.refused.len()), (1, rows.len() - 1));
-        for ((row, (_, reason)), refused) in rows.iter().enumerate().skip(1).zip(&read.refused) {
-            assert!(refused.line == row as u64 + 2 && refused.reason.contains(reason), "{reason}: {refused:?}");
+        assert_eq!((read.votes.len(), read.rejected.len()), (1, rows.len() - 1));
+        for ((row, (_, reason)), rejected) in rows.iter().enumerate().skip(1).zip(&read.rejected) {
+            assert!(rejected.line == row as u64 + 2 && rejected.reason.contains(reason), "{reason}: {rejected:?}");
         }
     }
 
     #[test]
     fn invalid_tables_are_errors() {
         for (text, expected) in [
-            ("", "it is empty"),
-            ("participant,clip,correct\n", "none of 0 rows"),
-            ("participant,clip\na,1\n", "there is no answer"),
-            ("worker,clip,correct\na,1,1\n", "there is no column \"participant\""),
-            ("participant,participant,clip,correct\na,a,1,1\n", "two columns are called \"participant\""),
+            ("", "the file is empty"),
+            ("participant,clip,correct\n", "no valid votes in 0 rows"),
+            ("participant,clip\na,1\n", "no column with answers"),
+            ("worker,clip,correct\na,1,1\n", "column \"participant\" not found"),
+            ("participant,participant,clip,correct\na,a,1,1\n", "two columns are named \"participant\""),
             ("participant,clip,correct\na,1,maybe\n", "line 2: correct is \"maybe\"; expected 1 or 0"),
         ] {
             let error = format!("{:#}", read(text).unwrap_err());
@@ -220,13 +226,24 @@ mod tests {
         let utf16 = VotesRead::of_bytes(b"\xff\xfea\0", false, &ColumnNames::default(), None).unwrap_err();
         assert!(utf16.to_string().contains("save it as UTF-8"));
         for (columns, expected) in
-            [("worker", "is no pair"), ("who=worker", "no field \"who\""), ("clip=", "has no name")]
+            [("worker", "invalid pair"), ("who=worker", "unknown field \"who\""), ("clip=", "no column name")]
         {
             assert!(ColumnNames::parse(columns).unwrap_err().to_string().contains(expected), "{expected}");
         }
         let names = ColumnNames::parse("clip=video").unwrap();
         let error = VotesRead::of_bytes(b"participant,clip,correct\na,1,1\n", false, &names, None).unwrap_err();
-        assert!(error.to_string().contains("there is no column \"video\""), "{error}");
+        assert!(error.to_string().contains("column \"video\" not found"), "{error}");
+    }
+
+    #[test]
+    fn keys_of_json_lines_match_like_columns_of_csv() {
+        let csv = read("Participant, CLIP,Correct\na,1,1\nb,2,0\n").unwrap();
+        let lines =
+            "{\"Participant\":\"a\",\" CLIP\":1,\"Correct\":1}\n{\"PARTICIPANT\":\"b\",\"clip\":2,\"correct\":0}\n";
+        let twice = format!("{lines}{{\"participant\":\"c\",\"clip\":3,\"Clip\":4,\"correct\":1}}\n");
+        let json = |text: &str| VotesRead::of_bytes(text.as_bytes(), true, &ColumnNames::default(), None).unwrap();
+        assert_eq!(json(lines), csv);
+        assert_eq!(json(&twice).rejected[0].reason, "two keys are named \"clip\"");
     }
 
     #[test]

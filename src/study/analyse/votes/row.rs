@@ -33,9 +33,9 @@ impl RowCells {
     fn name(&self, field: &str) -> RowResult<Option<String>> {
         match self.get(field) {
             Some(name) if name.chars().count() > MAX_NAME_CHARS => {
-                Err(format!("{field} is longer than {MAX_NAME_CHARS} letters"))
+                Err(format!("{field} is longer than {MAX_NAME_CHARS} characters"))
             }
-            Some(name) if name.contains(char::is_control) => Err(format!("{field} has a control character")),
+            Some(name) if name.contains(char::is_control) => Err(format!("{field} contains a control character")),
             name => Ok(name.map(str::to_owned)),
         }
     }
@@ -53,19 +53,19 @@ impl RowCells {
         }
     }
 
-    /// Whole number from `low` to `high`.
-    fn whole_number(&self, field: &str, [low, high]: [i64; 2]) -> RowResult<Option<i64>> {
+    /// Integer from `low` to `high`.
+    fn integer(&self, field: &str, [low, high]: [i64; 2]) -> RowResult<Option<i64>> {
         let Some(number) = self.number(field)? else { return Ok(None) };
         let is_right = number.fract() == 0.0 && number >= low as f64 && number <= high as f64;
         is_right
             .then_some(Some(number as i64))
-            .ok_or_else(|| format!("{field} is {number}; expected a whole number from {low} to {high}"))
+            .ok_or_else(|| format!("{field} is {number}; expected an integer from {low} to {high}"))
     }
 
     fn secs(&self, field: &str) -> RowResult<f64> {
         match self.number(field)?.unwrap_or(0.0) {
             secs if secs >= 0.0 => Ok(secs),
-            secs => Err(format!("{field} is {secs}; expected seconds")),
+            secs => Err(format!("{field} is {secs}; expected seconds, 0 or more")),
         }
     }
 
@@ -102,7 +102,7 @@ pub fn vote(cells: &RowCells, design: Option<TaskDesign>) -> RowResult<StudyVote
         task: cells.name("task")?.unwrap_or_else(|| title(design).to_owned()),
         design,
         phase,
-        trial: cells.whole_number("trial", [0, i64::from(u32::MAX)])?.unwrap_or(0) as u32,
+        trial: cells.integer("trial", [0, i64::from(u32::MAX)])?.unwrap_or(0) as u32,
         clip: if phase == TrialPhase::Main { cells.needed("clip")? } else { cells.name("clip")?.unwrap_or_default() },
         speaker: cells.name("speaker")?.unwrap_or_default(),
         conditions,
@@ -111,7 +111,7 @@ pub fn vote(cells: &RowCells, design: Option<TaskDesign>) -> RowResult<StudyVote
         stalled_secs: cells.secs("stalled_secs")?,
         unfocused_secs: cells.secs("unfocused_secs")?,
         response_secs: cells.secs("response_secs")?,
-        plays: cells.whole_number("plays", [0, i64::from(u32::MAX)])?.unwrap_or(0) as u32,
+        plays: cells.integer("plays", [0, i64::from(u32::MAX)])?.unwrap_or(0) as u32,
         completed: cells.yes_or_no("completed")?.unwrap_or(true),
     };
     check(&vote)?;
@@ -144,19 +144,22 @@ fn answer(
     }
     if let Some(is_correct) = cells.yes_or_no("correct")? {
         if !matches!(design, TaskDesign::Turing | TaskDesign::Mismatch) {
-            return Err("correct belongs to the designs turing and mismatch; give response and expected".to_owned());
+            return Err(
+                "the column correct applies only to the designs turing and mismatch; give response and expected"
+                    .to_owned(),
+            );
         }
         let shown = condition.unwrap_or_else(|| GENERATED.to_owned());
         let conditions = if design == TaskDesign::Turing { vec![NATURAL.to_owned(), shown] } else { vec![shown; 2] };
         let chosen = if is_correct { ScreenSide::Left } else { ScreenSide::Right };
         return Ok((conditions, Response::Side(chosen), Some(Response::Side(ScreenSide::Left))));
     }
-    if let Some(step) = cells.whole_number("step", [-2, 2])? {
+    if let Some(step) = cells.integer("step", [-2, 2])? {
         return Ok((names.unwrap_or_default(), Response::Step(step as i8), None));
     }
-    match cells.whole_number("score", [0, 100])? {
+    match cells.integer("score", [0, 100])? {
         Some(score) => Ok((names.unwrap_or_default(), Response::Scores(vec![score as u8]), None)),
-        None => Err("it has no answer".to_owned()),
+        None => Err("no answer".to_owned()),
     }
 }
 
@@ -200,31 +203,31 @@ pub fn check(vote: &StudyVote) -> RowResult<()> {
         return Ok(());
     }
     if vote.conditions.iter().any(String::is_empty) {
-        return Err("a condition has no name".to_owned());
+        return Err("a condition has an empty name".to_owned());
     }
     let n = vote.conditions.len();
     let is_side = |response: &Option<Response>| matches!(response, Some(Response::Side(_)));
     match (vote.design, &vote.response) {
         (TaskDesign::Turing | TaskDesign::Mismatch, Response::Side(_)) if n == 2 && is_side(&vote.expected) => Ok(()),
         (TaskDesign::Turing | TaskDesign::Mismatch, _) => {
-            Err("two conditions, a side and the expected side are needed".to_owned())
+            Err("expected two conditions, a response side and an expected side".to_owned())
         }
         (TaskDesign::TuringSingle, Response::Real(_)) if n == 1 && matches!(vote.expected, Some(Response::Real(_))) => {
             Ok(())
         }
         (TaskDesign::TuringSingle, _) => {
-            Err("one condition, real or generated as the response and as what was expected are needed".to_owned())
+            Err("expected one condition, and real or generated as response and as expected response".to_owned())
         }
         (TaskDesign::Preference, Response::Step(-2..=2)) if n == 2 && vote.conditions[0] != vote.conditions[1] => {
             Ok(())
         }
-        (TaskDesign::Preference, _) => Err("two different conditions and a step from -2 to 2 are needed".to_owned()),
+        (TaskDesign::Preference, _) => Err("expected two different conditions and a step from -2 to 2".to_owned()),
         (TaskDesign::Sliders, Response::Scores(scores))
             if n >= 1 && scores.len() == n && scores.iter().all(|score| *score <= 100) =>
         {
             Ok(())
         }
-        (TaskDesign::Sliders, _) => Err("a score from 0 to 100 is needed for each condition".to_owned()),
+        (TaskDesign::Sliders, _) => Err("expected a score from 0 to 100 for each condition".to_owned()),
     }
 }
 

@@ -39,7 +39,7 @@ fn estimate(cells: &[&[ClipVote]], weights: &[f64]) -> Result<StudentEstimate, S
     }
     // Without this check, rounding would give equal scores a tiny variance above 0.
     if cells.iter().all(|votes| votes.iter().all(|vote| vote.score == votes[0].score)) {
-        return Err(StatisticsError::NoSpread { what: "scores" });
+        return Err(StatisticsError::NoVariation { what: "scores" });
     }
     let scores = scores(cells);
     let variance = contrast.variance(&groups, &scores);
@@ -222,7 +222,7 @@ mod tests {
         let (alone, difference) = (crossed_estimate(&votes).unwrap(), crossed_difference(&better, &votes).unwrap());
         assert!((difference.value - 0.2).abs() < 1e-12 && difference.standard_error < alone.standard_error / 5.0);
         let same = crossed_difference(&votes, &votes);
-        assert!(matches!(same, Err(StatisticsError::NoSpread { .. })), "{same:?}");
+        assert!(matches!(same, Err(StatisticsError::NoVariation { .. })), "{same:?}");
     }
 
     #[test]
@@ -239,7 +239,7 @@ mod tests {
             [(0, 0), (0, 1), (1, 0)].map(|(participant, clip)| ClipVote { participant, clip, score: clip as f64 });
         assert!(crossed_estimate(&star[..2]).is_err() && crossed_estimate(&star).is_ok());
         let same = crossed(1, 5, 0..5).into_iter().map(|vote| ClipVote { score: 0.3, ..vote }).collect::<Vec<_>>();
-        assert!(matches!(crossed_estimate(&same), Err(StatisticsError::NoSpread { .. })));
+        assert!(matches!(crossed_estimate(&same), Err(StatisticsError::NoVariation { .. })));
         assert_eq!(what(crossed_difference(&crossed(1, 9, 0..9), &crossed(1, 9, 0..1))), "clips");
         let wrong = [ClipVote { participant: 0, clip: 0, score: f64::NAN }];
         assert!(matches!(crossed_estimate(&wrong), Err(StatisticsError::NotFinite { .. })));

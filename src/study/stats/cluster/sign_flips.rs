@@ -84,9 +84,9 @@ pub fn side_p(blocks: &[SideBlock]) -> Result<f64, StatisticsError> {
     let mut mean = 0.0;
     for block in blocks.iter().filter(|block| block.trials > 0) {
         let counts = Hypergeometric::new(block.trials, block.real_left, block.chosen_left);
-        let most = block.real_left.min(block.chosen_left);
-        let weights: Vec<f64> = (0..=most).map(|k| counts.as_ref().map_or(0.0, |counts| counts.pmf(k))).collect();
-        let mut sums = vec![0.0; distribution.len() + most as usize];
+        let max_both = block.real_left.min(block.chosen_left);
+        let weights: Vec<f64> = (0..=max_both).map(|k| counts.as_ref().map_or(0.0, |counts| counts.pmf(k))).collect();
+        let mut sums = vec![0.0; distribution.len() + max_both as usize];
         for (k, before) in distribution.iter().enumerate() {
             weights.iter().zip(&mut sums[k..]).for_each(|(weight, sum)| *sum += before * weight);
         }

@@ -108,6 +108,6 @@ mod tests {
         assert!(matches!(participant_estimate(&votes(&[(1, 0, 1.0)])), Err(StatisticsError::TooFew { .. })));
         assert!(participant_estimate(&[]).is_err() && participant_means(&votes(&[(1, 0, f64::NAN)])).is_err());
         let right = votes(&[(1, 0, 1.0), (2, 0, 1.0)]);
-        assert!(matches!(participant_estimate(&right), Err(StatisticsError::NoSpread { .. })));
+        assert!(matches!(participant_estimate(&right), Err(StatisticsError::NoVariation { .. })));
     }
 }

@@ -40,11 +40,11 @@ impl MixedLogit {
         at_least("clips", 2, groups.n[CLIP])?;
         let successes = scores(&[votes]);
         if let Some(&value) = successes.iter().find(|score| **score != 0.0 && **score != 1.0) {
-            return Err(StatisticsError::OutOfRange { what: "score of a binary vote", value, least: 0.0, most: 1.0 });
+            return Err(StatisticsError::OutOfRange { what: "score of a binary vote", value, min: 0.0, max: 1.0 });
         }
         let (n, share) = (votes.len() as f64, successes.iter().sum::<f64>() / votes.len() as f64);
         if share == 0.0 || share == 1.0 {
-            return Err(StatisticsError::NoSpread { what: "votes" });
+            return Err(StatisticsError::NoVariation { what: "votes" });
         }
         // Parameters are scaled by their approximate standard errors, so that the curvature is about 1.
         let n_groups = groups.n[PARTICIPANT].min(groups.n[CLIP]) as f64;
@@ -168,7 +168,7 @@ mod tests {
             let model = MixedLogit::fit(&votes).unwrap();
             let StudentEstimate { value, standard_error, .. } = model.intercept;
             let wald = StudentEstimate { degrees_of_freedom: f64::INFINITY, ..model.intercept };
-            for (what, found, expected, most) in [
+            for (what, found, expected, tolerance) in [
                 ("log-likelihood", model.log_likelihood, &set["log_likelihood"], 1e-4),
                 ("participants", model.sd_participants, &set["sd_participants"], 1e-3),
                 ("clips", model.sd_clips, &set["sd_clips"], 1e-3),
@@ -177,7 +177,10 @@ mod tests {
                 ("z", wald.statistic(0.0), &set["z"][0], 0.02),
                 ("p", wald.p_value(0.0), &set["p"][0], 1e-3),
             ] {
-                assert!((found - expected.as_f64().unwrap()).abs() < most, "{name} {what}: {found} for {expected}");
+                assert!(
+                    (found - expected.as_f64().unwrap()).abs() < tolerance,
+                    "{name} {what}: {found} for {expected}"
+                );
             }
             assert!(model.converged, "{name}");
             assert_eq!(model.sd_participants == 0.0 || model.sd_clips == 0.0, name == "singular", "{name}");
@@ -189,18 +192,18 @@ mod tests {
     }
 
     #[test]
-    fn votes_without_a_fit_are_refused() {
+    fn votes_without_a_fit_are_rejected() {
         let vote = |participant, clip, score| ClipVote { participant, clip, score };
         let cross: Vec<ClipVote> = (0..40).map(|k| vote(k / 8, k % 8, f64::from(u8::from(k % 3 == 0)))).collect();
         let changed =
             |change: fn(&ClipVote) -> ClipVote| MixedLogit::fit(&cross.iter().map(change).collect::<Vec<_>>());
-        let refused = |change| changed(change).unwrap_err();
+        let error_of = |change| changed(change).unwrap_err();
         assert!(matches!(MixedLogit::fit(&[]), Err(StatisticsError::TooFew { what: "votes", .. })));
-        assert!(matches!(refused(|v| ClipVote { score: 1.0, ..*v }), StatisticsError::NoSpread { .. }));
-        let alone = refused(|v| ClipVote { participant: 3, ..*v });
-        assert!(matches!(alone, StatisticsError::TooFew { what: "participants", .. }));
-        assert!(matches!(refused(|v| ClipVote { clip: 3, ..*v }), StatisticsError::TooFew { what: "clips", .. }));
-        assert!(matches!(refused(|v| ClipVote { score: 0.5, ..*v }), StatisticsError::OutOfRange { .. }));
+        assert!(matches!(error_of(|v| ClipVote { score: 1.0, ..*v }), StatisticsError::NoVariation { .. }));
+        let single = error_of(|v| ClipVote { participant: 3, ..*v });
+        assert!(matches!(single, StatisticsError::TooFew { what: "participants", .. }));
+        assert!(matches!(error_of(|v| ClipVote { clip: 3, ..*v }), StatisticsError::TooFew { what: "clips", .. }));
+        assert!(matches!(error_of(|v| ClipVote { score: 0.5, ..*v }), StatisticsError::OutOfRange { .. }));
         // Participants who always answer alike, and a total of two votes: a fit or an error, no panic.
         let stubborn = changed(|v| ClipVote { score: (v.participant % 2) as f64, ..*v });
         assert!(stubborn.is_ok_and(|model| model.intercept.value.is_finite()));
@@ -211,7 +214,7 @@ mod tests {
     #[test]
     fn error_rates_and_coverage_are_nominal() {
         let is_long = std::env::var_os("ORATOR_LONG").is_some();
-        let (n_studies, least, most) = if is_long { (2000, 0.03, 0.07) } else { (40, 0.0, 0.2) };
+        let (n_studies, min, max) = if is_long { (2000, 0.03, 0.07) } else { (40, 0.0, 0.2) };
         for n_clips in if is_long { vec![40, 20] } else { vec![40] } {
             let design = CrossedDesign { n_participants: 50, n_trials: 20, n_clips };
             let effects = CrossedEffects { share: 0.5, sd_participants: 0.5, sd_clips: 0.3 };
@@ -234,8 +237,8 @@ mod tests {
             let names = ["binomial test", "Wald's test", "t test", "interval of the bias", "interval of the share"];
             eprintln!("{n_studies} studies of {n_clips} clips without bias, errors of {names:?}: {rates:?}");
             let [binomial, wald, containment, misses, misses_share] = rates;
-            assert!((least..most).contains(&containment) && (least..most + 0.01).contains(&wald), "{rates:?}");
-            assert!(misses < most && misses_share < most && (!is_long || binomial > 0.1), "{rates:?}");
+            assert!((min..max).contains(&containment) && (min..max + 0.01).contains(&wald), "{rates:?}");
+            assert!(misses < max && misses_share < max && (!is_long || binomial > 0.1), "{rates:?}");
         }
     }
 }

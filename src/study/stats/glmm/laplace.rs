@@ -66,7 +66,7 @@ impl Laplace {
         for _ in 0..MAX_ITERATIONS {
             let (gradient, curvature) = self.derivatives(fixed, sds);
             let step = self.solve(&curvature, gradient);
-            let size = step.iter().fold(0.0f64, |most, v| most.max(v.abs()));
+            let size = step.iter().fold(0.0f64, |max, v| max.max(v.abs()));
             let mut share = 1.0;
             let (next, next_value) = loop {
                 let next: Vec<f64> = self.intercepts.iter().zip(&step).map(|(u, v)| u - share * v).collect();

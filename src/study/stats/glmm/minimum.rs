@@ -43,7 +43,7 @@ pub(super) fn minimum(mut f: impl FnMut(&Array1<f64>) -> f64, start: Array1<f64>
             inverse = Array2::eye(n);
             direction = -gradient.clone();
         }
-        let longest = direction.iter().fold(0.0f64, |most, v| most.max(v.abs()));
+        let longest = direction.iter().fold(0.0f64, |max, v| max.max(v.abs()));
         direction *= (5.0 / longest).min(1.0);
         let descent = direction.dot(&gradient);
         let mut share = 1.0;

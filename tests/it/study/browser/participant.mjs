@@ -120,8 +120,8 @@ async function participate(browser, seed) {
       await lookAway(1000);
     }
     await isOpen("main form fieldset");
-    const { startApartMs, mostApartMs } = await page.$eval(".films", (stage) => ({ ...stage.dataset }));
-    report.apart_ms.push([Number(startApartMs), Number(mostApartMs)]);
+    const { startOffsetMs, maxOffsetMs } = await page.$eval(".films", (stage) => ({ ...stage.dataset }));
+    report.apart_ms.push([Number(startOffsetMs), Number(maxOffsetMs)]);
   };
   const seeInTurn = async (n, after) => {
     for (let k = 0; k < n; k += 1) {

@@ -1,6 +1,6 @@
-//! Verdicts: sentences on what can be concluded from a task and what cannot.
+//! Conclusions: sentences on what the votes of a task show and what they do not show.
 
-use super::number_format::{count, p_value, percent, percents, points};
+use super::number_format::{counted, p_value, percent, percents, points};
 use super::result::{Conclusion, PairAnalysis, ShareAnalysis, ShareMeasure, StatisticSettings, TaskAnalysis};
 use super::statistic::StatisticMethod;
 use crate::plan::TaskDesign;
@@ -9,9 +9,9 @@ use crate::plan::TaskDesign;
 const MAX_PAIRS: usize = 6;
 
 /// Sentences about a task, the most important first.
-pub fn verdicts(task: &TaskAnalysis, settings: &StatisticSettings) -> Vec<String> {
+pub fn conclusions(task: &TaskAnalysis, settings: &StatisticSettings) -> Vec<String> {
     let mut sentences: Vec<String> = Vec::new();
-    let shares = task.shares.iter().filter(|share| share.measure != ShareMeasure::TakenForReal);
+    let shares = task.shares.iter().filter(|share| share.measure != ShareMeasure::JudgedReal);
     sentences.extend(shares.map(|share| share_sentence(share, settings)));
     if task.pairs.len() > MAX_PAIRS {
         sentences.push(many_pairs_sentence(task));
@@ -32,19 +32,19 @@ pub fn scope(share: &ShareAnalysis) -> String {
 
 fn share_sentence(share: &ShareAnalysis, settings: &StatisticSettings) -> String {
     let what = match share.measure {
-        ShareMeasure::GeneratedChosen => "the generated motion was taken for the real one in",
-        ShareMeasure::MatchedChosen => "the motion of the heard speech was chosen in",
-        ShareMeasure::Correct => "real and generated motion were told apart in",
-        ShareMeasure::TakenForReal => "the film was taken for real in",
+        ShareMeasure::GeneratedChosen => "the generated motion was chosen as the real one in",
+        ShareMeasure::MatchedChosen => "the matching motion was chosen in",
+        ShareMeasure::Correct => "the response (real or generated) was correct in",
+        ShareMeasure::JudgedReal => "the film was judged real in",
     };
     let confidence = format!("{:.0} %", 100.0 * settings.confidence);
     let first = || share.statistics.intervals.first().map(|interval| interval.ends);
     let interval = share.statistics.interval(StatisticMethod::Crossed).or_else(first);
     let interval =
         interval.map(|interval| format!(" ({confidence} interval {})", percents(interval))).unwrap_or_default();
-    let (n, share_of) = (count(share.n_votes as usize), percent(share.share));
+    let (votes, share_of) = (counted(share.n_votes as usize, "vote"), percent(share.share));
     format!(
-        "{}: {what} {share_of} of {n} votes{interval}. {}{}",
+        "{}: {what} {share_of} of {votes}{interval}. {}{}",
         capitalise(&scope(share)),
         conclusion_sentence(share),
         naive(share, settings.level())
@@ -58,42 +58,44 @@ fn conclusion_sentence(share: &ShareAnalysis) -> String {
     let equivalence = test.map(|test| p_value(test.p)).unwrap_or_default();
     let bound = test.map(|test| points(test.bound)).unwrap_or_default();
     let within = format!(
-        "The difference from chance lies within the bound of \u{b1}{bound} points (equivalence, {equivalence})"
+        "The difference from chance lies within the bound of \u{b1}{bound} percentage points (equivalence test, \
+         {equivalence})"
     );
     let (above, below) = match share.measure {
         ShareMeasure::GeneratedChosen => (
-            "more often than by chance: it was preferred to the real motion as the real one",
-            "less often than by chance: it can be told from the real motion",
+            "more often than by chance: participants mistook it for the real motion",
+            "less often than by chance: it can be distinguished from the real motion",
         ),
         ShareMeasure::MatchedChosen => (
-            "more often than by chance: the motion fits its speech better than that of another",
-            "less often than by chance: the motion of another speech was found more fitting",
+            "more often than by chance: it fits the speech better than the motion of another speech",
+            "less often than by chance: the motion of another speech was judged to fit better",
         ),
-        ShareMeasure::Correct | ShareMeasure::TakenForReal => (
-            "more often than by chance: they can be told apart",
-            "less often than by chance: they are told apart, with the names exchanged",
+        ShareMeasure::Correct | ShareMeasure::JudgedReal => (
+            "more often than by chance: real and generated motion can be distinguished",
+            "less often than by chance: they can be distinguished, but generated motion was judged real and real \
+             motion generated",
         ),
     };
     match share.conclusion {
         Conclusion::Above => format!("That is {above} ({p})."),
         Conclusion::Below => format!("That is {below} ({p})."),
-        Conclusion::AboveWithinBound => format!("That is {above} ({p}). {within}: it is there, but small."),
-        Conclusion::BelowWithinBound => format!("That is {below} ({p}). {within}: it is there, but small."),
+        Conclusion::AboveWithinBound => format!("That is {above} ({p}). {within}: it is significant, but small."),
+        Conclusion::BelowWithinBound => format!("That is {below} ({p}). {within}: it is significant, but small."),
         Conclusion::Equivalent => {
-            format!("No difference from chance was found ({p}). {within}: within it, the two are equivalent.")
+            format!("No difference from chance was found ({p}). {within}: equivalent up to this bound.")
         }
-        Conclusion::Undecided => format!(
-            "Nothing can be concluded: chance is not ruled out ({p}), and neither are differences of {bound} points \
-             (equivalence, {equivalence}). Failing to reject is not passing."
+        Conclusion::Inconclusive => format!(
+            "Inconclusive: the tests rule out neither chance ({p}) nor differences of {bound} percentage points or more \
+             (equivalence test, {equivalence}). A test that is not significant does not show equality."
         ),
         Conclusion::Untested => {
-            let why = share.statistics.missing.first().map(|why| format!(": {why}")).unwrap_or_default();
-            format!("There is no test that holds for other participants and clips{why}.")
+            let reason = share.statistics.missing.first().map(|reason| format!(": {reason}")).unwrap_or_default();
+            format!("No test that generalises to other participants and clips could be computed{reason}.")
         }
     }
 }
 
-/// Remark on the naive binomial test if it contradicts the crossed test.
+/// Sentence on the naive binomial test if it contradicts the crossed test.
 fn naive(share: &ShareAnalysis, level: f64) -> String {
     let Some((p, naive)) = share.statistics.crossed_p().zip(share.statistics.test(StatisticMethod::Binomial)) else {
         return String::new();
@@ -101,7 +103,7 @@ fn naive(share: &ShareAnalysis, level: f64) -> String {
     match (p < level) == (naive.p < level) {
         true => String::new(),
         false => format!(
-            " Taken for independent, which they are not, the votes would say the opposite (binomial test, {}).",
+            " A binomial test, which wrongly treats the votes as independent, gives the opposite result ({}).",
             p_value(naive.p)
         ),
     }
@@ -114,7 +116,7 @@ fn pair_sentence(pair: &PairAnalysis, design: TaskDesign) -> String {
     };
     let (scale, verb, unit) = match design {
         TaskDesign::Sliders => (1.0, "rated above", "points of 100"),
-        TaskDesign::TuringSingle => (100.0, "taken for real more often than", "points of percent"),
+        TaskDesign::TuringSingle => (100.0, "judged real more often than", "percentage points"),
         _ => (1.0, "preferred to", "steps of a scale from -2 to 2"),
     };
     let ends = pair.statistics.interval(StatisticMethod::Crossed).map(|interval| {
@@ -130,9 +132,11 @@ fn pair_sentence(pair: &PairAnalysis, design: TaskDesign) -> String {
     let size =
         format!("{:.2} {unit}{}{}", scale * pair.difference.abs(), ends.unwrap_or_default(), p.unwrap_or_default());
     match pair.conclusion {
-        Conclusion::Untested => format!("{high} and {low}: there is no test ({size})."),
-        Conclusion::Undecided | Conclusion::Equivalent => {
-            format!("No difference was found between {high} and {low} ({size}). That does not show that there is none.")
+        Conclusion::Untested => format!("{high} and {low}: not tested ({size})."),
+        Conclusion::Inconclusive | Conclusion::Equivalent => {
+            format!(
+                "No difference was found between {high} and {low} ({size}). This does not show that they are equal."
+            )
         }
         _ => format!("{high} was {verb} {low} ({size})."),
     }
@@ -140,13 +144,13 @@ fn pair_sentence(pair: &PairAnalysis, design: TaskDesign) -> String {
 
 fn many_pairs_sentence(task: &TaskAnalysis) -> String {
     let is_found = |pair: &&PairAnalysis| {
-        !matches!(pair.conclusion, Conclusion::Undecided | Conclusion::Equivalent | Conclusion::Untested)
+        !matches!(pair.conclusion, Conclusion::Inconclusive | Conclusion::Equivalent | Conclusion::Untested)
     };
     let n_found = task.pairs.iter().filter(is_found).count();
     format!(
-        "A difference was found in {n_found} of {} pairs of conditions, after Holm's adjustment. Of the others it is not \
-         shown that they do not differ.",
-        task.pairs.len()
+        "A difference was found in {n_found} of {} of conditions, after Holm's adjustment. For the others, this does \
+         not show that they are equal.",
+        counted(task.pairs.len(), "pair")
     )
 }
 

@@ -1,5 +1,5 @@
-//! Deck of one speaker's clips for one task: deals clips to sessions, each with a comparison and a screen arrangement.
-//! Also the random streams of a design.
+//! Scheduler of one speaker's clips for one task: assigns clips to sessions, each with a comparison and a screen
+//! arrangement. Also the random streams of a design.
 
 use rand::SeedableRng;
 use rand::seq::SliceRandom;
@@ -12,27 +12,27 @@ pub(super) fn stream(seed: u64, purpose: &str) -> ChaCha8Rng {
 
 /// Clip with the comparison and the arrangement in which it is shown.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub struct DealtClip {
+pub struct AssignedClip {
     pub clip: usize,
     pub comparison: usize,
     /// Row of the Latin square of screen positions.
     pub arrangement: usize,
 }
 
-/// Deck that stays balanced after any number of dealt clips: counts of clips differ by at most one, and so do the
+/// Scheduler that stays balanced after any number of assigned clips: counts of clips differ by at most one, and so do the
 /// counts of (clip, comparison) and of (clip, comparison, arrangement).
-pub(super) struct ClipDeck {
+pub(super) struct ClipScheduler {
     order: Vec<usize>,
     n_comparisons: usize,
     n_arrangements: usize,
-    /// Offset of this deck's comparisons and arrangements, so that decks dealt in parallel do not all show the same
-    /// ones at once.
+    /// Offset of this scheduler's comparisons and arrangements, so that schedulers used in parallel do not all show the
+    /// same ones at once.
     offset: usize,
-    n_dealt: usize,
+    n_assigned: usize,
     rng: ChaCha8Rng,
 }
 
-impl ClipDeck {
+impl ClipScheduler {
     pub(super) fn new(
         n_clips: usize,
         [n_comparisons, n_arrangements]: [usize; 2],
@@ -41,33 +41,33 @@ impl ClipDeck {
     ) -> Self {
         let (order, n_comparisons, n_arrangements) =
             ((0..n_clips).collect(), n_comparisons.max(1), n_arrangements.max(1));
-        Self { order, n_comparisons, n_arrangements, offset, n_dealt: 0, rng }
+        Self { order, n_comparisons, n_arrangements, offset, n_assigned: 0, rng }
     }
 
-    /// Deals `n` different clips for one session, at most as many as there are.
-    pub(super) fn deal(&mut self, n: usize) -> Vec<DealtClip> {
-        let mut hand: Vec<DealtClip> = Vec::new();
+    /// Assigns `n` different clips for one session, at most as many as there are.
+    pub(super) fn assign(&mut self, n: usize) -> Vec<AssignedClip> {
+        let mut chosen: Vec<AssignedClip> = Vec::new();
         let n_clips = self.order.len();
         let (n_comparisons, n_arrangements) = (self.n_comparisons, self.n_arrangements);
         // Consecutive clips cycle through the comparisons. The cycle shifts by one every `n_turns` clips, where each
         // clip would otherwise meet the same comparisons again.
         let n_turns = lcm(n_clips.max(1), n_comparisons);
         for _ in 0..n.min(n_clips) {
-            let at = self.n_dealt % (n_clips * n_comparisons * n_arrangements);
+            let at = self.n_assigned % (n_clips * n_comparisons * n_arrangements);
             if at == 0 {
-                // Every combination was dealt equally often, so the order is reshuffled. Clips already in this hand go
-                // last, so that none is dealt twice in one session.
+                // Every combination was assigned equally often, so the order is reshuffled. Clips of this session go
+                // last, so that none is assigned twice in one session.
                 self.order.shuffle(&mut self.rng);
-                self.order.sort_by_key(|clip| hand.iter().any(|dealt| dealt.clip == *clip));
+                self.order.sort_by_key(|clip| chosen.iter().any(|assigned| assigned.clip == *clip));
             }
             let (slot, visit) = (at % n_clips, at / n_clips);
             let turn = (at + at / n_turns) % n_comparisons;
             let comparison = (turn + self.offset) % n_comparisons;
             let arrangement = (visit / n_comparisons + slot / n_comparisons + turn + self.offset) % n_arrangements;
-            hand.push(DealtClip { clip: self.order[slot], comparison, arrangement });
-            self.n_dealt += 1;
+            chosen.push(AssignedClip { clip: self.order[slot], comparison, arrangement });
+            self.n_assigned += 1;
         }
-        hand
+        chosen
     }
 }
 
@@ -88,29 +88,29 @@ mod tests {
         #[test]
         fn counts_are_balanced_at_any_time(
             n_clips in 1usize..13, n_comparisons in 1usize..6, n_arrangements in 1usize..5,
-            offset in 0usize..4, hands in proptest::collection::vec(1usize..13, 1..40), seed in 0u64..100,
+            offset in 0usize..4, session_sizes in proptest::collection::vec(1usize..13, 1..40), seed in 0u64..100,
         ) {
             let rng = ChaCha8Rng::seed_from_u64(seed);
-            let mut deck = ClipDeck::new(n_clips, [n_comparisons, n_arrangements], offset, rng);
-            let mut counts = [(); 3].map(|()| BTreeMap::<DealtClip, usize>::new());
+            let mut scheduler = ClipScheduler::new(n_clips, [n_comparisons, n_arrangements], offset, rng);
+            let mut counts = [(); 3].map(|()| BTreeMap::<AssignedClip, usize>::new());
             for clip in 0..n_clips {
                 for comparison in 0..n_comparisons {
                     for arrangement in 0..n_arrangements {
-                        let cell = |comparison, arrangement| DealtClip { clip, comparison, arrangement };
+                        let cell = |comparison, arrangement| AssignedClip { clip, comparison, arrangement };
                         counts[0].insert(cell(0, 0), 0);
                         counts[1].insert(cell(comparison, 0), 0);
                         counts[2].insert(cell(comparison, arrangement), 0);
                     }
                 }
             }
-            for n in hands {
-                let hand = deck.deal(n.min(n_clips));
-                let clips: BTreeSet<usize> = hand.iter().map(|dealt| dealt.clip).collect();
-                assert_eq!(clips.len(), n.min(n_clips), "a clip is there twice");
-                for dealt in hand {
-                    *counts[0].get_mut(&DealtClip { comparison: 0, arrangement: 0, ..dealt }).unwrap() += 1;
-                    *counts[1].get_mut(&DealtClip { arrangement: 0, ..dealt }).unwrap() += 1;
-                    *counts[2].get_mut(&dealt).unwrap() += 1;
+            for n in session_sizes {
+                let chosen = scheduler.assign(n.min(n_clips));
+                let clips: BTreeSet<usize> = chosen.iter().map(|assigned| assigned.clip).collect();
+                assert_eq!(clips.len(), n.min(n_clips), "a clip occurs twice");
+                for assigned in chosen {
+                    *counts[0].get_mut(&AssignedClip { comparison: 0, arrangement: 0, ..assigned }).unwrap() += 1;
+                    *counts[1].get_mut(&AssignedClip { arrangement: 0, ..assigned }).unwrap() += 1;
+                    *counts[2].get_mut(&assigned).unwrap() += 1;
                 }
                 for counts in &counts {
                     assert!(counts.values().max().unwrap() - counts.values().min().unwrap() <= 1, "{counts:?}");
