@@ -7,7 +7,7 @@ use orator_base::math::order::median;
 /// Factor from median absolute deviation to standard deviation of a normal distribution.
 const MAD: f64 = 1.4826;
 /// Number of standard deviations above which an error is an outlier.
-pub const STRAY: f64 = 4.0;
+pub const OUTLIER_STDS: f64 = 4.0;
 /// Ridge penalty as a share of the data's scale, which keeps weights of unused vectors at 0.
 const PENALTY: f64 = 1e-3;
 

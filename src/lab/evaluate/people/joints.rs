@@ -46,8 +46,8 @@ pub struct LiftedErrors {
     pub mean_pose: JointErrors,
 }
 
-/// Motions of clips as lifted from what was found, for the mask, and their errors. `lifter` must leave the camera's axes
-/// as they are (`level = false`).
+/// Motions of clips as lifted from the detected keypoints (for the mask), and their errors. `lifter` must retain the
+/// camera axes (`level = false`).
 pub fn measure(lifter: &Lifter, clips: &[&RenderedClip]) -> Result<(Vec<Motion>, LiftedErrors)> {
     let mut sums = [ErrorSums::default(); 3];
     let mut motions = Vec::new();
@@ -58,16 +58,16 @@ pub fn measure(lifter: &Lifter, clips: &[&RenderedClip]) -> Result<(Vec<Motion>,
         for interval in intervals {
             for start in (interval.start..interval.end).step_by(SEGMENT) {
                 let frames: Vec<usize> = (start..(start + SEGMENT).min(interval.end)).collect();
-                let told: Vec<usize> =
+                let usable: Vec<usize> =
                     frames.into_iter().filter(|&t| is_lifted(&found, t) && is_lifted(&exact, t)).collect();
-                if told.is_empty() {
+                if usable.is_empty() {
                     continue;
                 }
                 let of_motion = |motion: &Motion| {
-                    told.iter().map(|&t| motion.joints.index_axis(Axis(0), t).to_owned()).collect::<Vec<_>>()
+                    usable.iter().map(|&t| motion.joints.index_axis(Axis(0), t).to_owned()).collect::<Vec<_>>()
                 };
                 let truth: Vec<Array2<f32>> =
-                    told.iter().map(|&t| clip.truth.joints.index_axis(Axis(0), t).to_owned()).collect();
+                    usable.iter().map(|&t| clip.truth.joints.index_axis(Axis(0), t).to_owned()).collect();
                 let mean = clip.truth.joints.mean_axis(Axis(0)).unwrap_or_else(|| Array2::zeros((N_JOINTS, 3)));
                 sums[0].add(&of_motion(&found), &truth);
                 sums[1].add(&of_motion(&exact), &truth);

@@ -168,8 +168,8 @@ impl TrainingTask for BodyLifterTask {
     fn errors(&self, brief: bool) -> Result<Vec<String>> {
         let n = if brief { N_SCENES_BRIEF } else { N_SCENES };
         let mut lines = Vec::new();
-        let by_rule = ("made by rule".to_owned(), Vec::new());
-        for (set, takes) in self.held_out.iter().chain([&by_rule]) {
+        let procedural = ("procedural gestures".to_owned(), Vec::new());
+        for (set, takes) in self.held_out.iter().chain([&procedural]) {
             for (filming, input) in [(Filming::Drop, "drop "), (Filming::Clean, "clean")] {
                 let scenes = scenes(takes, filming, n);
                 if scenes.is_empty() {

@@ -206,8 +206,8 @@ fn guess_hips(seen: &mut [SeenBody], shoulders_px: f64, rng: &mut ChaCha8Rng) {
         let (Some(right), Some(left)) = (frame[R_SHOULDER], frame[L_SHOULDER]) else { continue };
         for (hip, side) in [(R_HIP, -0.5), (L_HIP, 0.5)] {
             let middle = [0, 1].map(|k| f64::from(right[k] + left[k]) / 2.0);
-            let place = [aside + side * apart + 0.02 * normal(rng), below + 0.02 * normal(rng)];
-            frame[hip] = frame[hip].map(|_| [0, 1].map(|k| (middle[k] + shoulders_px * place[k]) as f32));
+            let position = [aside + side * apart + 0.02 * normal(rng), below + 0.02 * normal(rng)];
+            frame[hip] = frame[hip].map(|_| [0, 1].map(|k| (middle[k] + shoulders_px * position[k]) as f32));
         }
     }
 }

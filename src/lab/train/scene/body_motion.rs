@@ -152,18 +152,18 @@ struct WristPath {
 impl WristPath {
     fn sample(rng: &mut ChaCha8Rng, habit: &Habit, secs: f64) -> Self {
         let pace = rng.random_range(0.8..1.7);
-        let place = |rng: &mut ChaCha8Rng| {
+        let random_wrist = |rng: &mut ChaCha8Rng| {
             let rests = rng.random_bool(habit.rests);
             let ranges = if rests { habit.rest } else { habit.gestures[rng.random_range(0..habit.gestures.len())] };
             ranges.map(|(low, high)| rng.random_range(low..high))
         };
-        let start = place(rng);
+        let start = random_wrist(rng);
         let mut last = start;
         let mut moves = Vec::new();
         let mut t = -rng.random_range(0.0..2.0);
         while t < secs {
             let whole = rng.random_bool(0.6);
-            let next = if whole { place(rng) } else { last.map(|v| v + rng.random_range(-0.12..0.12)) };
+            let next = if whole { random_wrist(rng) } else { last.map(|v| v + rng.random_range(-0.12..0.12)) };
             let far = vec3::norm(vec3::sub(next, last));
             let takes = pace * rng.random_range(0.2..0.45) * (0.4 + far / 0.3);
             moves.push((t, t + takes, next));
@@ -182,13 +182,13 @@ impl WristPath {
     }
 
     fn at(&self, t: f64) -> Vec3 {
-        let mut place = self.start;
+        let mut position = self.start;
         for &(leaves, arrives, next) in self.moves.iter().take_while(|m| m.0 < t) {
             let s = ((t - leaves) / (arrives - leaves)).min(1.0);
             let share = s * s * s * (10.0 - 15.0 * s + 6.0 * s * s); // minimum jerk
-            place = std::array::from_fn(|k| place[k] + share * (next[k] - place[k]));
+            position = std::array::from_fn(|k| position[k] + share * (next[k] - position[k]));
         }
-        place
+        position
     }
 }
 
