@@ -44,7 +44,7 @@ const T_POSE_FRAMES: usize = 1;
 const LARGEST_JUMP: f64 = 0.1;
 /// Length of upper arm and forearm of the mean adult, metres.
 const ARM_METRES: f64 = 0.54;
-/// Least duration of a take, seconds.
+/// Shortest duration of a take, seconds.
 const SHORTEST_SECS: f64 = 1.0;
 
 /// Reads all takes of `paths` (BVH or `.npz` files, or folders searched for them), sorted by file name.
@@ -241,8 +241,8 @@ fn upper_body(joints: &[Vec3]) -> Pose {
     let up = vec3::unit(up, 1e-9).unwrap_or([0.0, 1.0, 0.0]);
     let nose = vec3::add(vec3::add(joints[1], vec3::scale(up, 0.06)), vec3::scale(ahead, 0.11));
     // A skeleton without legs has its root as both hips.
-    let spread = if joints[8] == joints[9] { vec3::scale(across, 0.3) } else { [0.0; 3] };
-    let hips = [vec3::sub(joints[8], spread), vec3::add(joints[9], spread)];
+    let hip_offset = if joints[8] == joints[9] { vec3::scale(across, 0.3) } else { [0.0; 3] };
+    let hips = [vec3::sub(joints[8], hip_offset), vec3::add(joints[9], hip_offset)];
     let order = [nose, joints[2], joints[3], joints[4], joints[5], joints[6], joints[7], hips[0], hips[1]];
     order.map(|p| {
         let [x, y, z] = vec3::sub(p, neck);
@@ -255,8 +255,8 @@ fn split_at_jumps(name: &str, fps: f64, poses: Vec<Pose>) -> Vec<BodyTake> {
     let limit = LARGEST_JUMP * 60.0 / fps;
     let jump =
         |a: &Pose, b: &Pose| (0..N_POINTS).map(|j| vec3::norm(vec3::sub(a[j], b[j]))).sum::<f64>() / N_POINTS as f64;
-    let stretches = poses.chunk_by(|a, b| jump(a, b) <= limit);
-    let long = stretches.filter(|s| s.len() as f64 >= SHORTEST_SECS * fps);
+    let excerpts = poses.chunk_by(|a, b| jump(a, b) <= limit);
+    let long = excerpts.filter(|s| s.len() as f64 >= SHORTEST_SECS * fps);
     long.enumerate()
         .map(|(i, s)| BodyTake { name: format!("{name}#{i}"), fps, poses: s.to_vec(), rendered: false })
         .collect()
@@ -323,7 +323,7 @@ mod tests {
         assert!(pose[R_HIP][1] > 0.4 && pose[L_HIP][0] > 0.0);
     }
 
-    /// A person at rest as BVH, 70 frames, axes and unit as `place` says.
+    /// A person at rest as BVH, 70 frames, with axes and unit converted by `place`.
     fn bvh(place: impl Fn([f64; 3]) -> [f64; 3]) -> String {
         let offset = |p: [f64; 3]| place(p).map(|v| format!("{v:.4}")).join(" ");
         let joint = |name: &str, p: [f64; 3], inner: &str| {

@@ -1,5 +1,5 @@
-//! Training of the lifters and of the body network: one straight loop over freshly drawn samples. What is learnt is a
-//! `TrainingTask`; the schedule, the optimiser and resuming are here.
+//! Training of the lifters and of the body network: one loop over newly drawn samples. A `TrainingTask` defines the
+//! network and its samples; this module has the schedule, the optimiser and resuming.
 
 use anyhow::{Context, Result, ensure};
 use candle_core::{DType, Device, Tensor};

@@ -6,7 +6,7 @@ use orator_formats::transcript::{Word, WordSource};
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 
-/// Least interval between the starts of two words with gestures, seconds.
+/// Shortest interval between the starts of two words with gestures, seconds.
 const MIN_INTERVAL: f64 = 1.5;
 /// Probability of such a word where one is allowed.
 const GESTURE_PROBABILITY: f64 = 0.12;

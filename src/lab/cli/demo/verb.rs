@@ -42,7 +42,7 @@ enum DemoVerb {
     /// Draw videos of a synthetic speaker with known joints.
     ///
     /// Writes the videos with audio, the ground truth, the marker models and a pipeline.toml into DIR. With --people,
-    /// renders people in rooms for the models for real people.
+    /// renders people in rooms, for the pose models for real people.
     Draw {
         /// Demo folder; created if it does not exist.
         dir: PathBuf,
@@ -97,7 +97,7 @@ enum DemoVerb {
         /// split has thirty.
         #[arg(long, default_value_t = 2.0)]
         hours: f64,
-        /// Add words that cannot be distinguished by their sound, some of which move a hand to a position of their
+        /// Add words that cannot be distinguished by their audio, some of which move a hand to a position of their
         /// own (version 2 of the rule).
         #[arg(long)]
         words: bool,
@@ -113,7 +113,7 @@ enum DemoVerb {
         #[arg(long, default_value_t = 1)]
         seed: u64,
     },
-    /// Measure how much of the rule of `demo speaker` a trained model has learnt.
+    /// Measure how much of the rule of `demo speaker` a trained model has learned.
     ///
     /// The test split is used. Exit code 2: a target is missed.
     Learned {

@@ -8,7 +8,7 @@ use orator_test_support::rule::rule::{HOLD, RETURN, RuleGestures, STROKE, WORD_D
 use orator_test_support::rule::words::{N_TARGETS, WordGesture, gesture};
 use serde::Serialize;
 
-/// Least time in seconds to the nearest other word with a gesture for a word to count as isolated.
+/// Shortest time in seconds to the nearest other word with a gesture for a word to count as isolated.
 const ISOLATED_SECS: f64 = 5.0;
 /// Two-sided normal quantile of a 95 % interval.
 const Z: f64 = 1.96;

@@ -64,8 +64,8 @@ impl DemoTruth {
         };
         let joints = truth.joints.select(Axis(0), &frames);
         let shoulders = frames.iter().zip(joints.outer_iter()).map(|(&t, frame)| {
-            let apart = |k: usize| (frame[[L_SHOULDER, k]] - frame[[R_SHOULDER, k]]).powi(2);
-            let metres = (0..3).map(apart).sum::<f32>().sqrt();
+            let squared = |k: usize| (frame[[L_SHOULDER, k]] - frame[[R_SHOULDER, k]]).powi(2);
+            let metres = (0..3).map(squared).sum::<f32>().sqrt();
             f64::from(truth.focal_px * metres / truth.neck[[t, 2]].max(0.05))
         });
         let shoulders_px = median(shoulders);

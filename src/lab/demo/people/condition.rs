@@ -191,7 +191,7 @@ pub enum GestureStyle {
 /// Ranges of the camera framing; lengths in units of the body (`Build::unit`).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Framing {
-    /// Least and greatest angle from the body's front.
+    /// Smallest and largest angle from the body's front.
     pub yaw_degrees: [f64; 2],
     /// Distance of the lower image border below the neck.
     pub below_neck: [f64; 2],

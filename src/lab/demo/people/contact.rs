@@ -12,9 +12,9 @@ use orator_base::types::skeleton::{L_HAND, N_HAND_JOINTS, N_JOINTS, R_HAND};
 /// 1.
 const TRUNK: [f64; 2] = [0.165, 0.14];
 const TRUNK_END: f64 = 0.56;
-/// Greatest depth in cm from which a point below a surface is lifted onto it.
+/// Largest depth in cm from which a point below a surface is lifted onto it.
 const MAX_DEPTH: f64 = 25.0;
-/// Least distance overlap joints of the two hands, metres.
+/// Smallest distance between joints of the two hands, metres.
 const MIN_HAND_DISTANCE: f64 = 0.024;
 const ROUNDS: usize = 4;
 
@@ -108,13 +108,13 @@ fn out_of_trunk(hand: &[Vec3], unit: f64) -> Vec3 {
 /// Penetration depth of the two hands, metres.
 fn hand_overlap(joints: &[Vec3; N_JOINTS]) -> f64 {
     let hand = |root: usize| &joints[root..root + N_HAND_JOINTS];
-    let mut least = f64::INFINITY;
+    let mut min_distance = f64::INFINITY;
     for a in hand(L_HAND) {
         for b in hand(R_HAND) {
-            least = least.min(norm(sub(*a, *b)));
+            min_distance = min_distance.min(norm(sub(*a, *b)));
         }
     }
-    (MIN_HAND_DISTANCE - least).max(0.0)
+    (MIN_HAND_DISTANCE - min_distance).max(0.0)
 }
 
 #[cfg(test)]

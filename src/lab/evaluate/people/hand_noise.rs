@@ -35,7 +35,7 @@ pub fn fit(set: &str, clips: &[RenderedClip]) -> HandNoise {
     let bias: [[f64; N_BASIS]; N_POINTS] = std::array::from_fn(|point| bias(&hands, point));
     for hand in &mut hands {
         for ((error, basis), bias) in hand.errors.iter_mut().zip(&hand.basis).zip(&bias) {
-            *error = bias_fit::rest(*error, basis, bias);
+            *error = bias_fit::residual(*error, basis, bias);
         }
     }
     let mean_error = |hand: &HandResidual, k: usize| hand.errors.iter().map(|e| e[k]).sum::<f64>() / N_POINTS as f64;

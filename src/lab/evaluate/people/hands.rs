@@ -49,12 +49,12 @@ fn of_frame(clip: &RenderedClip, t: usize) -> [HandOutcome; 2] {
     let hands = [clip.hand(0), clip.hand(1)];
     let palms = [L_HAND, R_HAND].map(|root| clip.px_of_bone(t, root, root + 9).max(1.0));
     let found = hands.map(|hand| is_found(hand, t));
-    let apart = |of: usize, from: usize| mean_distance(hands[of], hands[from], t) / palms[from];
-    let takes_other = |side: usize| {
-        let (own, other) = (apart(side, side), apart(side, 1 - side));
+    let distance = |of: usize, from: usize| mean_distance(hands[of], hands[from], t) / palms[from];
+    let is_on_other = |side: usize| {
+        let (own, other) = (distance(side, side), distance(side, 1 - side));
         found[side] && other < own && other < SAME_HAND
     };
-    let others = [takes_other(0), takes_other(1)];
+    let others = [is_on_other(0), is_on_other(1)];
     [0, 1].map(|side| {
         let visible = visible_share(hands[side], t);
         match found[side] {
@@ -63,7 +63,7 @@ fn of_frame(clip: &RenderedClip, t: usize) -> [HandOutcome; 2] {
             true if others == [true, true] => HandOutcome::Swapped,
             true if others[side] => HandOutcome::OtherHand,
             true if visible <= MAX_HIDDEN => HandOutcome::FalsePositive,
-            true if apart(side, side) > SAME_HAND => HandOutcome::Misplaced,
+            true if distance(side, side) > SAME_HAND => HandOutcome::Misplaced,
             true if visible >= MIN_VISIBLE => HandOutcome::Correct,
             true => HandOutcome::Unjudged,
         }
@@ -82,11 +82,11 @@ pub fn visible_share(hand: HandArrays, t: usize) -> f64 {
 
 /// Mean distance of the detected points of one hand from the true points of another, px.
 fn mean_distance(of: HandArrays, from: HandArrays, t: usize) -> f32 {
-    let apart = |point: usize| {
+    let distance = |point: usize| {
         let [dx, dy] = [0, 1].map(|k| of.found[[t, point, k]] - from.truth[[t, point, k]]);
         dx.hypot(dy)
     };
-    (0..N_HAND).map(apart).sum::<f32>() / N_HAND as f32
+    (0..N_HAND).map(distance).sum::<f32>() / N_HAND as f32
 }
 
 /// Hand statistics over clips; shares 0..1.

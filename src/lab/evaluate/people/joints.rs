@@ -104,7 +104,7 @@ impl ErrorSums {
             let [from, to]: [Vec<Vec3>; 2] = [(p, grow), (q, true_grow)].map(|(frame, grow)| {
                 std::iter::once(NECK).chain(ARMS).map(|joint| place(frame, grow, joint, NECK)).collect()
             });
-            let apart = |joint: usize| vec3::norm(vec3::sub(from[joint], to[joint]));
+            let distance = |joint: usize| vec3::norm(vec3::sub(from[joint], to[joint]));
             let depth = |joint: usize| (from[joint][2] - to[joint][2]).abs();
             let aligned = procrustes::similarity(&from, &to);
             let after =
@@ -112,11 +112,11 @@ impl ErrorSums {
             let both = |of: &dyn Fn(usize) -> f64, [a, b]: [usize; 2]| (of(a) + of(b)) / 2.0;
             let (elbows, wrists) = ([R_ELBOW, L_ELBOW], [R_WRIST, L_WRIST]);
             let n_arms = ARMS.count() as f64;
-            self.body.mpjpe += ARMS.map(apart).sum::<f64>() / n_arms;
+            self.body.mpjpe += ARMS.map(distance).sum::<f64>() / n_arms;
             self.body.p_mpjpe += ARMS.map(after).sum::<f64>() / n_arms;
-            self.body.elbow += both(&apart, elbows);
+            self.body.elbow += both(&distance, elbows);
             self.body.elbow_depth += both(&depth, elbows);
-            self.body.wrist += both(&apart, wrists);
+            self.body.wrist += both(&distance, wrists);
             self.body.wrist_depth += both(&depth, wrists);
             self.body.n_frames += 1;
             for root in [L_HAND, R_HAND] {

@@ -58,7 +58,7 @@ fn fit_point(tracks: &[PointTrack]) -> PointNoise {
     let (mut clip_means, mut seen, mut hidden) = (Vec::new(), Vec::new(), Vec::new());
     for track in tracks {
         let rest: Vec<Option<[f64; 2]>> =
-            track.errors.iter().map(|e| e.map(|(error, basis)| bias_fit::rest(error, &basis, &bias))).collect();
+            track.errors.iter().map(|e| e.map(|(error, basis)| bias_fit::residual(error, &basis, &bias))).collect();
         let middle = [0, 1].map(|k| median(rest.iter().flatten().map(|e| e[k])).unwrap_or(0.0));
         if rest.iter().flatten().count() > 10 {
             clip_means.extend(middle);
@@ -125,7 +125,7 @@ fn runs(tracks: impl Iterator<Item = Vec<Option<bool>>>) -> Runs {
             }
         }
     }
-    let rate = |part: f64, whole: f64, of_none: f64| if whole > 0.0 { part / whole } else { of_none };
+    let rate = |part: f64, whole: f64, default: f64| if whole > 0.0 { part / whole } else { default };
     Runs { begin: rate(begun, outside, 0.0), end: rate(ended, inside, 1.0) }
 }
 
@@ -169,7 +169,7 @@ mod tests {
         // A single pose does not determine the weights, only their sum.
         let frame: SeenBody = COCO.map(|c| Some([0, 1].map(|k| exact().truth.body[[3, c, k]])));
         let vectors = basis(&frame, 3, f64::from(exact().shoulders_px(3))).unwrap();
-        let along = |bias| bias_fit::rest([0.0; 2], &vectors, bias);
+        let along = |bias| bias_fit::residual([0.0; 2], &vectors, bias);
         (0..2).for_each(|k| near(along(&found.bias)[k], along(&known.points[3].bias)[k], 0.01));
         near(found.clip, 0.02, 0.005);
         near(found.visible.deviation, 0.01, 0.002);

@@ -87,9 +87,9 @@ fn icvl(rows: &[Vec<f64>], name: String) -> Result<FingerTake> {
     let mut hands: Vec<Fingers> = vec![[None; N_HAND]; frames.len()];
     for (finger, [_, one, two, _]) in BONES.into_iter().enumerate() {
         let [first, second, third] = [1, 2, 3].map(|k| 3 * finger + k);
-        let apart = frames.iter().map(|p| vec3::norm(vec3::sub(p[second], p[first])));
+        let distances = frames.iter().map(|p| vec3::norm(vec3::sub(p[second], p[first])));
         // Half the length of the two bones: in most frames fingers are straight, and labels err to both sides.
-        let together = lower_quantile(apart, 0.7).context("the file has no frame")?;
+        let together = lower_quantile(distances, 0.7).context("the file has no frame")?;
         let a = together * one / (one + two);
         for (p, hand) in frames.iter().zip(&mut hands) {
             let joint = joint_between(p[first], p[second], p[third], a, together - a);
@@ -118,9 +118,9 @@ fn icvl(rows: &[Vec<f64>], name: String) -> Result<FingerTake> {
 /// towards `third`.
 fn joint_between(first: Vec3, second: Vec3, third: Vec3, a: f64, b: f64) -> Vec3 {
     let along = vec3::sub(second, first);
-    let apart = vec3::norm(along).min(a + b).max((a - b).abs() + 1e-9);
+    let distance = vec3::norm(along).min(a + b).max((a - b).abs() + 1e-9);
     let along = vec3::unit(along, 1e-9).unwrap_or([0.0, 1.0, 0.0]);
-    let foot = (a * a - b * b + apart * apart) / (2.0 * apart);
+    let foot = (a * a - b * b + distance * distance) / (2.0 * distance);
     let height = (a * a - foot * foot).max(0.0).sqrt();
     let bent = vec3::across(vec3::sub(third, second), along);
     let side = vec3::unit(bent, 1e-9).unwrap_or_default();

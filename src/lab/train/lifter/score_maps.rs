@@ -32,8 +32,8 @@ impl Crop {
         let n = there().count().max(1) as f64;
         let middle = || [0, 1].map(|k| there().map(|p| p[k]).sum::<f64>() / n);
         let centre = seen[9].map_or_else(middle, |p| p.map(f64::from));
-        let reach = there().map(|p| (p[0] - centre[0]).hypot(p[1] - centre[1])).fold(0.0, f64::max);
-        (reach > 1e-6 && reach.is_finite()).then_some(Self { centre, side: 2.0 * reach })
+        let radius = there().map(|p| (p[0] - centre[0]).hypot(p[1] - centre[1])).fold(0.0, f64::max);
+        (radius > 1e-6 && radius.is_finite()).then_some(Self { centre, side: 2.0 * radius })
     }
 }
 

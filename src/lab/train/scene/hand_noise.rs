@@ -69,7 +69,7 @@ impl HandNoise {
     ) {
         let exact = *hand;
         let size = palm_px * scale;
-        let whole = [0, 1].map(|_| self.hand * normal(rng));
+        let common = [0, 1].map(|_| self.hand * normal(rng));
         for finger in 0..N_FINGERS {
             let noise = if rng.random_bool(self.hidden_share.clamp(0.0, 1.0)) { self.hidden } else { self.visible };
             let is_outlier = rng.random_bool(noise.outlier_share.clamp(0.0, 1.0));
@@ -80,7 +80,7 @@ impl HandNoise {
                 let bias = basis(&exact, j);
                 for k in 0..2 {
                     let own = noise.point * normal(rng);
-                    point[k] += size * (whole[k] + of_finger[k] + own);
+                    point[k] += size * (common[k] + of_finger[k] + own);
                     if with_bias {
                         point[k] += bias.iter().zip(self.bias[j - 1]).map(|(v, weight)| weight * v[k]).sum::<f64>();
                     }

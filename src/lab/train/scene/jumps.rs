@@ -12,7 +12,7 @@ const SCENE_SHARE: f64 = 0.3;
 const MAX_ERRORS: usize = 2;
 /// Duration of an error in frames.
 const FRAMES: std::ops::RangeInclusive<usize> = 2..=32;
-/// Least and greatest displacement of a jump in shoulder widths.
+/// Smallest and largest displacement of a jump in shoulder widths.
 const DISTANCE: [f64; 2] = [0.4, 4.0];
 /// Share of the errors that swap the wrists.
 const SWAP_SHARE: f64 = 0.25;

@@ -123,8 +123,8 @@ fn stored_name(set: &str) -> &str {
 
 impl CorpusClip {
     fn new(name: String, motion: &Motion) -> Self {
-        let whole = Array2::from_elem((motion.n_frames(), N_JOINTS), true);
-        Self { name, joints: Frames::new(motion.joints.view(), whole.view(), motion.fps).joints }
+        let mask = Array2::from_elem((motion.n_frames(), N_JOINTS), true);
+        Self { name, joints: Frames::new(motion.joints.view(), mask.view(), motion.fps).joints }
     }
 
     fn mirrored(self) -> Self {
@@ -174,11 +174,11 @@ fn remove_slow_yaw(poses: &[Pose], fps: f64) -> Vec<Pose> {
             turned
         })
         .collect();
-    let reach = (YAW_MEAN_SECS * fps).ceil() as usize;
+    let radius = (YAW_MEAN_SECS * fps).ceil() as usize;
     let mean = |t: usize| {
         let (mut sum, mut weights) = (0.0, 0.0);
-        for (s, yaw) in yaws.iter().enumerate().take(t + reach + 1).skip(t.saturating_sub(reach)) {
-            let weight = 1.0 + (PI * (s as f64 - t as f64) / (reach as f64 + 1.0)).cos();
+        for (s, yaw) in yaws.iter().enumerate().take(t + radius + 1).skip(t.saturating_sub(radius)) {
+            let weight = 1.0 + (PI * (s as f64 - t as f64) / (radius as f64 + 1.0)).cos();
             (sum, weights) = (sum + weight * yaw, weights + weight);
         }
         sum / weights
