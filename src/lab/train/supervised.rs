@@ -233,9 +233,10 @@ fn resume(training_task: &dyn TrainingTask, schedule: &Schedule, out: &Path, ada
     let fit = || -> Result<usize> {
         for (key, expected) in facts(training_task, schedule).as_object().into_iter().flatten() {
             let found = &contents.facts[key];
+            let name = if key == "lesson" { "configuration" } else { key.as_str() };
             ensure!(
                 found == expected,
-                "its {key} is {found}, but this training has {expected}; choose another --out or remove the checkpoint"
+                "its {name} is {found}, but this training has {expected}; choose another --out or remove the checkpoint"
             );
         }
         training_task.params().load(&contents.part("net."))?;

@@ -6,6 +6,7 @@ use super::traces;
 use anyhow::{Result, ensure};
 use ndarray::{Array1, Array2, Array3, ArrayView3};
 use orator_base::stage::progress::Progress;
+use orator_base::text::counted;
 use orator_base::types::skeleton::{NECK, is_duplicate};
 use orator_base::types::time::FrameRate;
 use orator_dataset::{Dataset, Sample, Split};
@@ -102,8 +103,9 @@ pub fn measure(dataset: &Dataset, speaker: Option<&TrainedSpeaker>, progress: &d
         dataset.samples(Split::Test).iter().map(|s| TestClip::new(dataset.read(s)?)).collect::<Result<_>>()?;
     ensure!(
         tests.len() > 1,
-        "the test split of {} has fewer than 2 clips; write the dataset with more `--hours`",
-        dataset.dir().display()
+        "the test split of {} has {}: expected at least 2",
+        dataset.dir().display(),
+        counted(tests.len(), "clip")
     );
     let fps = dataset.info().fps;
     let judge = Judge { tests: &tests, std: dataset.stats().std(), fps };

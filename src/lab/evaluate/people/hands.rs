@@ -167,7 +167,7 @@ mod tests {
     fn each_kind_of_error_has_its_own_outcome() {
         let mut clip = exact();
         let (left, right) = (clip.keypoints.left_hand.clone(), clip.keypoints.right_hand.clone());
-        // Frame 1: swapped; 2: the left hand is the right one again; 3: missed; 4: far off; 5: hidden and yet detected.
+        // Frame 1: swapped; 2: the left hand on the right one; 3: missed; 4: far off; 5: hidden and yet detected.
         clip.keypoints.left_hand.slice_mut(s![1..3, .., ..]).assign(&right.slice(s![1..3, .., ..]));
         clip.keypoints.right_hand.slice_mut(s![1..2, .., ..]).assign(&left.slice(s![1..2, .., ..]));
         clip.keypoints.left_hand.slice_mut(s![3, .., ..]).fill(0.0);
