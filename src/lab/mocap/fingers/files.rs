@@ -79,8 +79,8 @@ fn of_bvh(path: &Path) -> Result<Vec<FingerTake>> {
     if found.is_empty() {
         let names: Vec<&str> = bvh.joints.iter().map(|j| j.name.as_str()).take(40).collect();
         bail!(
-            "no finger joints in {}: expected names with a side (left, right, l, r) and a finger (thumb, index, middle, \
-             ring, pinky, little), such as LeftHandIndex1, b_l_index1 or thumb_01_r; found {}",
+            "no finger joints in {}: expected names with a side (left, right, l, r) and a finger (thumb, index, \
+             middle, ring, pinky, little), such as LeftHandIndex1, b_l_index1 or thumb_01_r; found {}",
             path.display(),
             names.join(" ")
         );
