@@ -14,13 +14,13 @@ use std::path::Path;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 #[repr(u8)]
 pub enum Visibility {
-    Seen,
+    Visible,
     /// Behind another part of the same body; for a finger also behind its own hand.
     BehindBody,
     /// Behind a hand that it does not belong to: a finger behind the other hand, a shoulder behind either.
     BehindHand,
     /// Behind an object: a desk or a held object.
-    BehindThing,
+    BehindObject,
     /// Behind another person.
     BehindPerson,
     /// Outside the image.
@@ -30,7 +30,7 @@ pub enum Visibility {
 impl Visibility {
     /// All values, in the order of their codes in a file.
     pub const ALL: [Self; 6] =
-        [Self::Seen, Self::BehindBody, Self::BehindHand, Self::BehindThing, Self::BehindPerson, Self::Outside];
+        [Self::Visible, Self::BehindBody, Self::BehindHand, Self::BehindObject, Self::BehindPerson, Self::Outside];
 }
 
 /// File that lists the clips in a folder of rendered persons.
@@ -45,13 +45,13 @@ pub struct RenderedTruth {
     pub fps: FrameRate,
     /// COCO-17, [T, 17, 2] px.
     pub body: Array3<f32>,
-    pub body_seen: Array2<Visibility>,
+    pub body_visibility: Array2<Visibility>,
     /// Left hand, [T, 21, 2] px.
     pub left_hand: Array3<f32>,
-    pub left_hand_seen: Array2<Visibility>,
+    pub left_hand_visibility: Array2<Visibility>,
     /// Right hand, [T, 21, 2] px.
     pub right_hand: Array3<f32>,
-    pub right_hand_seen: Array2<Visibility>,
+    pub right_hand_visibility: Array2<Visibility>,
     /// Joints [T, 49, 3] in camera axes (x right, y down, z away), metres, the neck at the origin of every frame.
     pub joints: Array3<f32>,
     /// COCO-17 in the same axes and from the same origin, [T, 17, 3], metres; face points lie on the skin.
@@ -88,11 +88,11 @@ impl RenderedTruth {
             npz::write(attempt, |npz| {
                 npz.add_array("fps", &aview1(&fps))?;
                 npz.add_array("body", &self.body)?;
-                npz.add_array("body_seen", &codes(&self.body_seen))?;
+                npz.add_array("body_seen", &codes(&self.body_visibility))?;
                 npz.add_array("left_hand", &self.left_hand)?;
-                npz.add_array("left_hand_seen", &codes(&self.left_hand_seen))?;
+                npz.add_array("left_hand_seen", &codes(&self.left_hand_visibility))?;
                 npz.add_array("right_hand", &self.right_hand)?;
-                npz.add_array("right_hand_seen", &codes(&self.right_hand_seen))?;
+                npz.add_array("right_hand_seen", &codes(&self.right_hand_visibility))?;
                 npz.add_array("joints", &self.joints)?;
                 npz.add_array(BODY_JOINTS, &self.body_joints)?;
                 npz.add_array("neck", &self.neck)?;
@@ -119,24 +119,24 @@ impl RenderedTruth {
             let known = |&code: &f64| (0.0..Visibility::ALL.len() as f64).contains(&code) && code.fract() == 0.0;
             ensure!(
                 codes.iter().all(known),
-                "{}: array `{name}` has a code that is none of 0..={}",
+                "invalid visibility code in the array `{name}` of {}: expected 0 to {}",
                 path.display(),
                 Visibility::ALL.len() - 1
             );
             Ok(codes.mapv(|code| Visibility::ALL[code as usize]))
         };
-        let body_seen = seen("body_seen", N_BODY)?;
-        let left_hand_seen = seen("left_hand_seen", N_HAND)?;
-        let right_hand_seen = seen("right_hand_seen", N_HAND)?;
+        let body_visibility = seen("body_seen", N_BODY)?;
+        let left_hand_visibility = seen("left_hand_seen", N_HAND)?;
+        let right_hand_visibility = seen("right_hand_seen", N_HAND)?;
         let speaks = npz.bools("speaks", &[n])?.into_dimensionality::<Ix1>()?;
         Ok(Self {
             fps,
             body: floats(&mut npz, "body", &[n, Some(N_BODY), Some(2)])?,
-            body_seen,
+            body_visibility,
             left_hand: floats(&mut npz, "left_hand", &[n, Some(N_HAND), Some(2)])?,
-            left_hand_seen,
+            left_hand_visibility,
             right_hand: floats(&mut npz, "right_hand", &[n, Some(N_HAND), Some(2)])?,
-            right_hand_seen,
+            right_hand_visibility,
             joints,
             body_joints: floats(&mut npz, BODY_JOINTS, &[n, Some(N_BODY), Some(3)])?,
             neck: floats(&mut npz, "neck", &[n, Some(3)])?,
@@ -163,16 +163,16 @@ mod tests {
     #[test]
     fn it_reads_back() {
         let n = 4;
-        let mut body_seen = Array2::from_elem((n, N_BODY), Visibility::Seen);
-        body_seen[[2, 9]] = Visibility::BehindThing;
+        let mut body_visibility = Array2::from_elem((n, N_BODY), Visibility::Visible);
+        body_visibility[[2, 9]] = Visibility::BehindObject;
         let truth = RenderedTruth {
             fps: FrameRate::new(15, 1),
             body: Array3::from_elem((n, N_BODY, 2), 3.5),
-            body_seen,
+            body_visibility,
             left_hand: Array3::zeros((n, N_HAND, 2)),
-            left_hand_seen: Array2::from_elem((n, N_HAND), Visibility::Outside),
+            left_hand_visibility: Array2::from_elem((n, N_HAND), Visibility::Outside),
             right_hand: Array3::zeros((n, N_HAND, 2)),
-            right_hand_seen: Array2::from_elem((n, N_HAND), Visibility::BehindHand),
+            right_hand_visibility: Array2::from_elem((n, N_HAND), Visibility::BehindHand),
             joints: Array3::from_elem((n, N_JOINTS, 3), 0.25),
             body_joints: Array3::from_elem((n, N_BODY, 3), -0.5),
             neck: Array2::from_elem((n, 3), 1.5),

@@ -30,7 +30,7 @@ pub fn skip(why: &str) {
 #[track_caller]
 pub fn real_data(path: &str) -> Option<PathBuf> {
     let Some(folder) = std::env::var_os("ORATOR_DATA").filter(|folder| !folder.is_empty()) else {
-        skip("ORATOR_DATA names no folder of real data");
+        skip("ORATOR_DATA is not set to a folder of real data");
         return None;
     };
     let found = Path::new(&folder).join(path).canonicalize().ok();
@@ -101,7 +101,7 @@ pub fn blender() -> Option<Command> {
         ask.is_ok_and(|status| status.success())
     });
     if found.is_none() {
-        skip(&format!("no Python 3.11 with Blender's module in {} (`make blender`)", folder.display()));
+        skip(&format!("no Python 3.11 with the module bpy in {} (`make blender`)", folder.display()));
     }
     found.map(python)
 }
@@ -149,7 +149,7 @@ pub fn python(packages: &str) -> Option<String> {
     let tried = Command::new(&python).args(["-c", &format!("import {packages}")]).output();
     let works = tried.is_ok_and(|output| output.status.success());
     if !works {
-        skip(&format!("{python} cannot import {packages} (ORATOR_REFERENCE_PYTHON names another)"));
+        skip(&format!("{python} cannot import {packages} (set ORATOR_REFERENCE_PYTHON to use another interpreter)"));
     }
     works.then_some(python)
 }

@@ -2,7 +2,7 @@
 //! a video, and a configuration for `orator run`.
 
 use super::people::condition::Condition;
-use super::people::scene::{CapturedClip, ClipSeeds, PeopleScene};
+use super::people::scene::{CapturedClip, ClipSeeds, PersonScene};
 use anyhow::{Context, Result};
 use orator_base::stage::progress::Progress;
 use orator_base::stage::workdir;
@@ -16,13 +16,13 @@ use rand_chacha::ChaCha8Rng;
 use std::path::{Path, PathBuf};
 
 /// A clip of the host: the speech of a seed, with the gestures that follow from it by the rule, and random variation.
-pub fn scene(body: u64, seed: u64, secs: f64, fps: FrameRate) -> PeopleScene {
+pub fn scene(body: u64, seed: u64, secs: f64, fps: FrameRate) -> PersonScene {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let speech = Speech::free(secs, &mut rng);
     let motion = RuleGestures::with_variation(&speech, &[], secs, &mut rng).motion(fps.frames_in(secs), fps);
     let clip = CapturedClip { motion, sound: Some(speech.sound(secs, &mut rng)) };
     let seeds = ClipSeeds { body, clothes: body, camera: body, motion: seed, voice: None };
-    PeopleScene::new(Condition::Front, seeds, secs, fps, Some(&clip))
+    PersonScene::new(Condition::Front, seeds, secs, fps, Some(&clip))
 }
 
 /// Writes `videos/host/clip-<n>.mp4`, `truth/clip-<n>.npz`, `speech.wav` and `pipeline.toml` into `dir`; returns the
@@ -43,13 +43,13 @@ pub fn draw(dir: &Path, plan: &DemoPlan, progress: &dyn Progress) -> Result<Vec<
             truth = Some(scene.film(attempt, progress)?);
             Ok(())
         })?;
-        truth.context("a rendered clip has no truth")?.write(&dir.join(format!("truth/clip-{number}.npz")))?;
+        truth.context("the rendered clip has no ground truth")?.write(&dir.join(format!("truth/clip-{number}.npz")))?;
         videos.push(video);
     }
     let speech_only = scene(seed, seed, SPEECH_ONLY_SECS, plan.fps);
     workdir::replace(&dir.join("speech.wav"), |attempt| wav::write(attempt, speech_only.sound()))?;
     let title =
-        "The rendered speaker of `orator-lab demo`, seen by the models for real people (`orator models fetch`).";
+        "The rendered speaker of `orator-lab demo`, for the pose models for real people (`orator models fetch`).";
     let pipeline = pipeline(title, "rendered by orator demo", "", plan.n_videos);
     workdir::write_file(&dir.join("pipeline.toml"), pipeline.as_bytes())?;
     Ok(videos)

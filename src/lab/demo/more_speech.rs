@@ -57,7 +57,7 @@ pub fn write(
     let writer = DatasetWriter::new(dir, about, SHARD_BYTES);
     let splits = (0..n_train + N_VALIDATION).map(|n| if n < n_train { Split::Train } else { Split::Validation });
     let clips: Vec<(u64, Split)> = (FIRST..).zip(splits).collect();
-    let task = progress.begin("speak", clips.len() as u64);
+    let task = progress.begin("generate speech", clips.len() as u64);
     for batch in clips.chunks(16) {
         let spoken: Vec<SpokenVideo> =
             batch.par_iter().map(|(number, _)| clip(plan, is_rendered, *number)).collect::<Result<_>>()?;

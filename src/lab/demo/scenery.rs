@@ -161,7 +161,7 @@ mod tests {
         for image in [&over, &background(&camera, &[&floor, &cube], &light, black()).image] {
             let at = |x: f64| image.pixel(on_floor(x)[0] as usize, on_floor(x)[1] as usize)[0];
             // The light comes from +x at 45 degrees: 20 cm up, the shadow falls 20 cm towards -x.
-            let [near, far] = [[-20.0, 20.0], [-40.0, 40.0]].map(|places| places.map(at));
+            let [near, far] = [[-20.0, 20.0], [-40.0, 40.0]].map(|positions| positions.map(at));
             assert!(near[0] < 140 && near[1] > 180 && far[0].abs_diff(far[1]) < 12, "{near:?} {far:?}");
         }
         let (mesh, label, depth) = renderer.label_at(on_floor(20.0)).unwrap();

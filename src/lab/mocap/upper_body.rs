@@ -11,6 +11,7 @@ use orator_base::math::rotation::Rotation;
 use orator_base::math::vec3;
 use orator_base::math::vec3::Vec3;
 use orator_base::motion::upper_body::{COCO, N_POINTS, Pose};
+use orator_base::text::counted;
 use orator_formats::bvh::joint_names;
 use orator_formats::bvh::read::{Bvh, Positions};
 use orator_formats::npz::Npz;
@@ -43,7 +44,7 @@ const T_POSE_FRAMES: usize = 1;
 const LARGEST_JUMP: f64 = 0.1;
 /// Length of upper arm and forearm of the mean adult, metres.
 const ARM_METRES: f64 = 0.54;
-/// Least duration of a take, seconds.
+/// Shortest duration of a take, seconds.
 const SHORTEST_SECS: f64 = 1.0;
 
 /// Reads all takes of `paths` (BVH or `.npz` files, or folders searched for them), sorted by file name.
@@ -60,7 +61,7 @@ pub fn read_all(paths: &[PathBuf]) -> Result<Vec<BodyTake>> {
     for file in files {
         takes.extend(read(&file)?);
     }
-    ensure!(!takes.is_empty(), "no stretch of motion of {SHORTEST_SECS} s or more in {paths:?}");
+    ensure!(!takes.is_empty(), "no continuous motion of at least {SHORTEST_SECS} s in {paths:?}");
     Ok(takes)
 }
 
@@ -72,7 +73,7 @@ pub fn read(path: &Path) -> Result<Vec<BodyTake>> {
     match path.extension().and_then(|e| e.to_str()) {
         Some("bvh") => read_bvh(path),
         Some("npz") => read_npz(path),
-        _ => bail!("{}: captured motion is read from .bvh and .npz files", path.display()),
+        _ => bail!("unsupported file {}: expected captured motion as .bvh or .npz", path.display()),
     }
 }
 
@@ -87,12 +88,17 @@ pub type Set = (String, Vec<BodyTake>);
 pub fn divide(mut takes: Vec<BodyTake>, patterns: &[String]) -> Result<(Vec<Set>, Vec<BodyTake>)> {
     let mut sets = Vec::new();
     for text in patterns {
-        let pattern = glob::Pattern::new(text).with_context(|| format!("`{text}` is no pattern of names"))?;
+        let pattern = glob::Pattern::new(text)
+            .with_context(|| format!("invalid pattern `{text}`: expected a name with `*` and `?` as wildcards"))?;
         let (set, others): (Vec<BodyTake>, Vec<BodyTake>) =
             takes.into_iter().partition(|take| pattern.matches(&take.name));
         if set.is_empty() {
             let names: Vec<&str> = others.iter().take(8).map(|take| take.name.as_str()).collect();
-            bail!("no take is called `{text}`; there are {}: {} ...", others.len(), names.join(", "));
+            bail!(
+                "no take matches `{text}`; there are {}, such as {}",
+                counted(others.len(), "take"),
+                names.join(", ")
+            );
         }
         sets.push((text.clone(), set));
         takes = others;
@@ -108,7 +114,7 @@ fn read_bvh(path: &Path) -> Result<Vec<BodyTake>> {
     let mut bodies: Vec<[Vec3; 10]> = placed.iter().map(|p| joints.map(|j| p[j])).collect();
     ensure!(
         bodies.iter().flatten().flatten().all(|v| v.is_finite()),
-        "{}: it holds numbers that are not finite",
+        "{} contains positions that are not finite",
         path.display()
     );
     y_up(&mut bodies);
@@ -129,8 +135,8 @@ fn named_joints(names: &[&str]) -> Result<[usize; 10]> {
     if !missing.is_empty() {
         let there: Vec<&str> = names.iter().copied().take(40).collect();
         bail!(
-            "no joint is named like a {}; expected names like Neck, Head, LeftArm, LeftForeArm, LeftHand, LeftUpLeg \
-             (also l_shoulder, UpperArm_L, ...); its joints are: {}",
+            "no joint found for {}: expected names such as Neck, Head, LeftArm, LeftForeArm, LeftHand, LeftUpLeg (or \
+             l_shoulder, UpperArm_L, ...); joints of the file: {}",
             missing.join(", "),
             there.join(" ")
         );
@@ -152,7 +158,7 @@ fn in_metres(bodies: &mut [[Vec3; 10]]) -> Result<()> {
     let bone = |p: &[Vec3; 10], a: usize, b: usize| vec3::norm(vec3::sub(p[a], p[b]));
     let arm = |p: &[Vec3; 10]| (bone(p, 2, 3) + bone(p, 3, 4) + bone(p, 5, 6) + bone(p, 6, 7)) / 2.0;
     let Some(arm) = upper_median(bodies.iter().map(arm)) else { return Ok(()) };
-    ensure!(arm > 1e-6, "its arms have no length");
+    ensure!(arm > 1e-6, "the arms have zero length");
     let grow = ARM_METRES / arm;
     bodies.iter_mut().for_each(|p| *p = p.map(|q| vec3::scale(q, grow)));
     Ok(())
@@ -172,7 +178,8 @@ fn read_npz(path: &Path) -> Result<Vec<BodyTake>> {
 /// Reads the ground truth of a rendered person, rotated upright, since its camera may be tilted.
 fn read_rendered(path: &Path) -> Result<Vec<BodyTake>> {
     let truth = RenderedTruth::read(path)?;
-    let up = vec3::unit(truth.up.map(f64::from), 1e-6).with_context(|| format!("{}: `up` is 0", path.display()))?;
+    let up = vec3::unit(truth.up.map(f64::from), 1e-6)
+        .with_context(|| format!("invalid array `up` in {}: expected a vector that is not zero", path.display()))?;
     let upright = Rotation::between(up, [0.0, -1.0, 0.0]);
     let pose = |frame: ndarray::ArrayView2<f32>| -> Pose {
         COCO.map(|point| upright.turn(std::array::from_fn(|k| f64::from(frame[[point, k]]))))
@@ -180,7 +187,7 @@ fn read_rendered(path: &Path) -> Result<Vec<BodyTake>> {
     let poses: Vec<Pose> = truth.body_joints.outer_iter().map(pose).collect();
     ensure!(
         poses.iter().flatten().flatten().all(|v| v.is_finite()),
-        "{}: it holds numbers that are not finite",
+        "{} contains positions that are not finite",
         path.display()
     );
     let name = path.file_stem().unwrap_or_default().to_string_lossy();
@@ -234,8 +241,8 @@ fn upper_body(joints: &[Vec3]) -> Pose {
     let up = vec3::unit(up, 1e-9).unwrap_or([0.0, 1.0, 0.0]);
     let nose = vec3::add(vec3::add(joints[1], vec3::scale(up, 0.06)), vec3::scale(ahead, 0.11));
     // A skeleton without legs has its root as both hips.
-    let spread = if joints[8] == joints[9] { vec3::scale(across, 0.3) } else { [0.0; 3] };
-    let hips = [vec3::sub(joints[8], spread), vec3::add(joints[9], spread)];
+    let hip_offset = if joints[8] == joints[9] { vec3::scale(across, 0.3) } else { [0.0; 3] };
+    let hips = [vec3::sub(joints[8], hip_offset), vec3::add(joints[9], hip_offset)];
     let order = [nose, joints[2], joints[3], joints[4], joints[5], joints[6], joints[7], hips[0], hips[1]];
     order.map(|p| {
         let [x, y, z] = vec3::sub(p, neck);
@@ -248,8 +255,8 @@ fn split_at_jumps(name: &str, fps: f64, poses: Vec<Pose>) -> Vec<BodyTake> {
     let limit = LARGEST_JUMP * 60.0 / fps;
     let jump =
         |a: &Pose, b: &Pose| (0..N_POINTS).map(|j| vec3::norm(vec3::sub(a[j], b[j]))).sum::<f64>() / N_POINTS as f64;
-    let stretches = poses.chunk_by(|a, b| jump(a, b) <= limit);
-    let long = stretches.filter(|s| s.len() as f64 >= SHORTEST_SECS * fps);
+    let excerpts = poses.chunk_by(|a, b| jump(a, b) <= limit);
+    let long = excerpts.filter(|s| s.len() as f64 >= SHORTEST_SECS * fps);
     long.enumerate()
         .map(|(i, s)| BodyTake { name: format!("{name}#{i}"), fps, poses: s.to_vec(), rendered: false })
         .collect()
@@ -316,7 +323,7 @@ mod tests {
         assert!(pose[R_HIP][1] > 0.4 && pose[L_HIP][0] > 0.0);
     }
 
-    /// A person at rest as BVH, 70 frames, axes and unit as `place` says.
+    /// A person at rest as BVH, 70 frames, with axes and unit converted by `place`.
     fn bvh(place: impl Fn([f64; 3]) -> [f64; 3]) -> String {
         let offset = |p: [f64; 3]| place(p).map(|v| format!("{v:.4}")).join(" ");
         let joint = |name: &str, p: [f64; 3], inner: &str| {

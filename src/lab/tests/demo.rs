@@ -12,7 +12,7 @@ fn lab(project: &Project, args: &[&str]) -> ProgramAnswer {
 }
 
 #[test]
-fn the_clip_has_its_pictures_its_sound_and_its_truth() {
+fn a_clip_has_frames_audio_and_ground_truth() {
     let dir = tempfile::tempdir().unwrap();
     let video = speaker_clip(dir.path(), 3.0, 5);
     let truth = DrawnTruth::read(&dir.path().join("truth/clip-1.npz")).unwrap();
@@ -69,9 +69,9 @@ fn a_video_does_not_depend_on_what_memory_held_before() {
 fn more_speech_of_the_figure_is_a_dataset() {
     let project = Project::with_clips("speech", 0, 1.0);
     let folder = project.dir().to_string_lossy().into_owned();
-    let draw = |more: &[&str]| {
+    let draw = |extra: &[&str]| {
         let plan = ["demo", "draw", &folder, "--rendered", "--videos", "1", "--secs", "1", "--speech", "1"];
-        lab(&project, &[&plan, more].concat())
+        lab(&project, &[&plan, extra].concat())
     };
     let drawn = draw(&[]);
     assert_eq!(drawn.code, 0, "{}", drawn.errors);

@@ -11,12 +11,12 @@ use rand_chacha::ChaCha8Rng;
 use std::process::Command;
 
 /// Procedural gestures, as takes of 8 s.
-fn by_rule() -> Set {
+fn procedural() -> Set {
     let take = |seed: u64| {
         let poses = gesture(&mut ChaCha8Rng::seed_from_u64(seed), 240, 1.0 / 30.0);
         BodyTake { name: format!("rule#{seed}"), fps: 30.0, poses, rendered: false }
     };
-    ("by rule".to_owned(), (900..908).map(take).collect())
+    ("procedural".to_owned(), (900..908).map(take).collect())
 }
 
 fn mpjpe(rows: &[BodyRow], method: &str, input: &str) -> f64 {
@@ -26,14 +26,14 @@ fn mpjpe(rows: &[BodyRow], method: &str, input: &str) -> f64 {
 #[test]
 fn the_lifter_beats_what_needs_no_network() {
     let lifters = Lifters::new(&config::LiftConfig::default()).unwrap();
-    let rows = table(&lifters, &[by_rule()], 16).unwrap();
+    let rows = table(&lifters, &[procedural()], 16).unwrap();
     eprintln!("{}", text(&rows));
     let lifted = mpjpe(&rows, "orator lift", "drop");
     for baseline in ["bone-length depth", "mean depth per joint", "constant mean pose"] {
         assert!(lifted < 0.8 * mpjpe(&rows, baseline, "clean"), "{}", text(&rows));
     }
     assert!(rows.iter().all(|row| row.complete_share > 0.97 && row.by_yaw.len() == 3));
-    assert_eq!(text(&rows), text(&table(&lifters, &[by_rule()], 16).unwrap()), "the same scenes each time");
+    assert_eq!(text(&rows), text(&table(&lifters, &[procedural()], 16).unwrap()), "the same scenes each time");
 }
 
 /// Targets for clips of TED speakers, which are in no training set.
@@ -49,9 +49,9 @@ fn ted_speakers_are_lifted_within_the_targets() {
 }
 
 #[test]
-fn files_that_are_no_motion_are_refused_by_name() {
+fn errors_of_files_without_motion_name_the_file() {
     let dir = tempfile::tempdir().unwrap();
-    let said = |name: &str, bytes: &[u8]| {
+    let error = |name: &str, bytes: &[u8]| {
         let path = dir.path().join(name);
         std::fs::write(&path, bytes).unwrap();
         let mut command = Command::new(env!("CARGO_BIN_EXE_orator-lab"));
@@ -61,9 +61,9 @@ fn files_that_are_no_motion_are_refused_by_name() {
         assert!(text.contains(name) && !text.contains("panicked"), "{text}");
         text
     };
-    assert!(said("cut.bvh", b"HIERARCHY ROOT Hips { OFFSET 0 0").contains("ends before"));
+    assert!(error("cut.bvh", b"HIERARCHY ROOT Hips { OFFSET 0 0").contains("ends before"));
     let strange = b"HIERARCHY ROOT a { OFFSET 0 0 0 CHANNELS 0 } MOTION Frames: 0 Frame Time: 0.1";
-    assert!(said("strange.bvh", strange).contains("LeftForeArm"));
-    said("empty.npz", b"");
-    said("motion.fbx", b"x");
+    assert!(error("strange.bvh", strange).contains("LeftForeArm"));
+    error("empty.npz", b"");
+    error("motion.fbx", b"x");
 }

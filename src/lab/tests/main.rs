@@ -1,4 +1,4 @@
-//! Integration tests of `orator-lab`. Those of `orator run` on what it draws need the program `orator` built beside it.
+//! Integration tests of `orator-lab`. Some run `orator`, which must be built in the same target folder.
 
 mod demo;
 mod lifter;

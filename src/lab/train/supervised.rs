@@ -1,5 +1,5 @@
-//! Training of the lifters and of the body network: one straight loop over freshly drawn samples. What is learnt is a
-//! `TrainingTask`; the schedule, the optimiser and resuming are here.
+//! Training of the lifters and of the body network: one loop over newly drawn samples. A `TrainingTask` defines the
+//! network and its samples; this module has the schedule, the optimiser and resuming.
 
 use anyhow::{Context, Result, ensure};
 use candle_core::{DType, Device, Tensor};
@@ -39,10 +39,10 @@ pub trait TrainingTask: Send + Sync {
     fn sample(&self, rng: &mut ChaCha8Rng, x: &mut [f32], y: &mut [f32]);
     /// [B, input shape] to the prediction: [B, 3 x points] unless the task defines its own `loss`.
     fn forward(&self, x: &Tensor, mode: &mut Mode) -> candle_core::Result<Tensor>;
-    /// Loss of the prediction `out` against the targets `wanted` [B, points, 3]; `weights` [1, points] have mean 1.
+    /// Loss of the prediction `out` against the targets `target` [B, points, 3]; `weights` [1, points] have mean 1.
     /// Default: the weighted mean distance of the points.
-    fn loss(&self, out: &Tensor, wanted: &Tensor, weights: &Tensor) -> candle_core::Result<Tensor> {
-        let distance = ((out.reshape(wanted.shape())? - wanted)?.sqr()?.sum(2)? + 1e-8)?.sqrt()?;
+    fn loss(&self, out: &Tensor, target: &Tensor, weights: &Tensor) -> candle_core::Result<Tensor> {
+        let distance = ((out.reshape(target.shape())? - target)?.sqr()?.sum(2)? + 1e-8)?.sqrt()?;
         distance.broadcast_mul(weights)?.mean_all()
     }
     /// Sets the weight of a batch in the running statistics, if the network has any.
@@ -104,13 +104,13 @@ pub fn start_from(training_task: &dyn TrainingTask, path: &Path) -> Result<Strin
         let contents = Contents::from_bytes(&bytes)?;
         ensure!(
             contents.facts["kind"] == training_task.kind(),
-            "it is a {}, not a {}",
+            "its kind is {}, expected \"{}\"",
             contents.facts["kind"],
             training_task.kind()
         );
         training_task.params().load(&contents.tensors)
     };
-    load().with_context(|| format!("cannot start from {}", path.display()))?;
+    load().with_context(|| format!("cannot initialise from {}", path.display()))?;
     Ok(blake3::hash(&bytes).to_hex().to_string())
 }
 
@@ -161,12 +161,12 @@ fn train_until(
     end: usize,
     progress: &dyn Progress,
 ) -> Result<()> {
-    ensure!(schedule.batch > 1, "a training needs at least two samples a batch");
+    ensure!(schedule.batch > 1, "invalid --batch {}: expected at least 2", schedule.batch);
     let mut adam =
         Adam::new(training_task.params(), adam::Config { amsgrad: true, max_norm: Some(1.0), ..Default::default() })?;
     let start = resume(training_task, schedule, out, &mut adam)?;
     if start > 0 {
-        progress.say(&format!("going on at step {start} of {}", schedule.steps));
+        progress.say(&format!("resuming at step {start} of {}", schedule.steps));
     }
     let mut log = MetricsLog::lines_alone(&sibling(out, ".jsonl"), start)?;
     let weights = training_task.weights();
@@ -186,7 +186,7 @@ fn train_until(
         let prediction = training_task.forward(&x, &mut Mode::Train(&mut rng))?;
         let loss = training_task.loss(&prediction, &y, &weights)?;
         let norm = adam.step(&loss.backward()?, schedule.learning_rate(step))?;
-        ensure!(norm.is_finite(), "step {step}: the gradient is not finite; try a smaller --learning-rate");
+        ensure!(norm.is_finite(), "the gradient of step {step} is not finite; use a smaller --learning-rate");
         let loss = f64::from(loss.to_scalar::<f32>()?);
         sum += loss;
         n_summed += 1;
@@ -233,16 +233,17 @@ fn resume(training_task: &dyn TrainingTask, schedule: &Schedule, out: &Path, ada
     let fit = || -> Result<usize> {
         for (key, expected) in facts(training_task, schedule).as_object().into_iter().flatten() {
             let found = &contents.facts[key];
+            let name = if key == "lesson" { "configuration" } else { key.as_str() };
             ensure!(
                 found == expected,
-                "the checkpoint has {key} {found}, this training {expected}; choose another --out or move the old one away"
+                "its {name} is {found}, but this training has {expected}; choose another --out or remove the checkpoint"
             );
         }
         training_task.params().load(&contents.part("net."))?;
-        Ok(contents.facts["step"].as_u64().context("it names no step")? as usize)
+        Ok(contents.facts["step"].as_u64().context("it has no step number")? as usize)
     };
-    let step = fit().with_context(|| format!("cannot go on from {}", path.display()))?;
-    adam.load("adam.", &contents.tensors).with_context(|| format!("cannot go on from {}", path.display()))?;
+    let step = fit().with_context(|| format!("cannot resume from {}", path.display()))?;
+    adam.load("adam.", &contents.tensors).with_context(|| format!("cannot resume from {}", path.display()))?;
     Ok(step)
 }
 

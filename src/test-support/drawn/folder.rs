@@ -32,11 +32,11 @@ consent = "none needed: nobody is shown"
 source = "SOURCE"
 
 MODELS[segment]
-speech = "loudness"                # its speech is made of tones, which the speech model rightly takes for none
+speech = "loudness"                # the speech consists of tones, which the speech model does not classify as speech
 
 [gan]
-learning_rate = 5e-4               # for hundreds of steps on a minute of speech; the defaults are for hours of it
-lambda_gan = 0.15                  # 1 moves nearly three times as much as the data after 600 steps
+learning_rate = 5e-4               # for hundreds of steps on a minute of speech; the defaults are for hours
+lambda_gan = 0.15                  # with 1, the model moves nearly three times as much as the data after 600 steps
 "#;
 
 const MARKER_MODELS: &str = r#"[pose2d]
@@ -44,7 +44,7 @@ person = "person-marker"
 body = "body-marker"
 hand = "hand-marker"
 palm = ""
-face = ""                          # it has no face
+face = ""                          # the figure has no face
 
 "#;
 
@@ -79,8 +79,8 @@ impl DemoPlan {
     /// # Errors
     /// A number of videos outside 1..=1000 or a duration outside 1..=3600 s.
     pub fn check(&self) -> anyhow::Result<()> {
-        ensure!((1..=1000).contains(&self.n_videos), "between 1 and 1000 videos can be drawn, not {}", self.n_videos);
-        ensure!((1.0..=3600.0).contains(&self.secs), "a video lasts 1 to 3600 seconds, not {}", self.secs);
+        ensure!((1..=1000).contains(&self.n_videos), "invalid --videos {}: expected 1 to 1000", self.n_videos);
+        ensure!((1.0..=3600.0).contains(&self.secs), "invalid --secs {}: expected 1 to 3600", self.secs);
         Ok(())
     }
 }
@@ -102,7 +102,7 @@ pub fn draw(dir: &Path, plan: &DemoPlan, progress: &dyn Progress) -> anyhow::Res
     }
     let speech_only = DrawnScene::new(plan.seed.wrapping_mul(1000), SPEECH_ONLY_SECS, plan.size).sound();
     workdir::replace(&dir.join("speech.wav"), |attempt| wav::write(attempt, &speech_only))?;
-    let title = "The synthetic speaker of `orator-lab demo`: the marker models know its suit and no real person.";
+    let title = "The synthetic speaker of `orator-lab demo`: the marker models detect its suit only, no real people.";
     let pipeline = pipeline(title, "drawn by orator demo", MARKER_MODELS, plan.n_videos);
     workdir::write_file(&dir.join("pipeline.toml"), pipeline.as_bytes())?;
     Ok(videos)

@@ -49,7 +49,11 @@ impl RuleBaselines {
     pub fn fit(dataset: &Dataset) -> Result<Self> {
         let fps = dataset.info().fps;
         let (train, validation) = (clips(dataset, Split::Train)?, clips(dataset, Split::Validation)?);
-        ensure!(!train.is_empty() && !validation.is_empty(), "{}: a split is empty", dataset.dir().display());
+        ensure!(
+            !train.is_empty() && !validation.is_empty(),
+            "the train or validation split of {} is empty",
+            dataset.dir().display()
+        );
         let windows = train.iter().flat_map(|clip| {
             let starts = (0..clip.sound.nrows() / WINDOW).map(|n| n * WINDOW);
             starts.map(|t| {

@@ -128,15 +128,21 @@ impl SpokenClip {
     pub fn from_sample(sample: &Sample) -> Result<Self> {
         let clip: Self =
             serde_json::from_value(sample.meta.get("rule").cloned().unwrap_or_default()).with_context(|| {
-                format!("{} is not of the synthetic speaker; `orator-lab demo speaker` writes one", sample.key)
+                format!("the sample {} has no rule: expected a dataset of `orator-lab demo speaker`", sample.key)
             })?;
         ensure!(
             [RULE, RULE_OF_WORDS].contains(&clip.rule),
-            "{} follows version {} of the rule, this program knows {RULE} and {RULE_OF_WORDS}",
-            sample.key,
-            clip.rule
+            "unknown version {} of the rule in the sample {}: expected {RULE} or {RULE_OF_WORDS}",
+            clip.rule,
+            sample.key
         );
-        ensure!(clip.n_frames == sample.n_frames(), "{} has {} frames", sample.key, sample.n_frames());
+        ensure!(
+            clip.n_frames == sample.n_frames(),
+            "the sample {} has {} frames: expected {}",
+            sample.key,
+            sample.n_frames(),
+            clip.n_frames
+        );
         Ok(clip)
     }
 
@@ -155,7 +161,7 @@ impl SpokenClip {
 
 /// Clips for `hours` of training, ten minutes of validation, and ten of test, or thirty if the rule has words.
 pub fn clips(hours: f64, seed: u64, rule: u32, habits: u64) -> Result<Vec<SpokenClip>> {
-    ensure!((0.01..=100.0).contains(&hours), "--hours {hours}: expected 0.01 to 100");
+    ensure!((0.01..=100.0).contains(&hours), "invalid --hours {hours}: expected 0.01 to 100");
     let n_train = (hours * 3600.0 / FPS.secs(CLIP_FRAMES)).ceil() as usize;
     let clips_of =
         |split, n| (0..n).map(move |number| SpokenClip { rule, seed, split, number, n_frames: CLIP_FRAMES, habits });
@@ -179,10 +185,10 @@ pub fn write(dir: &Path, clips: &[SpokenClip], progress: &dyn Progress) -> Resul
         ..About::new(&name, FPS)
     };
     let writer = DatasetWriter::new(dir, about, SHARD_BYTES);
-    let task = progress.begin("speak", clips.len() as u64);
-    for some in clips.chunks(16) {
-        let spoken: Vec<SpokenVideo> = some.par_iter().map(SpokenClip::spoken).collect();
-        for (clip, spoken) in some.iter().zip(spoken) {
+    let task = progress.begin("generate speech", clips.len() as u64);
+    for batch in clips.chunks(16) {
+        let spoken: Vec<SpokenVideo> = batch.par_iter().map(SpokenClip::spoken).collect();
+        for (clip, spoken) in batch.iter().zip(spoken) {
             spoken.write(&writer, clip.split)?;
             task.advance(1);
         }

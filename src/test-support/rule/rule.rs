@@ -2,7 +2,7 @@
 //! variation.
 
 use super::habits::{ArmTarget, CENTRE, HIGH, Habits, POINT, REST, WIDE};
-use super::words::{self, N_PLACES, WordGesture};
+use super::words::{self, N_TARGETS, WordGesture};
 use crate::drawn::figure::{ArmControls, Controls, DrawnFigure};
 use crate::drawn::gesture::minimum_jerk;
 use crate::drawn::speech::{Speech, Syllable};
@@ -30,7 +30,7 @@ const ACCENT: f64 = 0.5;
 /// Delay from the start of a word to its stroke, seconds.
 pub const WORD_DELAY: f64 = 0.3;
 /// Stroke targets of words.
-const WORD_TARGETS: [ArmTarget; N_PLACES] = [
+const WORD_TARGETS: [ArmTarget; N_TARGETS] = [
     [0.34, -0.2, -0.16, 0.3, 0.9, 0.1, 0.0, 0.1],
     [0.52, 0.1, -0.1, -0.5, 0.4, 0.1, 0.0, 0.16],
     [0.44, 0.4, -0.05, 0.7, 0.1, 0.6, -0.2, 0.04],
@@ -99,8 +99,8 @@ impl<'a> RuleGestures<'a> {
         let mut strokes: [Vec<(f64, ArmTarget)>; 2] = std::array::from_fn(|hand| {
             let accents = speech.syllables.iter().filter(|syllable| syllable.stress > ACCENT);
             let stroke = accents.filter_map(|accent| {
-                let place = habits.targets.get(accent.vowel)?[hand]?;
-                Some((accent.start + habits.delays[hand], scaled_target(&place, amplitude(accent))))
+                let target = habits.targets.get(accent.vowel)?[hand]?;
+                Some((accent.start + habits.delays[hand], scaled_target(&target, amplitude(accent))))
             });
             stroke.collect()
         });
@@ -120,9 +120,9 @@ impl<'a> RuleGestures<'a> {
             let is_skipped = rng.random_bool(SKIPPED_SHARE);
             let late = TIME_SD * standard_normal(rng);
             let amplitude = amplitude(accent) * rng.random_range(0.85..1.15);
-            for (hand, place) in habits.targets.get(accent.vowel).into_iter().flatten().enumerate() {
-                let Some(place) = place else { continue };
-                let goal = perturbed(&scaled_target(place, amplitude), rng);
+            for (hand, target) in habits.targets.get(accent.vowel).into_iter().flatten().enumerate() {
+                let Some(target) = target else { continue };
+                let goal = perturbed(&scaled_target(target, amplitude), rng);
                 if !is_skipped {
                     strokes[hand].push((accent.start + habits.delays[hand] + late, goal));
                 }
@@ -134,8 +134,8 @@ impl<'a> RuleGestures<'a> {
             if now >= secs {
                 break;
             }
-            let place = [WIDE, HIGH, POINT, CENTRE][rng.random_range(0..4)];
-            let goal = perturbed(&scaled_target(&place, rng.random_range(0.6..1.0)), rng);
+            let target = [WIDE, HIGH, POINT, CENTRE][rng.random_range(0..4)];
+            let goal = perturbed(&scaled_target(&target, rng.random_range(0.6..1.0)), rng);
             strokes[rng.random_range(0..2)].push((now, goal));
         }
         strokes.iter_mut().for_each(|strokes| strokes.sort_by(|a, b| a.0.total_cmp(&b.0)));
@@ -150,14 +150,14 @@ impl<'a> RuleGestures<'a> {
         let lift = LIFT * self.slow_envelope(secs);
         let sway = |number: usize| self.sway.as_ref().map_or(0.0, |sway| sway.at(number, secs));
         let arm = |hand: usize| {
-            let mut place = self.moves[hand].iter().take_while(|m| m.start < secs).fold(REST, |mut place, m| {
+            let mut position = self.moves[hand].iter().take_while(|m| m.start < secs).fold(REST, |mut position, m| {
                 let done = minimum_jerk((secs - m.start) / m.secs);
-                place.iter_mut().zip(m.goal).for_each(|(now, goal)| *now += done * (goal - *now));
-                place
+                position.iter_mut().zip(m.goal).for_each(|(now, goal)| *now += done * (goal - *now));
+                position
             });
-            place[1] -= lift;
-            (0..3).for_each(|k| place[k] += WRIST_SWAY * sway(3 * hand + k));
-            ArmControls::from(place)
+            position[1] -= lift;
+            (0..3).for_each(|k| position[k] += WRIST_SWAY * sway(3 * hand + k));
+            ArmControls::from(position)
         };
         let torso = [0, 1, 2].map(|k| TORSO_SWAY * sway(6 + k));
         Controls { arms: [arm(0), arm(1)], torso, ..Controls::default() }
@@ -179,9 +179,9 @@ impl<'a> RuleGestures<'a> {
     /// Wrist position relative to the neck, metres, at the target of a gesture; the rest of the pose is that of the
     /// rule at `secs`.
     pub fn wrist_at(&self, gesture: WordGesture, secs: f64) -> Vec3 {
-        let WordGesture { hand, place } = gesture;
+        let WordGesture { hand, target } = gesture;
         let mut controls = self.controls(secs);
-        let mut target = WORD_TARGETS[place];
+        let mut target = WORD_TARGETS[target];
         target[1] -= LIFT * self.slow_envelope(secs);
         controls.arms[hand] = ArmControls::from(target);
         let figure = DrawnFigure::new(&controls);
@@ -214,8 +214,8 @@ fn insert_word_strokes(
     mut varied: impl FnMut(&ArmTarget) -> (f64, ArmTarget),
 ) {
     for word in spoken {
-        let Some(WordGesture { hand, place }) = words::gesture(&word.word) else { continue };
-        let (late, goal) = varied(&WORD_TARGETS[place]);
+        let Some(WordGesture { hand, target }) = words::gesture(&word.word) else { continue };
+        let (late, goal) = varied(&WORD_TARGETS[target]);
         let start = word.start_secs + WORD_DELAY + late;
         strokes[hand].retain(|(other, _)| !(start - STROKE..start + STROKE + HOLD).contains(other));
         let at = strokes[hand].partition_point(|(other, _)| *other < start);
@@ -241,9 +241,9 @@ fn amplitude(accent: &Syllable) -> f64 {
     0.45 + 0.4 * (accent.peak() - 0.4) / 0.6
 }
 
-/// Target at the share `amplitude` of the way from the rest pose to `place`.
-fn scaled_target(place: &ArmTarget, amplitude: f64) -> ArmTarget {
-    std::array::from_fn(|k| REST[k] + amplitude * (place[k] - REST[k]))
+/// Target at the share `amplitude` of the way from the rest pose to `target`.
+fn scaled_target(target: &ArmTarget, amplitude: f64) -> ArmTarget {
+    std::array::from_fn(|k| REST[k] + amplitude * (target[k] - REST[k]))
 }
 
 fn perturbed(goal: &ArmTarget, rng: &mut ChaCha8Rng) -> ArmTarget {
@@ -350,12 +350,12 @@ mod tests {
             let Some(gesture) = words::gesture(&word.word) else { continue };
             let t = FPS.frames_in(word.start_secs + WORD_DELAY + STROKE) + 1;
             let wrist = [L_WRIST, R_WRIST][gesture.hand];
-            let distance = |place: usize| -> f64 {
-                let at = rule.wrist_at(WordGesture { place, ..gesture }, FPS.secs(t));
+            let distance = |target: usize| -> f64 {
+                let at = rule.wrist_at(WordGesture { target, ..gesture }, FPS.secs(t));
                 (0..3).map(|k| (f64::from(motion.joints[[t, wrist, k]]) - at[k]).powi(2)).sum::<f64>().sqrt()
             };
-            let own = distance(gesture.place);
-            let others = (0..N_PLACES).filter(|place| *place != gesture.place).map(distance);
+            let own = distance(gesture.target);
+            let others = (0..N_TARGETS).filter(|target| *target != gesture.target).map(distance);
             assert!(own < 0.001 && others.fold(f64::MAX, f64::min) > 0.25, "{word:?}: {own} m");
             n += 1;
         }

@@ -44,16 +44,12 @@ pub fn speech_of(folder: &Path) -> Result<Vec<(PathBuf, Split)>> {
     let mut sounds: Vec<PathBuf> = entries.map(|entry| Ok(entry?.path())).collect::<Result<_>>()?;
     sounds.retain(|path| path.extension().is_some_and(|ending| ending == "wav"));
     sounds.sort();
-    ensure!(
-        !sounds.is_empty(),
-        "{} holds no .wav; `--speech` takes a folder of NAME.wav with NAME.tsv",
-        folder.display()
-    );
+    ensure!(!sounds.is_empty(), "no .wav file in {}: expected a folder of NAME.wav with NAME.tsv", folder.display());
     for sound in &sounds {
         let words = sound.with_extension("tsv");
         ensure!(
             words.is_file(),
-            "{} has no {} beside it: start, end and word, a row each",
+            "no word times for {}: expected {} with one row of start, end and word per word",
             sound.display(),
             words.display()
         );
@@ -75,7 +71,7 @@ pub fn write(dir: &Path, speech: &[(PathBuf, Split)], seed: u64, progress: &dyn 
         ..About::new(NAME, FPS)
     };
     let writer = DatasetWriter::new(dir, about, SHARD_BYTES);
-    let task = progress.begin("gesture", speech.len() as u64);
+    let task = progress.begin("generate gestures", speech.len() as u64);
     for (file, split) in speech {
         spoken(file, seed)?.write(&writer, *split)?;
         task.advance(1);
@@ -85,9 +81,9 @@ pub fn write(dir: &Path, speech: &[(PathBuf, Split)], seed: u64, progress: &dyn 
 
 fn spoken(file: &Path, seed: u64) -> Result<SpokenVideo> {
     let name = file.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-    let mut sound = audio::read_mono(file, SAMPLE_RATE)?.with_context(|| format!("{} has no sound", file.display()))?;
+    let mut sound = audio::read_mono(file, SAMPLE_RATE)?.with_context(|| format!("no audio in {}", file.display()))?;
     let n_frames = FPS.frames_in(sound.secs());
-    ensure!(n_frames > 0, "{} is shorter than a frame", file.display());
+    ensure!(n_frames > 0, "{} is too short: expected at least one frame", file.display());
     sound.samples.truncate(sample_at(FPS, SAMPLE_RATE, n_frames));
     let transcript = Transcript::read(&file.with_extension("tsv"))?;
     let words: Vec<_> = transcript.words.into_iter().filter(|word| word.end_secs <= sound.secs()).collect();

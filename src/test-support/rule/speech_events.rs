@@ -10,7 +10,7 @@ const WINDOW: f64 = 0.05;
 /// there is a pause.
 const MIN_LOUD: f64 = 0.85;
 const MAX_SILENT: f64 = 0.08;
-/// Least interval between two loud syllables, and least pause between two phrases, in seconds.
+/// Shortest interval between two loud syllables, and shortest pause between two phrases, in seconds.
 const MIN_BEAT_INTERVAL: f64 = 0.45;
 const MIN_PAUSE: f64 = 0.22;
 

@@ -6,17 +6,17 @@ use orator_formats::transcript::{Word, WordSource};
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 
-/// Least interval between the starts of two words with gestures, seconds.
+/// Shortest interval between the starts of two words with gestures, seconds.
 const MIN_INTERVAL: f64 = 1.5;
 /// Probability of such a word where one is allowed.
 const GESTURE_PROBABILITY: f64 = 0.12;
 /// Largest number of syllables of a word.
 const MAX_SYLLABLES: usize = 3;
 /// Number of targets per hand.
-pub const N_PLACES: usize = 4;
+pub const N_TARGETS: usize = 4;
 
 /// Words that move the left and right hand to each of their targets.
-const GESTURES: [[&str; N_PLACES]; 2] = [["over", "away", "deep", "self"], ["high", "aside", "low", "here"]];
+const GESTURES: [[&str; N_TARGETS]; 2] = [["over", "away", "deep", "self"], ["high", "aside", "low", "here"]];
 /// All other words.
 const OTHERS: &str = "the of and a to in is you that it he was for on are as with his they I at be this have from or one \
     had by word but not what all were we when your can said there use an each which she do how their if will other about \
@@ -36,14 +36,14 @@ const PAIR_CLASSES: usize = 5;
 pub struct WordGesture {
     /// 0: left, 1: right.
     pub hand: usize,
-    /// Index of the target, below [`N_PLACES`].
-    pub place: usize,
+    /// Index of the target, below [`N_TARGETS`].
+    pub target: usize,
 }
 
 /// Gesture of a word; `None` if it has none.
 pub fn gesture(word: &str) -> Option<WordGesture> {
     let of_hand = |hand: usize| GESTURES[hand].iter().position(|own| *own == word);
-    (0..2).find_map(|hand| of_hand(hand).map(|place| WordGesture { hand, place }))
+    (0..2).find_map(|hand| of_hand(hand).map(|target| WordGesture { hand, target }))
 }
 
 /// Words for the syllables of a speech, one to three syllables each, drawn independently of the syllables. Training
@@ -64,7 +64,7 @@ pub fn words(speech: &Speech, split: Split, rng: &mut ChaCha8Rng) -> Vec<Word> {
         let is_allowed = last.is_none_or(|last: usize| n > last + 2 && start - spans[last][0] >= MIN_INTERVAL);
         let is_gesture = rng.random_bool(GESTURE_PROBABILITY) && is_allowed;
         last = if is_gesture { Some(n) } else { last };
-        chosen.push(if is_gesture { GESTURES[rng.random_range(0..2)][rng.random_range(0..N_PLACES)] } else { "" });
+        chosen.push(if is_gesture { GESTURES[rng.random_range(0..2)][rng.random_range(0..N_TARGETS)] } else { "" });
     }
     let others: Vec<&str> = OTHERS.split_whitespace().collect();
     for n in 0..chosen.len() {
@@ -88,8 +88,8 @@ pub fn words(speech: &Speech, split: Split, rng: &mut ChaCha8Rng) -> Vec<Word> {
 /// Whether the pair of `word` and the other word with index `other` belongs to the split; true for a word without
 /// gesture.
 fn is_of_split(word: &str, other: usize, split: Split) -> bool {
-    let Some(WordGesture { hand, place }) = gesture(word) else { return true };
-    let is_held_out = (3 * (N_PLACES * hand + place) + other).is_multiple_of(PAIR_CLASSES);
+    let Some(WordGesture { hand, target }) = gesture(word) else { return true };
+    let is_held_out = (3 * (N_TARGETS * hand + target) + other).is_multiple_of(PAIR_CLASSES);
     is_held_out == (split != Split::Train)
 }
 
@@ -124,10 +124,10 @@ mod tests {
         let strokes: Vec<&Word> = words.iter().filter(|word| gesture(&word.word).is_some()).collect();
         assert!(strokes.windows(2).all(|two| two[1].start_secs - two[0].start_secs >= MIN_INTERVAL));
         let different: BTreeSet<&str> = strokes.iter().map(|word| word.word.as_str()).collect();
-        assert_eq!(different.len(), 2 * N_PLACES);
+        assert_eq!(different.len(), 2 * N_TARGETS);
         assert!(words.iter().all(|word| word.end_secs > word.start_secs && !word.word.is_empty()));
         let others: BTreeSet<&str> = OTHERS.split_whitespace().collect();
-        assert_eq!(others.len(), OTHERS.split_whitespace().count(), "a word stands twice");
+        assert_eq!(others.len(), OTHERS.split_whitespace().count(), "duplicate word");
         assert!(others.iter().all(|other| gesture(other).is_none()));
     }
 }

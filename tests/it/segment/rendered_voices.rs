@@ -8,7 +8,7 @@ use orator_base::stage::progress::Silent;
 use orator_base::types::time::FrameRate;
 use orator_formats::keypoints_npz;
 use orator_lab::demo::people::condition::Condition;
-use orator_lab::demo::people::scene::{ClipSeeds, PeopleScene};
+use orator_lab::demo::people::scene::{ClipSeeds, PersonScene};
 use orator_test_support::project::{Project, files_under};
 use orator_test_support::skip::{fetched_model, fetched_models};
 use std::path::Path;
@@ -47,7 +47,7 @@ fn of_two_the_one_who_speaks_is_followed_and_the_voices_are_told_apart() {
     let project = Project::with_clips("two", 0, 0.0);
     for seed in [3, 8] {
         let seeds = ClipSeeds { body: seed, clothes: seed, camera: seed, motion: seed, voice: None };
-        let scene = PeopleScene::new(Condition::Front, seeds, SECS, FPS, None);
+        let scene = PersonScene::new(Condition::Front, seeds, SECS, FPS, None);
         scene.film(&project.dir().join(format!("{seed}.mp4")), &Silent).unwrap();
     }
     // Side by side, one two thirds as large; the voice is of one or of the other.

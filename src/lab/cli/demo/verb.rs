@@ -3,17 +3,18 @@
 use super::learned;
 use crate::demo::GENERATOR;
 use crate::demo::check::pipeline;
-use crate::demo::check::pipeline::{LEAST_FRAMES, LEAST_JOINTS, Millimetres};
+use crate::demo::check::pipeline::{MIN_FRAMES, MIN_JOINTS, Millimetres};
 use crate::demo::check::sheet;
 use crate::demo::host;
 use crate::demo::more_speech;
 use crate::demo::people;
 use crate::demo::people::condition::Condition;
-use crate::demo::people::folder::PeoplePlan;
+use crate::demo::people::folder::RenderPlan;
 use anyhow::{Context, Result, bail, ensure};
 use orator::cli::Outcome;
 use orator::cli::ui::Ui;
 use orator_base::stage::workdir::{self, FolderLock};
+use orator_base::text::{counted, length};
 use orator_base::types::time::FrameRate;
 use orator_dataset::Dataset;
 use orator_dataset::config;
@@ -26,7 +27,7 @@ use orator_test_support::rule::{dataset, speech_dataset};
 use serde_json::json;
 use std::path::{Path, PathBuf};
 
-/// Seconds of a clip of rendered people, if not given.
+/// Default duration of a clip of rendered people, seconds.
 const PEOPLE_SECS: f64 = 8.0;
 
 /// Generate synthetic speakers with known motion, and measure results on them.
@@ -41,7 +42,7 @@ enum DemoVerb {
     /// Draw videos of a synthetic speaker with known joints.
     ///
     /// Writes the videos with audio, the ground truth, the marker models and a pipeline.toml into DIR. With --people,
-    /// renders people in rooms for the models for real people.
+    /// renders people in rooms, for the pose models for real people.
     Draw {
         /// Demo folder; created if it does not exist.
         dir: PathBuf,
@@ -96,7 +97,7 @@ enum DemoVerb {
         /// split has thirty.
         #[arg(long, default_value_t = 2.0)]
         hours: f64,
-        /// Add words that cannot be distinguished by their sound, some of which move a hand to a position of their
+        /// Add words that cannot be distinguished by their audio, some of which move a hand to a position of their
         /// own (version 2 of the rule).
         #[arg(long)]
         words: bool,
@@ -112,7 +113,7 @@ enum DemoVerb {
         #[arg(long, default_value_t = 1)]
         seed: u64,
     },
-    /// Measure how much of the rule of `demo speaker` a trained model has learnt.
+    /// Measure how much of the rule of `demo speaker` a trained model has learned.
     ///
     /// The test split is used. Exit code 2: a target is missed.
     Learned {
@@ -161,22 +162,22 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
             if let Some(n_clips) = people {
                 let conditions = Condition::of_names(&conditions)?;
                 let secs = secs.unwrap_or(PEOPLE_SECS);
-                return render(&dir, &PeoplePlan { conditions, n_clips, secs, fps, seed, motion, truth_only }, ui);
+                return render(&dir, &RenderPlan { conditions, n_clips, secs, fps, seed, motion, truth_only }, ui);
             }
-            let usual = DemoPlan::default();
-            let plan = DemoPlan { n_videos: videos, secs: secs.unwrap_or(usual.secs), fps, seed, ..usual };
+            let defaults = DemoPlan::default();
+            let plan = DemoPlan { n_videos: videos, secs: secs.unwrap_or(defaults.secs), fps, seed, ..defaults };
             draw(&dir, &plan, rendered, speech, ui)
         }
         DemoVerb::Measure { dir } => measure(&dir, ui),
         DemoVerb::Speaker { dir, speech: Some(folder), seed, .. } => {
             let speech = speech_dataset::speech_of(&folder)?;
             let write = |attempt: &Path| speech_dataset::write(attempt, &speech, seed, ui);
-            speak(&dir, speech.len(), speech_dataset::RULE_OF_SPEECH, ui, write)
+            write_speaker(&dir, speech.len(), speech_dataset::RULE_OF_SPEECH, ui, write)
         }
         DemoVerb::Speaker { dir, hours, words, habits, seed, speech: None } => {
             let rule = if words { dataset::RULE_OF_WORDS } else { dataset::RULE };
             let clips = dataset::clips(hours, seed, rule, habits)?;
-            speak(&dir, clips.len(), rule, ui, |attempt| dataset::write(attempt, &clips, ui))
+            write_speaker(&dir, clips.len(), rule, ui, |attempt| dataset::write(attempt, &clips, ui))
         }
         DemoVerb::Learned { dataset, checkpoint, picture } => {
             learned::run(&dataset, checkpoint.as_deref(), picture.as_deref(), ui)
@@ -186,29 +187,36 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
 }
 
 fn draw(dir: &Path, plan: &DemoPlan, rendered: bool, speech: Option<u32>, ui: &Ui) -> Result<Outcome> {
-    let more = speech.map(|minutes| say_more(dir, plan, rendered, 60.0 * f64::from(minutes), ui)).transpose()?;
+    let extra = speech.map(|minutes| write_speech(dir, plan, rendered, 60.0 * f64::from(minutes), ui)).transpose()?;
     let videos = if rendered { host::draw(dir, plan, ui)? } else { folder::draw(dir, plan, ui)? };
     let next = format!("orator run -c {}", dir.join("pipeline.toml").display());
-    let mut text =
-        format!("drew {} videos of {} s into {}", videos.len(), plan.secs, dir.join("videos/host").display());
-    if let Some((secs, dataset)) = &more {
-        text += &format!("\nand {secs:.0} s of the same figure without video into {}", dataset.display());
+    let mut text = format!(
+        "wrote {} of {} to {}",
+        counted(videos.len(), "video"),
+        length(plan.secs),
+        dir.join("videos/host").display()
+    );
+    if let Some((secs, dataset)) = &extra {
+        text += &format!("\nwrote {} of additional speech without video to {}", length(*secs), dataset.display());
     }
-    let more = more.map(|(_, dataset)| dataset);
-    ui.summary(&text, Some(&next), json!({ "videos": videos, "speech": more, "next": next }));
+    let extra = extra.map(|(_, dataset)| dataset);
+    ui.summary(&text, Some(&next), json!({ "videos": videos, "speech": extra, "next": next }));
     Ok(Outcome::Done)
 }
 
-/// Speech of the demo's figure without video: seconds to train on, and the dataset. What is there already stays.
-fn say_more(dir: &Path, plan: &DemoPlan, rendered: bool, secs: f64, ui: &Ui) -> Result<(f64, PathBuf)> {
+/// Speech of the demo's figure without video: training duration in seconds, and the dataset. An existing dataset is
+/// reused.
+fn write_speech(dir: &Path, plan: &DemoPlan, rendered: bool, secs: f64, ui: &Ui) -> Result<(f64, PathBuf)> {
     let out = dir.join("speech");
     let folder = std::path::absolute(&out)?;
     if workdir::has_files(&folder) {
-        let made = Dataset::open(&folder)?;
+        let existing = Dataset::open(&folder)?;
         ensure!(
-            made.info().notes.contains(&more_speech::note(plan, rendered, secs)),
-            "{} holds other speech than that of this figure; choose another folder, or remove it",
-            out.display()
+            existing.info().notes.contains(&more_speech::note(plan, rendered, secs)),
+            "{} contains other speech: expected that of `--seed {}` with this duration and figure; remove it or choose \
+             another folder",
+            out.display(),
+            plan.seed
         );
     } else {
         let _lock = FolderLock::exclusive(&folder)?;
@@ -217,13 +225,13 @@ fn say_more(dir: &Path, plan: &DemoPlan, rendered: bool, secs: f64, ui: &Ui) -> 
     Ok((secs, out))
 }
 
-fn render(dir: &Path, plan: &PeoplePlan, ui: &Ui) -> Result<Outcome> {
+fn render(dir: &Path, plan: &RenderPlan, ui: &Ui) -> Result<Outcome> {
     let clips = people::folder::draw(dir, plan, ui)?;
     let next = format!("orator run -c {} --to pose2d", dir.join("pipeline.toml").display());
     let text = format!(
-        "rendered {} clips of people under {} conditions into {}",
-        clips.len(),
-        plan.conditions.len(),
+        "rendered {} of people under {} to {}",
+        counted(clips.len(), "clip"),
+        counted(plan.conditions.len(), "condition"),
         dir.join("videos").display()
     );
     ui.summary(&text, Some(&next), json!({ "clips": clips, "next": next }));
@@ -239,46 +247,50 @@ fn measure(dir: &Path, ui: &Ui) -> Result<Outcome> {
         format!("{name:34}{:>8.2}{:>8.2}{:>7.1} %\n", px.median, px.p90, 100.0 * px.found)
     };
     let targets = m.targets();
-    let mut text = format!("{:34}{:>8}{:>8}{:>9}\n", "2D, px from the truth", "median", "90 %", "found");
+    let mut text = format!("{:34}{:>8}{:>8}{:>9}\n", "2D keypoint error, px", "median", "90 %", "detected");
     text += &px("body (13 points)", &m.body);
     text += &px("hands (2 x 21 points)", &m.hands);
     text += &m.shoulders_px.map_or(String::new(), |shoulders| {
         let [body, hands] = [m.body.median, m.hands.median].map(|px| 100.0 * px / shoulders);
-        format!("of points that can be seen; the shoulders are {shoulders:.0} px wide: {body:.1} % and {hands:.1} % of them\n")
+        format!(
+            "visible points only; medians relative to the shoulder width of {shoulders:.0} px: body {body:.1} %, hands \
+             {hands:.1} %\n"
+        )
     });
-    text +=
-        &format!("{:34}{:>8}{:>8}{:>8}{:>9}\n", "3D, mean mm from the truth", "joints", "body", "wrists", "fingers");
+    text += &format!("{:34}{:>8}{:>8}{:>8}{:>9}\n", "3D joint error, mean mm", "joints", "body", "wrists", "fingers");
     text += &row("this run", &m.lifted);
-    text += &row("trivial: the mean pose", &m.mean_pose);
-    text += &row("trivial: true x, y and mean depth", &m.mean_depth);
-    text += &row("trivial: true x, y and bone lengths", &m.bone_depth);
+    text += &row("baseline: mean pose", &m.mean_pose);
+    text += &row("baseline: true x, y, mean depth", &m.mean_depth);
+    text += &row("baseline: true x, y, bone lengths", &m.bone_depth);
     text += &format!(
-        "{} of {} frames are in the dataset, {:.1} % of their joints have a number; all rows count these. joints: 48 from the neck; fingers: from their wrist; no rotation,\n\
-         segments of 60 frames scaled to 0.90 m of shoulders, upper arm and forearm.\n",
+        "{} of {} frames are in the dataset; {:.1} % of their joints have values, and all rows use these only.\n\
+         joints: 48, relative to the neck; fingers: relative to their wrist; segments of 60 frames are scaled to \
+         0.90 m (shoulder width + upper arm + forearm) and not rotated.\n",
         m.n_frames,
         m.n_drawn,
         100.0 * m.joints
     );
-    text += &m.more_secs.map_or(String::new(), |more| {
+    text += &m.speech_secs.map_or(String::new(), |speech| {
         format!(
-            "to train on: {:.0} s that came through the videos, {more:.0} s of the same figure without video\n",
-            m.train_secs
+            "training data: {} from the videos, {} of additional speech without video\n",
+            length(m.train_secs),
+            length(speech)
         )
     });
-    let good = m.good();
-    let met = if good { "met" } else { "MISSED" };
+    let targets_met = m.meets_targets();
+    let met = if targets_met { "met" } else { "MISSED" };
     let generator =
-        if m.shoulders_px.is_some() { "a rendered person, seen by the models for real people" } else { GENERATOR };
+        if m.shoulders_px.is_some() { "rendered person, with the pose models for real people" } else { GENERATOR };
     text += &format!("generator: {generator}\n");
     text += &format!(
-        "3D error against the known truth: {:.1} mm; targets: {:.1} px, {:.0} mm, {:.0} % of points found, {:.0} % \
-         of frames, {:.0} % of joints: {met}",
+        "3D error: {:.1} mm; targets: 2D error {:.1} px, 3D error {:.0} mm, {:.0} % of points detected, {:.0} % of \
+         frames and {:.0} % of joints in the dataset: {met}",
         m.lifted.all,
-        targets.most_px,
-        targets.most_mm,
-        100.0 * targets.least_found,
-        100.0 * LEAST_FRAMES,
-        100.0 * LEAST_JOINTS
+        targets.max_px,
+        targets.max_mm,
+        100.0 * targets.min_found,
+        100.0 * MIN_FRAMES,
+        100.0 * MIN_JOINTS
     );
     let mm = |mm: &Millimetres| json!({ "all": mm.all, "body": mm.body, "wrists": mm.wrists, "fingers": mm.fingers });
     let facts = json!({
@@ -287,13 +299,14 @@ fn measure(dir: &Path, ui: &Ui) -> Result<Outcome> {
         "mm": mm(&m.lifted), "mean_pose_mm": mm(&m.mean_pose), "mean_depth_mm": mm(&m.mean_depth),
         "bone_depth_mm": mm(&m.bone_depth), "joints": m.joints, "shoulders_px": m.shoulders_px,
         "generator": generator,
-        "n_frames": m.n_frames, "n_drawn": m.n_drawn, "good": good, "train_secs": m.train_secs, "more_secs": m.more_secs,
+        "n_frames": m.n_frames, "n_drawn": m.n_drawn, "targets_met": targets_met, "train_secs": m.train_secs,
+        "speech_secs": m.speech_secs,
     });
     ui.summary(&text, None, facts);
-    Ok(if good { Outcome::Done } else { Outcome::SomeFailed })
+    Ok(if targets_met { Outcome::Done } else { Outcome::SomeFailed })
 }
 
-fn speak(
+fn write_speaker(
     dir: &Path,
     n_clips: usize,
     rule: u32,
@@ -302,10 +315,15 @@ fn speak(
 ) -> Result<Outcome> {
     let out = std::path::absolute(dir)?;
     let _lock = FolderLock::exclusive(&out)?;
-    ensure!(!workdir::has_files(&out), "{} is not empty; choose another folder", dir.display());
+    ensure!(!workdir::has_files(&out), "the folder {} is not empty; choose another one", dir.display());
     let info = workdir::build_folder(&out, write)?;
-    let secs: Vec<String> = info.splits.iter().map(|(name, split)| format!("{name} {:.0} s", split.secs)).collect();
-    let text = format!("{n_clips} clips by version {rule} of the rule: {}", secs.join(", "));
+    let secs: Vec<String> = info.splits.iter().map(|(name, split)| format!("{name} {}", length(split.secs))).collect();
+    let text = format!(
+        "wrote {} by version {rule} of the rule to {}: {}",
+        counted(n_clips, "clip"),
+        dir.display(),
+        secs.join(", ")
+    );
     let next = format!("orator-lab demo learned --dataset {}", dir.display());
     ui.summary(&text, Some(&next), json!({ "dataset": dir, "clips": n_clips, "next": next }));
     Ok(Outcome::Done)
@@ -315,11 +333,11 @@ fn draw_sheet(dir: &Path, out: &Path, generated: Option<&Path>, ui: &Ui) -> Resu
     let config = config::load(&dir.join("pipeline.toml"), &[])?;
     let units = config::videos::all(&config);
     let Some(unit) = units.iter().flat_map(|videos| &videos.units).next() else {
-        bail!("{} names no video", dir.join("pipeline.toml").display());
+        bail!("no entry of {} matches a video", dir.join("pipeline.toml").display());
     };
     let generated = generated.map(|path| motion_file::read(path, Some(folder::DATASET_FPS))).transpose()?;
     let image = sheet::draw_sheet(&config.settings.work.dir, unit, generated.as_ref().map(|read| &read.motion))
-        .with_context(|| format!("drawing a contact sheet of {}", unit.source.display()))?;
+        .with_context(|| format!("cannot draw a contact sheet of {}", unit.source.display()))?;
     workdir::replace(out, |attempt| png::write(attempt, &image))?;
     ui.summary(&format!("wrote {}", out.display()), None, json!({ "sheet": out }));
     Ok(Outcome::Done)

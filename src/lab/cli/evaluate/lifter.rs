@@ -45,13 +45,13 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
 }
 
 fn body(args: Args, ui: &Ui) -> Result<Outcome> {
-    ensure!((1..=100_000).contains(&args.scenes), "--scenes must lie between 1 and 100000");
+    ensure!((1..=100_000).contains(&args.scenes), "invalid --scenes {}: expected 1 to 100000", args.scenes);
     let settings = config::LiftConfig {
         body_weights: args.body_weights.unwrap_or_default(),
         hand_weights: args.hand_weights.unwrap_or_default(),
         ..Default::default()
     };
-    let takes = upper_body::read_all(&args.mocap).context("reading --mocap")?;
+    let takes = upper_body::read_all(&args.mocap).context("cannot read --mocap")?;
     let sets = if args.takes.is_empty() {
         vec![("all takes".to_owned(), takes)]
     } else {

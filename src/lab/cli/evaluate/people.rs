@@ -1,7 +1,7 @@
 //! `orator-lab evaluate people`.
 
 use crate::evaluate::people::page;
-use crate::evaluate::people::{gap, grid, table};
+use crate::evaluate::people::{grid, keypoint_statistics, table};
 use anyhow::Result;
 use orator::cli::Outcome;
 use orator::cli::ui::Ui;
@@ -11,9 +11,9 @@ use std::path::PathBuf;
 
 /// Measure the errors of a run on rendered people, by condition.
 ///
-/// Compared with the ground truth: 2D keypoints, hands (missed, placed on the other hand, swapped, invented), wrongly
-/// accepted and rejected intervals, and lifted joints. The errors of the joints are printed next to those of the mean
-/// pose of the clip and of the same lifter with exact keypoints.
+/// Compared with the ground truth: 2D keypoints, hands (missed, detected on the other hand, swapped, false positives),
+/// falsely accepted and rejected seconds, and lifted joints. The errors of the joints are printed next to those of
+/// the mean pose of the clip and of the same lifter with exact keypoints.
 #[derive(clap::Args)]
 pub struct Args {
     /// Folder written by `orator-lab demo draw --people`.
@@ -28,7 +28,7 @@ pub struct Args {
     /// Configuration files of runs on real clips, whose keypoints are compared with the rendered ones: scores,
     /// jitter, detected hands.
     #[arg(long, value_name = "FILE", num_args = 1..)]
-    beside: Vec<PathBuf>,
+    real: Vec<PathBuf>,
     /// Also write an HTML page.
     #[arg(long, value_name = "PAGE.html")]
     pub report: Option<PathBuf>,
@@ -38,15 +38,15 @@ pub fn run(args: &Args, ui: &Ui) -> Result<Outcome> {
     let default = [args.dir.join("pipeline.toml")];
     let config: &[PathBuf] = if args.config.is_empty() { &default } else { &args.config };
     let rows = table::table(&args.dir, config, args.part.as_deref())?;
-    let looked_at: Vec<&PathBuf> =
-        if args.beside.is_empty() { Vec::new() } else { config.iter().chain(&args.beside).collect() };
-    let looks = looked_at.into_iter().map(|file| gap::look(file)).collect::<Result<Vec<_>>>()?;
-    let last = (!looks.is_empty()).then(|| gap::grid(&looks));
+    let files: Vec<&PathBuf> =
+        if args.real.is_empty() { Vec::new() } else { config.iter().chain(&args.real).collect() };
+    let statistics = files.into_iter().map(|file| keypoint_statistics::of_config(file)).collect::<Result<Vec<_>>>()?;
+    let last = (!statistics.is_empty()).then(|| keypoint_statistics::grid(&statistics));
     let mut text = grid::text(&rows, last.as_ref());
     if let Some(path) = &args.report {
         workdir::write_file(path, page::html(&rows, last.as_ref()).as_bytes())?;
         text += &format!("\nwrote {}", path.display());
     }
-    ui.summary(&text, None, json!({ "people": rows, "keypoints": looks, "report": args.report }));
+    ui.summary(&text, None, json!({ "conditions": rows, "keypoints": statistics, "report": args.report }));
     Ok(Outcome::Done)
 }

@@ -5,6 +5,7 @@ use crate::train::space::basis;
 use orator::cli::Outcome;
 use orator::cli::ui::Ui;
 use orator_base::stage::progress::Progress as _;
+use orator_base::text::counted;
 use std::path::PathBuf;
 
 /// Fit the fixed basis in which `orator evaluate` compares windows of motion.
@@ -28,9 +29,9 @@ pub fn run(args: Args, ui: &Ui) -> anyhow::Result<Outcome> {
         basis::fit(&corpus, args.corpus.seed, &args.out)?
     };
     let mut text = format!(
-        "{} written: {} windows, fingers weigh {:.2}\nvariance that the 64 directions hold: {:.1} %",
+        "wrote {}: {}, finger weight {:.2}\nvariance explained by the 64 components: {:.1} %",
         args.out.display(),
-        fitted.n_windows,
+        counted(fitted.n_windows, "window"),
         fitted.finger_weight,
         100.0 * fitted.share
     );

@@ -1,4 +1,4 @@
-//! The motion that the two fixed spaces are learnt from, as `orator-lab train basis` and `orator-lab train embedding` gather it.
+//! Training motion of the two fixed motion spaces (`orator-lab train basis` and `orator-lab train embedding`).
 
 use crate::mocap::upper_body;
 use crate::train::space::corpus::Corpus;
@@ -17,7 +17,7 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use std::path::PathBuf;
 
-/// Clips of a minute of each kind of speaker made by rule, and how many more are only measured on.
+/// Number of one-minute clips of each kind of procedural speaker, and of additional ones for evaluation only.
 const CLIPS: usize = 12;
 const HELD_OUT: usize = 2;
 const FPS: FrameRate = FrameRate::new(15, 1);
@@ -38,19 +38,19 @@ pub struct CorpusArgs {
 }
 
 pub fn gather(args: &CorpusArgs, ui: &Ui) -> Result<Corpus> {
-    let task = ui.begin("gathering motion", 0);
-    let takes = upper_body::read_all(&args.mocap).context("reading --mocap")?;
+    let task = ui.begin("reading motion", 0);
+    let takes = upper_body::read_all(&args.mocap).context("cannot read --mocap")?;
     let (held_out, mut takes) = upper_body::divide(takes, &args.hold_out)?;
-    ensure!(!takes.is_empty(), "--hold-out leaves nothing to learn from");
+    ensure!(!takes.is_empty(), "--hold-out selects every take: expected at least one take for training");
     takes.sort_by(|a, b| a.name.cmp(&b.name));
-    task.detail("speakers made by rule");
+    task.detail("procedural speakers");
     let mut speakers = Vec::new();
     for seed in 0..CLIPS + HELD_OUT {
         let number = args.seed.wrapping_add(seed as u64);
         let clip = dataset::clips(CLIP_SECS / 3600.0, number, dataset::RULE, 0)?
             .into_iter()
             .next()
-            .context("no clip of the rule")?;
+            .context("the synthetic speaker has no clip")?;
         speakers.push((format!("speaker {number}"), clip.motion()));
         speakers.push((format!("gestures {number}"), gestures(number)));
     }
@@ -58,7 +58,7 @@ pub fn gather(args: &CorpusArgs, ui: &Ui) -> Result<Corpus> {
     Corpus::new(&takes, &held_out, &speakers, &others, args.seed)
 }
 
-/// A minute of the demo's figure.
+/// One minute of the drawn figure of `orator-lab demo`.
 fn gestures(seed: u64) -> Motion {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let speech = Speech::new(CLIP_SECS, &mut rng);

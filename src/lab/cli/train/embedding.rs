@@ -42,7 +42,11 @@ pub struct Args {
 }
 
 pub fn run(args: Args, ui: &Ui) -> anyhow::Result<Outcome> {
-    ensure!(args.learning_rate > 0.0 && args.learning_rate < 1.0, "--learning-rate must lie between 0 and 1");
+    ensure!(
+        args.learning_rate > 0.0 && args.learning_rate < 1.0,
+        "invalid --learning-rate {}: expected a value between 0 and 1",
+        args.learning_rate
+    );
     let corpus = corpus::gather(&args.corpus, ui)?;
     let n_frames = corpus.n_frames();
     let mut training_task = EmbeddingTask::new(corpus, args.corpus.seed)?;
@@ -56,9 +60,11 @@ pub fn run(args: Args, ui: &Ui) -> anyhow::Result<Outcome> {
         started_from,
     };
     let errors = train(&mut training_task, &schedule, &args.out, ui)?;
-    let written = if args.steps == 0 { String::new() } else { format!("{} written\n", args.out.display()) };
-    let text =
-        format!("{written}{n_frames} frames to learn from; of held-out windows came back\n{}", errors.join("\n"));
+    let written = if args.steps == 0 { String::new() } else { format!("wrote {}\n", args.out.display()) };
+    let text = format!(
+        "{written}{n_frames} training frames; reconstruction errors of held-out windows:\n{}",
+        errors.join("\n")
+    );
     ui.summary(&text, None, serde_json::json!({ "out": args.out, "frames": n_frames, "errors": errors }));
     Ok(Outcome::Done)
 }

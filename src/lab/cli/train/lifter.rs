@@ -61,7 +61,7 @@ pub struct Args {
     checkpoint_every: usize,
 }
 
-/// Whose networks.
+/// Lifter whose networks are trained.
 #[derive(Clone, Copy, PartialEq, clap::ValueEnum)]
 pub enum LifterPart {
     Body,
@@ -77,25 +77,30 @@ enum HandNetwork {
 }
 
 pub fn run(args: Args, ui: &Ui) -> anyhow::Result<Outcome> {
-    ensure!(args.learning_rate > 0.0 && args.learning_rate < 1.0, "--learning-rate must lie between 0 and 1");
-    ensure!((1..=4096).contains(&args.width.unwrap_or(256)), "--width must lie between 1 and 4096");
+    ensure!(
+        args.learning_rate > 0.0 && args.learning_rate < 1.0,
+        "invalid --learning-rate {}: expected a value between 0 and 1",
+        args.learning_rate
+    );
+    ensure!((1..=4096).contains(&args.width.unwrap_or(256)), "invalid --width: expected 1 to 4096");
     let mut training_task: Box<dyn TrainingTask> = match args.part {
         LifterPart::Body => {
-            ensure!(!args.mocap.is_empty(), "the body lifter learns from captured motion: give --mocap PATH");
+            ensure!(!args.mocap.is_empty(), "no training motion for the body lifter; give --mocap PATH");
             ensure!(
                 args.widths.iter().all(|w| w % 2 == 1) && args.widths.iter().product::<usize>() <= 729,
-                "--widths are odd, and their product is at most 729 frames"
+                "invalid --widths {:?}: expected odd numbers whose product is at most 729",
+                args.widths
             );
-            let takes = upper_body::read_all(&args.mocap).context("reading --mocap")?;
+            let takes = upper_body::read_all(&args.mocap).context("cannot read --mocap")?;
             let (held_out, takes) = upper_body::divide(takes, &args.hold_out)?;
-            ensure!(!takes.is_empty(), "--hold-out leaves nothing to learn from");
+            ensure!(!takes.is_empty(), "--hold-out selects every take: expected at least one take for training");
             let config = BodyLifter::config(args.width.unwrap_or(256), &args.widths);
             Box::new(BodyLifterTask::new(takes, held_out, &config, args.seed)?)
         }
         LifterPart::Hands => {
             ensure!(
                 args.mocap.is_empty() && args.hold_out.is_empty(),
-                "the hand lifter learns from hands made by rule: no --mocap"
+                "--mocap and --hold-out apply to `--part body` only; the hand lifter is trained on procedural hands"
             );
             match args.network {
                 HandNetwork::Coordinates => Box::new(HandLifterTask::new(args.width.unwrap_or(896), args.seed)?),
@@ -117,7 +122,7 @@ pub fn run(args: Args, ui: &Ui) -> anyhow::Result<Outcome> {
         ui.summary(&errors.join("\n"), None, serde_json::json!({ "errors": errors }));
         return Ok(Outcome::Done);
     }
-    let text = format!("{} written\n{}", args.out.display(), errors.join("\n"));
+    let text = format!("wrote {}\n{}", args.out.display(), errors.join("\n"));
     let key = if args.part == LifterPart::Body { "--body-weights" } else { "--hand-weights" };
     let next = format!("orator lift KEYPOINTS.npz --out JOINTS.npy {key} {}", args.out.display());
     let facts =

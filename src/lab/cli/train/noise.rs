@@ -30,7 +30,7 @@ pub struct Args {
 }
 
 pub fn run(args: &Args, ui: &Ui) -> Result<Outcome> {
-    ensure!(!args.out.is_dir(), "{} is a folder; name a file", args.out.display());
+    ensure!(!args.out.is_dir(), "invalid --out {}: it is a folder, expected a file", args.out.display());
     let mut measured = MeasuredNoise { bodies: Vec::new(), hands: Vec::new() };
     for file in &args.config {
         let clips = clips::read(&args.dir, file, Some(&args.part))?;
@@ -40,6 +40,6 @@ pub fn run(args: &Args, ui: &Ui) -> Result<Outcome> {
     }
     let text = serde_json::to_string_pretty(&measured)? + "\n";
     workdir::write_file(&args.out, text.as_bytes())?;
-    ui.summary(&format!("{} written", args.out.display()), None, json!({ "out": args.out, "noise": measured }));
+    ui.summary(&format!("wrote {}", args.out.display()), None, json!({ "out": args.out, "noise": measured }));
     Ok(Outcome::Done)
 }

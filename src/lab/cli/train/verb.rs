@@ -23,8 +23,9 @@ enum Network {
 }
 
 pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
-    const STOPPING: &str = "stopping after this step, with a checkpoint; the next signal ends at once";
-    const RETAINED: &str = "the newest checkpoint is retained, and the same command continues from it";
+    const STOPPING: &str =
+        "stopping after this step and writing a checkpoint; send the signal again to stop immediately";
+    const RETAINED: &str = "the newest checkpoint is retained; run the same command to continue from it";
     match args.network {
         Network::Basis(_) | Network::Noise(_) => signals::exit_on_signal("unfinished work is discarded"),
         _ => ui.enable_stop_requests(STOPPING, RETAINED),

@@ -1,11 +1,12 @@
-//! Check of a speaker trained on the rule: its motion for the sound of the test split is compared with the synthetic
+//! Check of a speaker trained on the rule: its motion for the audio of the test split is compared with the synthetic
 //! speaker's motion and the predictable part of the rule, and with simpler predictors.
 
-use super::places::{self, PlaceShare, WordPlaces};
+use super::positions::{self, PositionShare, WordPositions};
 use super::traces;
 use anyhow::{Result, ensure};
 use ndarray::{Array1, Array2, Array3, ArrayView3};
 use orator_base::stage::progress::Progress;
+use orator_base::text::counted;
 use orator_base::types::skeleton::{NECK, is_duplicate};
 use orator_base::types::time::FrameRate;
 use orator_dataset::{Dataset, Sample, Split};
@@ -31,8 +32,8 @@ pub struct LearnedRow {
     pub speed_correlation: [f64; 2],
     /// Pose metrics; `None` if no poses are predicted.
     pub poses: Option<PoseQuality>,
-    /// Places to which words move the hands; `None` if the rule has no words, or no poses are predicted.
-    pub places: Option<WordPlaces>,
+    /// Positions to which words move the hands; `None` if the rule has no words, or no poses are predicted.
+    pub positions: Option<WordPositions>,
 }
 
 /// Agreement of the poses with the speaker's.
@@ -58,7 +59,7 @@ pub struct Learned {
     /// Penalties of the ridge regressions (one frame, one second of context), to speeds and to poses.
     pub ridge_strengths: [[f64; 2]; 2],
     /// Whether the generator reaches the targets; `None`: no generator.
-    pub good: Option<bool>,
+    pub targets_met: Option<bool>,
     /// First clip, for the plot.
     #[serde(skip)]
     pub first: Option<traces::TraceClip>,
@@ -66,19 +67,19 @@ pub struct Learned {
 
 /// Targets of the generator: correlation of each wrist's speed, PCK as a multiple of the mean pose's and of the
 /// mismatched prediction's, motion energy as a share of the data's.
-pub const LEAST_CORRELATION: f64 = 0.7;
-pub const LEAST_PCK: f64 = 1.5;
+pub const MIN_CORRELATION: f64 = 0.7;
+pub const MIN_PCK: f64 = 1.5;
 pub const ENERGY: std::ops::RangeInclusive<f64> = 0.7..=1.3;
 
-/// Targets for a rule with words: share of correct places of all words, and of isolated words for the network that
+/// Targets for a rule with words: share of correct positions of all words, and of isolated words for the network that
 /// reads the words of a segment; largest deviation from chance of a network without word input; correlation on beats.
-pub const LEAST_PLACES: f64 = 0.8;
-pub const LEAST_LONE_PLACES: f64 = 0.7;
-pub const MOST_FROM_CHANCE: f64 = 0.1;
-pub const LEAST_BEATS: f64 = 0.6;
+pub const MIN_POSITIONS: f64 = 0.8;
+pub const MIN_ISOLATED_POSITIONS: f64 = 0.7;
+pub const MAX_FROM_CHANCE: f64 = 0.1;
+pub const MIN_BEATS: f64 = 0.6;
 
 /// Row of the generator conditioned on the words of another clip.
-const OTHER_WORDS: &str = "generator, another text";
+const OTHER_WORDS: &str = "generator, mismatched words";
 /// Speed below which a wrist of the rule counts as static, m/s.
 const STATIC_SPEED: f64 = 0.05;
 
@@ -88,9 +89,9 @@ struct TestClip {
     /// `None` for the second rule.
     clip: Option<SpokenClip>,
     predictable: Array3<f32>,
-    sound: Array2<f64>,
+    audio: Array2<f64>,
     /// Steps [T - 1, 2] in which no word moves the left or the right hand.
-    of_beats: Array2<bool>,
+    without_word_strokes: Array2<bool>,
 }
 
 /// Evaluates `speaker` on the test split of the synthetic speaker's `dataset`; without a speaker, only the baselines.
@@ -100,10 +101,15 @@ struct TestClip {
 pub fn measure(dataset: &Dataset, speaker: Option<&TrainedSpeaker>, progress: &dyn Progress) -> Result<Learned> {
     let tests: Vec<TestClip> =
         dataset.samples(Split::Test).iter().map(|s| TestClip::new(dataset.read(s)?)).collect::<Result<_>>()?;
-    ensure!(tests.len() > 1, "{}: the test split needs two clips at least", dataset.dir().display());
+    ensure!(
+        tests.len() > 1,
+        "the test split of {} has {}: expected at least 2",
+        dataset.dir().display(),
+        counted(tests.len(), "clip")
+    );
     let fps = dataset.info().fps;
     let judge = Judge { tests: &tests, std: dataset.stats().std(), fps };
-    let task = progress.begin("listen", 0);
+    let task = progress.begin("predict", 0);
     let baselines = RuleBaselines::fit(dataset)?;
     let row = |predictor, predicted: Vec<Array3<f32>>| judge.row(predictor, &predicted);
     let each = |predict: &dyn Fn(&TestClip) -> Array3<f32>| tests.iter().map(predict).collect::<Vec<_>>();
@@ -112,8 +118,8 @@ pub fn measure(dataset: &Dataset, speaker: Option<&TrainedSpeaker>, progress: &d
         task.detail("generating");
         let with_words = |shift: Option<usize>| -> Result<Vec<Array3<f32>>> {
             let one = |n: usize| {
-                let said = shift.map(|shift| tests[(n + shift) % tests.len()].said());
-                Ok(speaker.motion(&tests[n].sample.sound, said.unwrap_or_default())?.joints)
+                let words = shift.map(|shift| tests[(n + shift) % tests.len()].words());
+                Ok(speaker.motion(&tests[n].sample.sound, words.unwrap_or_default())?.joints)
             };
             (0..tests.len()).map(one).collect()
         };
@@ -121,7 +127,7 @@ pub fn measure(dataset: &Dataset, speaker: Option<&TrainedSpeaker>, progress: &d
         for (predicted, test) in predicted.iter().zip(&tests) {
             ensure!(
                 predicted.shape() == test.predictable.shape(),
-                "the speaker has another frame rate than the dataset"
+                "the frame rates of checkpoint and dataset differ; use the dataset that the checkpoint was trained on"
             );
         }
         first = predicted.first().zip(tests.first()).map(|(predicted, test)| traces::TraceClip {
@@ -130,36 +136,37 @@ pub fn measure(dataset: &Dataset, speaker: Option<&TrainedSpeaker>, progress: &d
             predicted: predicted.clone(),
         });
         rows.push(row("generator", predicted.clone()));
-        let mut other = predicted;
-        other.rotate_left(1);
-        rows.push(row("generator, another test sound", other));
+        let mut mismatched = predicted;
+        mismatched.rotate_left(1);
+        rows.push(row("generator, mismatched audio", mismatched));
         if speaker.reads_words() {
             rows.push(row(OTHER_WORDS, with_words(Some(1))?));
-            rows.push(row("generator, no words", with_words(None)?));
+            rows.push(row("generator, without words", with_words(None)?));
         }
     }
     rows.push(row("mean pose", each(&|test| baselines.mean_pose(test.sample.n_frames()))));
     let names = [
-        ["ridge of the frame, to poses", "ridge of the frame, to speeds"],
-        ["ridge of a second, to poses", "ridge of a second, to speeds"],
+        ["ridge, 1 frame of audio, poses", "ridge, 1 frame of audio, speeds"],
+        ["ridge, 1 s of audio, poses", "ridge, 1 s of audio, speeds"],
     ];
     for (ridge, [to_poses, to_speeds]) in baselines.ridges.iter().zip(names) {
-        rows.push(row(to_poses, each(&|test| ridge.poses(&test.sound))));
-        let speeds: Vec<Array2<f64>> = tests.iter().map(|test| ridge.speeds(&test.sound)).collect();
+        rows.push(row(to_poses, each(&|test| ridge.poses(&test.audio))));
+        let speeds: Vec<Array2<f64>> = tests.iter().map(|test| ridge.speeds(&test.audio)).collect();
         let speed_correlation = judge.correlation(&speeds);
-        rows.push(LearnedRow { predictor: to_speeds, speed_correlation, poses: None, places: None });
+        rows.push(LearnedRow { predictor: to_speeds, speed_correlation, poses: None, positions: None });
     }
-    rows.push(row("nearest training window by sound", each(&|test| baselines.nearest(&test.sound))));
-    rows.push(row("the data itself", each(&|test| test.sample.motion.joints.clone())));
-    rows.push(row("the rule without variation", each(&|test| test.predictable.clone())));
+    rows.push(row("nearest neighbour by audio", each(&|test| baselines.nearest(&test.audio))));
+    rows.push(row("ground truth", each(&|test| test.sample.motion.joints.clone())));
+    rows.push(row("rule without variation", each(&|test| test.predictable.clone())));
     if judge.has_words() {
-        rows.push(row("the rule without its words", each(&|test| test.without_words(fps))));
+        rows.push(row("rule without words", each(&|test| test.rule_without_words(fps))));
     }
     let n_frames: usize = tests.iter().map(|test| test.sample.n_frames()).sum();
     Ok(Learned {
         n_clips: tests.len(),
         secs: fps.secs(n_frames),
-        good: speaker.map(|speaker| if judge.has_words() { good_words(&rows, speaker) } else { good(&rows) }),
+        targets_met: speaker
+            .map(|speaker| if judge.has_words() { word_targets_met(&rows, speaker) } else { targets_met(&rows) }),
         rows,
         ridge_strengths: baselines.ridges.each_ref().map(|ridge| ridge.strengths),
         first,
@@ -168,46 +175,46 @@ pub fn measure(dataset: &Dataset, speaker: Option<&TrainedSpeaker>, progress: &d
 
 /// Whether the first row (the generator) reaches the targets relative to the second (mismatched) and the third (mean
 /// pose).
-fn good(rows: &[LearnedRow]) -> bool {
+fn targets_met(rows: &[LearnedRow]) -> bool {
     let [predicted, others @ ..] = rows else { return false };
     let Some(poses) = predicted.poses else { return false };
-    let beats = |other: &LearnedRow| other.poses.is_some_and(|other| poses.pck >= LEAST_PCK * other.pck);
-    predicted.speed_correlation.iter().all(|correlation| *correlation >= LEAST_CORRELATION)
+    let beats = |other: &LearnedRow| other.poses.is_some_and(|other| poses.pck >= MIN_PCK * other.pck);
+    predicted.speed_correlation.iter().all(|correlation| *correlation >= MIN_CORRELATION)
         && others.iter().take(2).all(beats)
         && ENERGY.contains(&poses.energy)
 }
 
 /// Whether the generator's row reaches the targets for words.
-fn good_words(rows: &[LearnedRow], speaker: &TrainedSpeaker) -> bool {
-    let Some((row, places)) = rows.first().and_then(|row| Some((row, row.places?))) else { return false };
-    let is_chance = |share: PlaceShare| (share.share() - PlaceShare::CHANCE).abs() <= MOST_FROM_CHANCE;
-    let others = rows.iter().find(|row| row.predictor == OTHER_WORDS).and_then(|row| row.places);
+fn word_targets_met(rows: &[LearnedRow], speaker: &TrainedSpeaker) -> bool {
+    let Some((row, positions)) = rows.first().and_then(|row| Some((row, row.positions?))) else { return false };
+    let is_chance = |share: PositionShare| (share.share() - PositionShare::CHANCE).abs() <= MAX_FROM_CHANCE;
+    let others = rows.iter().find(|row| row.predictor == OTHER_WORDS).and_then(|row| row.positions);
     let uses_words = match speaker.architecture() {
-        Some(Architecture::Contextual) => places.all.share() >= LEAST_PLACES,
-        Some(Architecture::Words) => places.alone.share() >= LEAST_LONE_PLACES,
-        _ => return is_chance(places.all),
+        Some(Architecture::Contextual) => positions.all.share() >= MIN_POSITIONS,
+        Some(Architecture::Words) => positions.isolated.share() >= MIN_ISOLATED_POSITIONS,
+        _ => return is_chance(positions.all),
     };
     uses_words
         && others.is_some_and(|others| is_chance(others.all))
-        && row.speed_correlation.iter().all(|correlation| *correlation >= LEAST_BEATS)
+        && row.speed_correlation.iter().all(|correlation| *correlation >= MIN_BEATS)
 }
 
 impl TestClip {
     fn new(sample: Sample) -> Result<Self> {
         let clip = (!is_by_speech(&sample)).then(|| SpokenClip::from_sample(&sample)).transpose()?;
         let predictable = clip.map_or_else(|| predictable(&sample), |clip| clip.predictable()).joints;
-        let sound = frame_log_mel(&sample.sound, sample.n_frames(), sample.motion.fps);
+        let audio = frame_log_mel(&sample.sound, sample.n_frames(), sample.motion.fps);
         let all = || Array2::from_elem((sample.n_frames().saturating_sub(1), 2), true);
-        let of_beats = clip.map_or_else(all, |clip| places::of_beats(&clip, sample.motion.fps));
-        Ok(Self { sample, clip, predictable, sound, of_beats })
+        let without_word_strokes = clip.map_or_else(all, |clip| positions::without_words(&clip, sample.motion.fps));
+        Ok(Self { sample, clip, predictable, audio, without_word_strokes })
     }
 
-    fn said(&self) -> &[Word] {
+    fn words(&self) -> &[Word] {
         self.sample.words.as_deref().unwrap_or_default()
     }
 
-    /// The rule's motion for the same sound without words.
-    fn without_words(&self, fps: FrameRate) -> Array3<f32> {
+    /// The rule's motion for the same audio without words.
+    fn rule_without_words(&self, fps: FrameRate) -> Array3<f32> {
         let of_clip = |clip: SpokenClip| {
             RuleGestures::of_habits(&clip.habits(), &clip.speech(), &[]).motion(clip.n_frames, fps).joints
         };
@@ -227,12 +234,12 @@ impl Judge<'_> {
         self.tests.iter().filter_map(|test| test.clip).any(|clip| clip.rule == RULE_OF_WORDS)
     }
 
-    fn places(&self, predicted: &[Array3<f32>]) -> WordPlaces {
-        let mut places = WordPlaces::default();
+    fn positions(&self, predicted: &[Array3<f32>]) -> WordPositions {
+        let mut positions = WordPositions::default();
         for (joints, test) in predicted.iter().zip(self.tests) {
-            test.clip.iter().for_each(|clip| places.count(clip, joints.view(), self.fps));
+            test.clip.iter().for_each(|clip| positions.count(clip, joints.view(), self.fps));
         }
-        places
+        positions
     }
 
     fn row(&self, predictor: &'static str, predicted: &[Array3<f32>]) -> LearnedRow {
@@ -245,9 +252,9 @@ impl Judge<'_> {
             correct.count(PckAxes::Xyz, predicted.view(), ground_truth.joints.view(), ground_truth.mask.view());
             energy.add(predicted.view(), ground_truth.mask.view(), self.fps);
             reference_energy.add(ground_truth.joints.view(), ground_truth.mask.view(), self.fps);
-            let held = held(test, self.fps);
-            pauses.add(predicted.view(), held.view(), self.fps);
-            reference_pauses.add(ground_truth.joints.view(), held.view(), self.fps);
+            let paused = paused(test, self.fps);
+            pauses.add(predicted.view(), paused.view(), self.fps);
+            reference_pauses.add(ground_truth.joints.view(), paused.view(), self.fps);
             let of_clip = self.error(predicted.view(), ground_truth.joints.view());
             errors = (errors.0 + of_clip.0, errors.1 + of_clip.1);
         }
@@ -262,7 +269,7 @@ impl Judge<'_> {
                 pauses: pauses.relative_to(&reference_pauses),
                 l1: errors.0 / f64::max(errors.1, 1.0),
             }),
-            places: self.has_words().then(|| self.places(predicted)),
+            positions: self.has_words().then(|| self.positions(predicted)),
         }
     }
 
@@ -270,13 +277,16 @@ impl Judge<'_> {
         let truth: Vec<Array2<f64>> =
             self.tests.iter().map(|test| wrist_speeds(test.predictable.view(), self.fps)).collect();
         std::array::from_fn(|hand| {
-            let of_beats = |parts: &[Array2<f64>]| -> Array1<f64> {
+            let without_word_strokes = |parts: &[Array2<f64>]| -> Array1<f64> {
                 let steps = parts.iter().zip(self.tests).flat_map(|(part, test)| {
-                    part.column(hand).into_iter().zip(test.of_beats.column(hand)).filter(|(_, is_beat)| **is_beat)
+                    part.column(hand)
+                        .into_iter()
+                        .zip(test.without_word_strokes.column(hand))
+                        .filter(|(_, is_beat)| **is_beat)
                 });
                 steps.map(|(speed, _)| *speed).collect()
             };
-            correlation(of_beats(speeds).view(), of_beats(&truth).view())
+            correlation(without_word_strokes(speeds).view(), without_word_strokes(&truth).view())
         })
     }
 
@@ -294,9 +304,9 @@ impl Judge<'_> {
 }
 
 /// Mask of the frames in which both wrists of the rule are slower than `STATIC_SPEED`.
-fn held(test: &TestClip, fps: FrameRate) -> Array2<bool> {
+fn paused(test: &TestClip, fps: FrameRate) -> Array2<bool> {
     let speeds = wrist_speeds(test.predictable.view(), fps);
-    let still = |t: usize| speeds.row(t.min(speeds.nrows() - 1)).iter().all(|speed| *speed < STATIC_SPEED);
+    let is_static = |t: usize| speeds.row(t.min(speeds.nrows() - 1)).iter().all(|speed| *speed < STATIC_SPEED);
     let mask = &test.sample.motion.mask;
-    Array2::from_shape_fn(mask.dim(), |(t, joint)| mask[[t, joint]] && still(t.saturating_sub(1)) && still(t))
+    Array2::from_shape_fn(mask.dim(), |(t, joint)| mask[[t, joint]] && is_static(t.saturating_sub(1)) && is_static(t))
 }

@@ -2,7 +2,7 @@
 
 pub mod learned;
 pub mod pipeline;
-pub mod places;
+pub mod positions;
 pub mod sheet;
 pub mod traces;
 pub mod truth;

@@ -19,21 +19,21 @@ use std::path::{Path, PathBuf};
 
 /// Version of the drawn speaker that the numbers below belong to. Version 2 corrected the figure's posture; the lifter's
 /// training was changed once after its error on this figure was known, so that error is no blind test.
-pub const GENERATOR: &str = "synthetic speaker, version 2; the lifter's training was changed once after its error here was seen (models/body_lifter.md)";
+pub const GENERATOR: &str = "synthetic speaker, version 2 (not a blind test: models/body_lifter.md)";
 
 /// Largest accepted median keypoint error and mean joint error.
-pub const MOST_PX: f64 = 2.0;
-pub const MOST_MM: f64 = 80.0;
+pub const MAX_PX: f64 = 2.0;
+pub const MAX_MM: f64 = 80.0;
 /// Targets for a rendered person and models of real persons, which define shoulders and elbows differently: largest
 /// median of keypoint errors as a share of the shoulder width, largest mean joint error, smallest share of detected
 /// points.
-const MOST_OF_SHOULDERS: f64 = 0.1;
-const MOST_MM_OF_REAL_MODELS: f64 = 120.0;
-const LEAST_FOUND_BY_REAL_MODELS: f64 = 0.85;
+const MAX_OF_SHOULDERS: f64 = 0.1;
+const MAX_MM_OF_REAL_MODELS: f64 = 120.0;
+const MIN_FOUND_BY_REAL_MODELS: f64 = 0.85;
 /// Smallest share of detected points, of video frames in the dataset, and of joints with finite values.
-pub const LEAST_FOUND: f64 = 0.95;
-pub const LEAST_FRAMES: f64 = 0.5;
-pub const LEAST_JOINTS: f64 = 0.95;
+pub const MIN_FOUND: f64 = 0.95;
+pub const MIN_FRAMES: f64 = 0.5;
+pub const MIN_JOINTS: f64 = 0.95;
 /// Frames scaled by one factor.
 const SEGMENT: usize = 60;
 /// Sum of shoulder width, upper arm and forearm after scaling, metres.
@@ -70,7 +70,7 @@ pub struct PipelineCheck {
     pub n_drawn: usize,
     /// Seconds of training data from the videos, and from `demo draw --speech` if present.
     pub train_secs: f64,
-    pub more_secs: Option<f64>,
+    pub speech_secs: Option<f64>,
     /// Share of the dataset's joints with finite values, 0..1; distances are measured on these only.
     pub joints: f64,
     pub lifted: Millimetres,
@@ -86,21 +86,21 @@ pub struct PipelineCheck {
 
 impl PipelineCheck {
     /// Whether every target is met.
-    pub fn good(&self) -> bool {
+    pub fn meets_targets(&self) -> bool {
         let targets = self.targets();
-        let px = |pixels: &Pixels| pixels.median <= targets.most_px && pixels.found >= targets.least_found;
-        let enough = self.n_frames > 0 && self.n_frames as f64 >= LEAST_FRAMES * self.n_drawn as f64;
-        px(&self.body) && px(&self.hands) && enough && self.joints >= LEAST_JOINTS && self.lifted.all <= targets.most_mm
+        let px = |pixels: &Pixels| pixels.median <= targets.max_px && pixels.found >= targets.min_found;
+        let enough = self.n_frames > 0 && self.n_frames as f64 >= MIN_FRAMES * self.n_drawn as f64;
+        px(&self.body) && px(&self.hands) && enough && self.joints >= MIN_JOINTS && self.lifted.all <= targets.max_mm
     }
 
     /// Targets for the kind of speaker in the videos.
     pub fn targets(&self) -> Targets {
         match self.shoulders_px {
-            None => Targets { most_px: MOST_PX, most_mm: MOST_MM, least_found: LEAST_FOUND },
+            None => Targets { max_px: MAX_PX, max_mm: MAX_MM, min_found: MIN_FOUND },
             Some(shoulders) => Targets {
-                most_px: MOST_OF_SHOULDERS * shoulders,
-                most_mm: MOST_MM_OF_REAL_MODELS,
-                least_found: LEAST_FOUND_BY_REAL_MODELS,
+                max_px: MAX_OF_SHOULDERS * shoulders,
+                max_mm: MAX_MM_OF_REAL_MODELS,
+                min_found: MIN_FOUND_BY_REAL_MODELS,
             },
         }
     }
@@ -110,11 +110,11 @@ impl PipelineCheck {
 #[derive(Clone, Copy, Debug)]
 pub struct Targets {
     /// Largest medians of keypoints, px.
-    pub most_px: f64,
+    pub max_px: f64,
     /// Largest mean error of joints, mm.
-    pub most_mm: f64,
+    pub max_mm: f64,
     /// Smallest share of detected points, 0..1.
-    pub least_found: f64,
+    pub min_found: f64,
 }
 
 /// Compares the keypoints and the dataset of the run in `dir` with `dir/truth`.
@@ -126,14 +126,18 @@ pub fn measure(dir: &Path) -> Result<PipelineCheck> {
     let (mut lifted, mut true_joints) = (Vec::new(), Vec::new());
     let dataset = Dataset::open(speaker_dir(&dir.join("work"), StageName::Dataset, "host"))?;
     measured.train_secs = train_secs(&dataset);
-    let more = dir.join("speech");
-    if more.is_dir() {
-        measured.more_secs = Some(train_secs(&Dataset::open(more)?));
+    let speech = dir.join("speech");
+    if speech.is_dir() {
+        measured.speech_secs = Some(train_secs(&Dataset::open(speech)?));
     }
     for sample in Split::ALL.into_iter().flat_map(|split| dataset.samples(split)) {
         let sample = dataset.read(&sample)?;
-        let (video, first) = sample.key.rsplit_once('-').with_context(|| format!("odd key {}", sample.key))?;
-        let first: usize = first.parse().with_context(|| format!("odd key {}", sample.key))?;
+        let (video, first) = sample
+            .key
+            .rsplit_once('-')
+            .with_context(|| format!("invalid sample key `{}`: expected NAME-FRAME", sample.key))?;
+        let first: usize =
+            first.parse().with_context(|| format!("invalid sample key `{}`: expected NAME-FRAME", sample.key))?;
         let truth = truth_of(dir, video)?.drawn;
         let n_frames = sample.n_frames().min(truth.motion.n_frames().saturating_sub(first));
         for start in (0..n_frames).step_by(SEGMENT) {
@@ -145,14 +149,14 @@ pub fn measure(dir: &Path) -> Result<PipelineCheck> {
         }
         measured.n_frames += n_frames;
     }
-    ensure!(measured.n_frames > 0, "{} holds no frame to compare", dataset.dir().display());
+    ensure!(measured.n_frames > 0, "the dataset {} has no frame with ground truth", dataset.dir().display());
     let joined = |parts: &[Array3<f32>]| {
         ndarray::concatenate(Axis(0), &parts.iter().map(|part| part.view()).collect::<Vec<_>>())
-            .context("joining segments")
+            .context("cannot concatenate the segments")
     };
     let (lifted, truth) = (joined(&lifted)?, joined(&true_joints)?);
-    let mean: Array2<f32> = truth.mean_axis(Axis(0)).context("no frame")?;
-    let always = mean.broadcast(truth.raw_dim()).context("mean pose")?.to_owned();
+    let mean: Array2<f32> = truth.mean_axis(Axis(0)).context("the dataset has no frame")?;
+    let always = mean.broadcast(truth.raw_dim()).context("cannot broadcast the mean pose")?.to_owned();
     let mut flat = truth.clone();
     flat.slice_mut(s![.., .., 2]).assign(&always.slice(s![.., .., 2]));
     let finite = lifted.iter().filter(|v| v.is_finite()).count();
@@ -213,13 +217,13 @@ struct Distances {
 impl Distances {
     /// Compares `seen` [T, n, 3] (x, y, score) with `truth` [T, n, 2] over the frames that both have; points that are
     /// not visible (NaN) are ignored.
-    fn compare(&mut self, seen: ArrayView3<f32>, truth: ArrayView3<f32>, least_score: f32) {
+    fn compare(&mut self, seen: ArrayView3<f32>, truth: ArrayView3<f32>, min_score: f32) {
         for (seen, truth) in seen.outer_iter().zip(truth.outer_iter()) {
-            let visible = |(_, place): &(_, ndarray::ArrayView1<f32>)| place[0].is_finite();
-            for (point, place) in seen.outer_iter().zip(truth.outer_iter()).filter(visible) {
+            let visible = |(_, position): &(_, ndarray::ArrayView1<f32>)| position[0].is_finite();
+            for (point, position) in seen.outer_iter().zip(truth.outer_iter()).filter(visible) {
                 self.n_points += 1;
-                if point[2] > least_score {
-                    self.px.push(f64::from((point[0] - place[0]).hypot(point[1] - place[1])));
+                if point[2] > min_score {
+                    self.px.push(f64::from((point[0] - position[0]).hypot(point[1] - position[1])));
                 }
             }
         }
@@ -322,7 +326,7 @@ mod tests {
     }
 
     #[test]
-    fn a_run_that_found_little_is_not_good() {
+    fn a_run_that_detected_little_misses_the_targets() {
         let pixels = Pixels { median: 0.3, p90: 1.0, found: 1.0 };
         let mm = Millimetres { all: 40.0, ..Millimetres::default() };
         let good = PipelineCheck {
@@ -335,11 +339,15 @@ mod tests {
             ..PipelineCheck::default()
         };
         let few = Pixels { found: 0.05, ..pixels };
-        assert!(good.good());
+        assert!(good.meets_targets());
         assert!(
-            !PipelineCheck { body: few, ..good.clone() }.good() && !PipelineCheck { hands: few, ..good.clone() }.good()
+            !PipelineCheck { body: few, ..good.clone() }.meets_targets()
+                && !PipelineCheck { hands: few, ..good.clone() }.meets_targets()
         );
-        assert!(!PipelineCheck { n_frames: 1, ..good.clone() }.good() && !PipelineCheck { joints: 0.1, ..good }.good());
+        assert!(
+            !PipelineCheck { n_frames: 1, ..good.clone() }.meets_targets()
+                && !PipelineCheck { joints: 0.1, ..good }.meets_targets()
+        );
     }
 
     #[test]

@@ -19,8 +19,7 @@ use std::path::Path;
 const CELL: [usize; 2] = [320, 240];
 const HEAD_PX: usize = 40;
 const N_ROWS: usize = 3;
-const COLUMNS: [&str; 5] =
-    ["video", "2D keypoints", "3D, from the front", "3D, from the left", "generated from speech"];
+const COLUMNS: [&str; 5] = ["video", "2D keypoints", "3D, front", "3D, left", "generated motion"];
 
 /// Draws the sheet of the video `unit` of a run in the folder `work`, with `generated` motion if given.
 ///
@@ -31,7 +30,7 @@ pub fn draw_sheet(work: &Path, unit: &Unit, generated: Option<&Motion>) -> Resul
     let lifted = Artifact::Joints.path(work, unit);
     let motion = joints_npz::read(&lifted)?;
     let moments = moments(&motion);
-    ensure!(!moments.is_empty(), "{} has no frame with a pose", lifted.display());
+    ensure!(!moments.is_empty(), "no frame of {} has a complete pose", lifted.display());
     let width = COLUMNS.len() * CELL[0];
     let mut sheet = Image::filled(width, HEAD_PX + N_ROWS * CELL[1], PAPER);
     for (column, words) in COLUMNS.iter().enumerate() {
@@ -70,9 +69,9 @@ pub fn draw_sheet(work: &Path, unit: &Unit, generated: Option<&Motion>) -> Resul
 
 /// Frames spread evenly over those with a complete pose.
 fn moments(motion: &Motion) -> Vec<usize> {
-    let whole = |frame: &ArrayView2<f32>| frame.iter().all(|v| v.is_finite());
+    let is_complete = |frame: &ArrayView2<f32>| frame.iter().all(|v| v.is_finite());
     let frames: Vec<usize> =
-        motion.joints.outer_iter().enumerate().filter(|(_, frame)| whole(frame)).map(|(n, _)| n).collect();
+        motion.joints.outer_iter().enumerate().filter(|(_, frame)| is_complete(frame)).map(|(n, _)| n).collect();
     let mut moments: Vec<usize> =
         (0..N_ROWS).filter_map(|k| frames.get((2 * k + 1) * frames.len() / (2 * N_ROWS)).copied()).collect();
     moments.dedup();
@@ -81,7 +80,7 @@ fn moments(motion: &Motion) -> Vec<usize> {
 
 fn small(image: &Image) -> Result<Image> {
     let mut cell = Image::filled(CELL[0], CELL[1], PAPER);
-    warp::resize(image, &mut cell).context("shrinking a frame")?;
+    warp::resize(image, &mut cell).context("cannot scale a frame")?;
     Ok(cell)
 }
 

@@ -49,9 +49,9 @@ pub fn picture(clip: &TraceClip, fps: FrameRate) -> Result<Image> {
         draw::text(&mut image, name, [4.0, floor - 150.0], 9.0, colour)?;
         draw::text(&mut image, "0..2.5 m/s", [4.0, floor - 130.0], 8.0, INK)?;
     }
-    let words = "black: the rule   grey: the speaker (rule and variation)   coloured: made for the sound";
+    let words = "black: rule   grey: speaker (rule and variation)   coloured: model";
     draw::text(&mut image, words, [MARGIN_PX, 16.0], 9.0, INK)?;
-    for (row, (joints, name)) in [(&clip.data, "speaker"), (&clip.predicted, "made")].into_iter().enumerate() {
+    for (row, (joints, name)) in [(&clip.data, "speaker"), (&clip.predicted, "model")].into_iter().enumerate() {
         let top = 2.0 * LANE_PX + row as f32 * POSES_PX;
         draw::text(&mut image, name, [4.0, top + 80.0], 9.0, INK)?;
         for pose in 0..N_POSES {

@@ -33,14 +33,18 @@ impl DemoTruth {
         if !Npz::open(path)?.has(BODY_JOINTS) {
             let drawn = DrawnTruth::read(path)?;
             let fps = drawn.motion.fps;
-            ensure!(fps == DATASET_FPS, "{} is at {fps} frames a second, not at {DATASET_FPS}", path.display());
+            ensure!(
+                fps == DATASET_FPS,
+                "invalid frame rate of {}: expected {DATASET_FPS}, found {fps}",
+                path.display()
+            );
             return Ok(Self { drawn, shoulders_px: None });
         }
         let truth = RenderedTruth::read(path)?;
         let step = truth.fps.per_sec() / DATASET_FPS.per_sec();
         ensure!(
             step >= 1.0 && step.fract() == 0.0,
-            "{} is at {} frames a second, no multiple of {DATASET_FPS}; draw the demo with --fps 15 or 30",
+            "invalid frame rate of {}: expected a multiple of {DATASET_FPS}, found {}; draw the demo with `--fps 30`",
             path.display(),
             truth.fps
         );
@@ -52,7 +56,7 @@ impl DemoTruth {
         let visible = |px: &Array3<f32>, seen: &Array2<Visibility>| {
             let (mut px, seen) = (px.select(Axis(0), &frames), seen.select(Axis(0), &frames));
             for ((t, point), seen) in seen.indexed_iter() {
-                if *seen != Visibility::Seen {
+                if *seen != Visibility::Visible {
                     px.slice_mut(s![t, point, ..]).fill(f32::NAN);
                 }
             }
@@ -60,17 +64,17 @@ impl DemoTruth {
         };
         let joints = truth.joints.select(Axis(0), &frames);
         let shoulders = frames.iter().zip(joints.outer_iter()).map(|(&t, frame)| {
-            let apart = |k: usize| (frame[[L_SHOULDER, k]] - frame[[R_SHOULDER, k]]).powi(2);
-            let metres = (0..3).map(apart).sum::<f32>().sqrt();
+            let squared = |k: usize| (frame[[L_SHOULDER, k]] - frame[[R_SHOULDER, k]]).powi(2);
+            let metres = (0..3).map(squared).sum::<f32>().sqrt();
             f64::from(truth.focal_px * metres / truth.neck[[t, 2]].max(0.05))
         });
         let shoulders_px = median(shoulders);
-        let body = visible(&truth.body, &truth.body_seen).slice(s![.., ..N_BODY, ..]).to_owned();
+        let body = visible(&truth.body, &truth.body_visibility).slice(s![.., ..N_BODY, ..]).to_owned();
         let drawn = DrawnTruth {
             motion: Motion::from_joints(DATASET_FPS, joints),
             body,
-            left_hand: visible(&truth.left_hand, &truth.left_hand_seen),
-            right_hand: visible(&truth.right_hand, &truth.right_hand_seen),
+            left_hand: visible(&truth.left_hand, &truth.left_hand_visibility),
+            right_hand: visible(&truth.right_hand, &truth.right_hand_visibility),
         };
         Self { drawn, shoulders_px }
     }

@@ -8,7 +8,7 @@ use super::motion::{ActorMotion, LeanStyle};
 use super::trunk::SeatedRig;
 use super::vocabulary::{DESK_AHEAD, DESK_BELOW_NECK};
 use super::voice::Voice;
-use crate::demo::looks;
+use crate::demo::appearance;
 use orator_avatar::animate::avatar::Avatar;
 use orator_avatar::animate::rig::rig::{CM, Rig};
 use orator_avatar::animate::{AnimationOptions, Constraints, Smoothing, Yaw, perform};
@@ -38,7 +38,7 @@ pub struct ActorRole {
     /// Whether the person leans over the desk (a sampled `LeanStyle`).
     pub leans: bool,
     /// Position on the floor (x, z), cm, and rotation to the person's left, radians.
-    pub place: [f64; 2],
+    pub position: [f64; 2],
     pub turn: f64,
     pub speaks: bool,
 }
@@ -47,7 +47,7 @@ pub struct ActorRole {
 pub struct Actor {
     pub rig: Rig,
     pub avatar: Avatar,
-    /// Points of the face (`looks::face`), cm, in the axes of the head joint.
+    /// Points of the face (`appearance::face`), cm, in the axes of the head joint.
     pub face: [Vec3; 5],
     pub held: Option<HeldObject>,
     pub poses: Vec<ActorPose>,
@@ -117,7 +117,7 @@ impl Actor {
         let rig = performed.rig;
         let seated = SeatedRig { rig: &rig, seat: role.seat, knees, shins };
         let turn = Rotation::about([0.0, 1.0, 0.0], role.turn);
-        let shift = [role.place[0], 0.0, role.place[1]];
+        let shift = [role.position[0], 0.0, role.position[1]];
         let last = performed.clip.n_frames().saturating_sub(1);
         let poses = (0..n_steps)
             .map(|step| {
@@ -135,8 +135,8 @@ impl Actor {
         let neck = add(turn.turn(seated.torso(&upright).neck), shift);
         let hips = add(turn.turn(seated.root(&upright)), shift);
         let unit = rig.skeleton.joints[rig.spine].offset[1] / 10.0;
-        let looks = looks::random(seeds.clothes);
-        let (avatar, face) = (Avatar::new(&rig, &looks), looks::face(&rig, &looks));
+        let appearance = appearance::random(seeds.clothes);
+        let (avatar, face) = (Avatar::new(&rig, &appearance), appearance::face(&rig, &appearance));
         let desk_ahead = DESK_AHEAD + actor_motion.lean_style.desk_ahead();
         Self { rig, avatar, face, held, poses, role, unit, neck, hips, desk_ahead }
     }
@@ -159,7 +159,7 @@ impl Actor {
     }
 }
 
-/// Surfaces below the hands of a seated body, before the body is moved to its place.
+/// Surfaces below the hands of a seated body, before the body is moved to its position.
 fn obstacles(seated: &SeatedRig, build: &Build, lean_style: LeanStyle, front: usize) -> Obstacles {
     let unit = build.unit();
     let (upright, mut slabs) = (Default::default(), Vec::new());
@@ -170,13 +170,13 @@ fn obstacles(seated: &SeatedRig, build: &Build, lean_style: LeanStyle, front: us
             top: hips[1] + 4.0 * unit,
             x: [-half, half],
             z: [8.0 * unit, 46.0 * unit],
-            beneath: f64::INFINITY,
+            below: f64::INFINITY,
         });
     }
     if seated.seat == Seat::Desk {
         let top = seated.torso(&upright).neck[1] - DESK_BELOW_NECK * CM * unit;
         let near = (DESK_AHEAD + lean_style.desk_ahead()) * CM * unit;
-        slabs.push(Slab { top, x: [-90.0, 90.0], z: [near, 120.0], beneath: DESK_BELOW_NECK + 0.03 });
+        slabs.push(Slab { top, x: [-90.0, 90.0], z: [near, 120.0], below: DESK_BELOW_NECK + 0.03 });
     }
     Obstacles { slabs, lean_style, front }
 }

@@ -38,7 +38,7 @@ pub enum Condition {
     /// Portrait format.
     Portrait,
     /// A second, silent person that gestures too.
-    TwoPeople,
+    TwoPersons,
     /// Seated behind a desk, trunk leaning forwards, head bowed, elbows and hands further forwards.
     LeaningDesk,
 }
@@ -62,7 +62,7 @@ impl Condition {
         Self::Small,
         Self::Compressed,
         Self::Portrait,
-        Self::TwoPeople,
+        Self::TwoPersons,
         Self::LeaningDesk,
     ];
 
@@ -85,7 +85,7 @@ impl Condition {
             Self::Small => "small",
             Self::Compressed => "compressed",
             Self::Portrait => "portrait",
-            Self::TwoPeople => "two-people",
+            Self::TwoPersons => "two-people",
             Self::LeaningDesk => "leaning-desk",
         }
     }
@@ -98,7 +98,7 @@ impl Condition {
         for name in names {
             if !Self::ALL.iter().any(|condition| condition.name() == name) {
                 let known: Vec<&str> = Self::ALL.iter().map(|condition| condition.name()).collect();
-                bail!("`{name}` is no condition; conditions are {}", known.join(", "));
+                bail!("unknown condition `{name}`: expected one of {}", known.join(", "));
             }
         }
         let named = |condition: &Self| names.is_empty() || names.iter().any(|name| name == condition.name());
@@ -161,7 +161,7 @@ impl Condition {
                 fov_degrees: [28.0, 42.0],
                 ..half
             },
-            Self::TwoPeople => Framing { yaw_degrees: [0.0, 15.0], below_neck: [0.6, 0.8], ..half },
+            Self::TwoPersons => Framing { yaw_degrees: [0.0, 15.0], below_neck: [0.6, 0.8], ..half },
             _ => half,
         }
     }
@@ -191,7 +191,7 @@ pub enum GestureStyle {
 /// Ranges of the camera framing; lengths in units of the body (`Build::unit`).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Framing {
-    /// Least and greatest angle from the body's front.
+    /// Smallest and largest angle from the body's front.
     pub yaw_degrees: [f64; 2],
     /// Distance of the lower image border below the neck.
     pub below_neck: [f64; 2],

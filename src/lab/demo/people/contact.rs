@@ -4,7 +4,7 @@
 use super::body;
 use super::body::{ArmPosture, Build, SIDES};
 use super::motion::LeanStyle;
-use super::trunk::TorsoPlace;
+use super::trunk::TorsoPosition;
 use orator_base::math::vec3::{Vec3, add, norm, scale, sub};
 use orator_base::types::skeleton::{L_HAND, N_HAND_JOINTS, N_JOINTS, R_HAND};
 
@@ -12,9 +12,9 @@ use orator_base::types::skeleton::{L_HAND, N_HAND_JOINTS, N_JOINTS, R_HAND};
 /// 1.
 const TRUNK: [f64; 2] = [0.165, 0.14];
 const TRUNK_END: f64 = 0.56;
-/// Greatest depth in cm from which a point below a surface is lifted onto it.
+/// Largest depth in cm from which a point below a surface is lifted onto it.
 const MAX_DEPTH: f64 = 25.0;
-/// Least distance overlap joints of the two hands, metres.
+/// Smallest distance between joints of the two hands, metres.
 const MIN_HAND_DISTANCE: f64 = 0.024;
 const ROUNDS: usize = 4;
 
@@ -26,7 +26,7 @@ pub struct Slab {
     pub z: [f64; 2],
     /// A hand whose planned wrist position is at least this far below the neck belongs under the surface, metres of a
     /// body of unit 1.
-    pub beneath: f64,
+    pub below: f64,
 }
 
 /// Obstacles of a person's hands.
@@ -50,7 +50,7 @@ fn thickness(joint: usize) -> f64 {
 
 impl Obstacles {
     /// Joints of the arms in the torso's axes, metres, after resolving contacts.
-    pub fn resolve(&self, build: &Build, arms: &[ArmPosture; 2], torso: &TorsoPlace) -> [Vec3; N_JOINTS] {
+    pub fn resolve(&self, build: &Build, arms: &[ArmPosture; 2], torso: &TorsoPosition) -> [Vec3; N_JOINTS] {
         let unit = build.unit();
         let mut wrists = arms.each_ref().map(|posture| scale(self.lean_style.wrist(posture.wrist), unit));
         let mut joints = body::joints(build, arms, wrists);
@@ -78,10 +78,10 @@ impl Obstacles {
 
     /// Displacement in metres (torso axes) that lifts a hand onto the surfaces; `below` is the planned distance of its
     /// wrist below the neck.
-    fn onto_slabs(&self, below: f64, (hand, forearm): (&[Vec3], Vec3), torso: &TorsoPlace) -> Vec3 {
+    fn onto_slabs(&self, below: f64, (hand, forearm): (&[Vec3], Vec3), torso: &TorsoPosition) -> Vec3 {
         let joints = hand.iter().enumerate().map(|(joint, &at)| (torso.world(at), thickness(joint)));
         let points: Vec<(Vec3, f64)> = joints.chain([(torso.world(forearm), 3.5)]).collect();
-        let lift = self.slabs.iter().filter(|slab| below < slab.beneath).flat_map(|slab| {
+        let lift = self.slabs.iter().filter(|slab| below < slab.below).flat_map(|slab| {
             points.iter().map(move |([x, y, z], thick)| {
                 let over = (slab.x[0]..slab.x[1]).contains(x) && (slab.z[0]..slab.z[1]).contains(z);
                 let lift = slab.top + thick - y;
@@ -108,13 +108,13 @@ fn out_of_trunk(hand: &[Vec3], unit: f64) -> Vec3 {
 /// Penetration depth of the two hands, metres.
 fn hand_overlap(joints: &[Vec3; N_JOINTS]) -> f64 {
     let hand = |root: usize| &joints[root..root + N_HAND_JOINTS];
-    let mut least = f64::INFINITY;
+    let mut min_distance = f64::INFINITY;
     for a in hand(L_HAND) {
         for b in hand(R_HAND) {
-            least = least.min(norm(sub(*a, *b)));
+            min_distance = min_distance.min(norm(sub(*a, *b)));
         }
     }
-    (MIN_HAND_DISTANCE - least).max(0.0)
+    (MIN_HAND_DISTANCE - min_distance).max(0.0)
 }
 
 #[cfg(test)]
@@ -131,7 +131,7 @@ mod tests {
         let rig = build.rig();
         let seated = SeatedRig { rig: &rig, seat: Seat::Desk, knees: 0.1, shins: 0.1 };
         let torso = seated.torso(&TrunkPosture::default());
-        let slab = Slab { top: torso.neck[1] - 36.0, x: [-60.0, 60.0], z: [26.0, 90.0], beneath: 0.5 };
+        let slab = Slab { top: torso.neck[1] - 36.0, x: [-60.0, 60.0], z: [26.0, 90.0], below: 0.5 };
         let low = ArmPosture {
             wrist: [0.12, 0.42, -0.36],
             elbow: 0.3,

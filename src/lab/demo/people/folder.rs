@@ -2,7 +2,7 @@
 //! `orator run` with the models for real persons.
 
 use super::condition::Condition;
-use super::scene::{CapturedClip, PeopleScene};
+use super::scene::{CapturedClip, PersonScene};
 
 pub use super::scene::ClipSeeds;
 use crate::rendered_truth::LIST;
@@ -35,7 +35,7 @@ impl SetPart {
 
 /// A clip of a set; paths are relative to the set's folder.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct PeopleClip {
+pub struct PersonClip {
     pub video: PathBuf,
     pub truth: PathBuf,
     /// Name of the condition.
@@ -55,7 +55,7 @@ pub struct PeopleClip {
 
 /// Rendering plan.
 #[derive(Clone, Debug)]
-pub struct PeoplePlan {
+pub struct RenderPlan {
     pub conditions: Vec<Condition>,
     /// Number of clips per condition, a multiple of 3.
     pub n_clips: usize,
@@ -68,9 +68,9 @@ pub struct PeoplePlan {
     pub truth_only: bool,
 }
 
-const PIPELINE: &str = r#"# Rendered people of `orator-lab demo draw --people`: one speaker for each condition, seen by the models for real people.
+const PIPELINE: &str = r#"# Rendered people of `orator-lab demo draw --people`: one speaker per condition.
 [segment]
-speech = "loudness"                # its speech is made of tones, which the speech model rightly takes for none
+speech = "loudness"                # the speech consists of tones, which the speech model does not classify as speech
 "#;
 
 const SPEAKER: &str = r#"
@@ -87,10 +87,10 @@ source = "rendered by orator demo"
 ///
 /// # Errors
 /// An invalid plan; captured motion that cannot be read; a failure to render or to write.
-pub fn draw(dir: &Path, plan: &PeoplePlan, progress: &dyn Progress) -> Result<Vec<PeopleClip>> {
+pub fn draw(dir: &Path, plan: &RenderPlan, progress: &dyn Progress) -> Result<Vec<PersonClip>> {
     let n = plan.n_clips;
-    ensure!(n > 0 && n.is_multiple_of(3), "--people takes 3, 6, 9 ... clips for each condition, not {n}");
-    ensure!((1.0..=600.0).contains(&plan.secs), "a clip of a person lasts 1 to 600 seconds, not {}", plan.secs);
+    ensure!(n > 0 && n.is_multiple_of(3), "invalid --people {n}: expected a positive multiple of 3");
+    ensure!((1.0..=600.0).contains(&plan.secs), "invalid --secs {}: expected 1 to 600", plan.secs);
     let motions = plan.motion.as_deref().map(motions).transpose()?.unwrap_or_default();
     let (mut clips, mut configuration) = (Vec::new(), PIPELINE.to_owned());
     for &condition in &plan.conditions {
@@ -102,7 +102,7 @@ pub fn draw(dir: &Path, plan: &PeoplePlan, progress: &dyn Progress) -> Result<Ve
             let motion = (!motions.is_empty()).then(|| motions[clips.len() % motions.len()].clone());
             let captured = motion.as_deref().map(captured).transpose()?;
             let secs = captured.as_ref().map_or(plan.secs, |clip| plan.secs.min(secs_of(&clip.motion)));
-            let scene = PeopleScene::new(condition, seeds, secs, plan.fps, captured.as_ref());
+            let scene = PersonScene::new(condition, seeds, secs, plan.fps, captured.as_ref());
             let stem = format!("{name}-{}", number + 1);
             let video = PathBuf::from(format!("videos/{name}/{stem}.mp4"));
             let truth = PathBuf::from(format!("truth/{name}/{stem}.npz"));
@@ -113,9 +113,9 @@ pub fn draw(dir: &Path, plan: &PeoplePlan, progress: &dyn Progress) -> Result<Ve
                     Ok(())
                 })?;
             }
-            known.context("a rendered clip has no truth")?.write(&dir.join(&truth))?;
+            known.context("the rendered clip has no ground truth")?.write(&dir.join(&truth))?;
             files[3 * number / n].push(format!("\"{stem}.mp4\""));
-            clips.push(PeopleClip {
+            clips.push(PersonClip {
                 video,
                 truth,
                 condition: name.to_owned(),
@@ -141,12 +141,16 @@ pub fn draw(dir: &Path, plan: &PeoplePlan, progress: &dyn Progress) -> Result<Ve
 ///
 /// # Errors
 /// A list that is missing or invalid.
-pub fn read(dir: &Path) -> Result<Vec<PeopleClip>> {
+pub fn read(dir: &Path) -> Result<Vec<PersonClip>> {
     let path = dir.join(LIST);
     let text = std::fs::read_to_string(&path).with_context(|| {
-        format!("{} cannot be read; `orator-lab demo draw {} --people 3` writes it", path.display(), dir.display())
+        format!(
+            "cannot read {}: expected the list that `orator-lab demo draw {} --people N` writes",
+            path.display(),
+            dir.display()
+        )
     })?;
-    serde_json::from_str(&text).with_context(|| format!("{} is no list of rendered people", path.display()))
+    serde_json::from_str(&text).with_context(|| format!("invalid list of rendered clips {}", path.display()))
 }
 
 /// Seeds of a clip. The three parts use disjoint ranges, so that no body, camera, clothes or motion occurs in two
@@ -164,12 +168,12 @@ fn motions(path: &Path) -> Result<Vec<PathBuf>> {
     if !path.is_dir() {
         return Ok(vec![path.to_owned()]);
     }
-    let entries = std::fs::read_dir(path).with_context(|| format!("{} cannot be read", path.display()))?;
+    let entries = std::fs::read_dir(path).with_context(|| format!("cannot read the folder {}", path.display()))?;
     let mut files = entries.map(|entry| Ok(entry?.path())).collect::<Result<Vec<_>>>()?;
     files.retain(|file| file.is_file() && motion_file::has_ending(file));
     files.sort();
     if files.is_empty() {
-        bail!("{} holds no motion: expected files ending in {}", path.display(), motion_file::ENDINGS.join(", "));
+        bail!("no motion in {}: expected files that end in {}", path.display(), motion_file::ENDINGS.join(", "));
     }
     Ok(files)
 }
@@ -181,9 +185,9 @@ fn secs_of(motion: &Motion) -> f64 {
 fn captured(path: &Path) -> Result<CapturedClip> {
     let motion = motion_file::read(path, None)?.motion;
     units::check(&motion).with_context(|| path.display().to_string())?;
-    ensure!(secs_of(&motion) >= 1.0, "{} lasts less than a second", path.display());
-    let beside = path.with_extension("wav");
-    let sound = beside.is_file().then(|| read_sound(&beside)).transpose()?;
+    ensure!(secs_of(&motion) >= 1.0, "the motion {} is too short: expected at least 1 s", path.display());
+    let audio = path.with_extension("wav");
+    let sound = audio.is_file().then(|| read_sound(&audio)).transpose()?;
     Ok(CapturedClip { motion, sound })
 }
 

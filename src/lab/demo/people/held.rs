@@ -57,7 +57,7 @@ impl HeldObject {
     /// Mesh of the object in the hand of a pose, world cm.
     pub fn posed(&self, rig: &Rig, root: Vec3, local: &[Rotation]) -> Mesh {
         let hand = rig.arms[self.side].hand;
-        let (turns, places) = (rig.skeleton.world(local), rig.skeleton.positions(root, local));
-        solid::placed(&self.mesh, turns[hand], places[hand])
+        let (turns, positions) = (rig.skeleton.world(local), rig.skeleton.positions(root, local));
+        solid::placed(&self.mesh, turns[hand], positions[hand])
     }
 }

@@ -52,8 +52,8 @@ fn linear(image: &Image) -> impl Iterator<Item = [f32; 4]> {
 
 /// Gaussian blur in linear light, in two passes over rows and columns.
 fn blur(image: &mut Image, sigma: f64) {
-    let reach = (3.0 * sigma).ceil() as usize;
-    let raw: Vec<f64> = (0..=reach).map(|k| exp_neg(0.5 * (k as f64 / sigma) * (k as f64 / sigma))).collect();
+    let radius = (3.0 * sigma).ceil() as usize;
+    let raw: Vec<f64> = (0..=radius).map(|k| exp_neg(0.5 * (k as f64 / sigma) * (k as f64 / sigma))).collect();
     let sum = raw[0] + 2.0 * raw[1..].iter().sum::<f64>();
     let weights: Vec<f32> = raw.iter().map(|w| (w / sum) as f32).collect();
     let (width, height) = (image.width, image.height);
@@ -62,7 +62,7 @@ fn blur(image: &mut Image, sigma: f64) {
             .map(|at| {
                 let here = along(at);
                 let mut sum = values[at].map(|v| weights[0] * v);
-                for k in 1..=reach {
+                for k in 1..=radius {
                     let back = values[at - step * k.min(here)];
                     let ahead = values[at + step * k.min(n - 1 - here)];
                     (0..3).for_each(|c| sum[c] += weights[k] * (back[c] + ahead[c]));
@@ -109,8 +109,8 @@ mod tests {
         image.data[3 * (15 * 40 + 20)..][..3].fill(255);
         let blurred = CameraDefects { blur_px: 1.5, ..CameraDefects::default() }.apply(image.clone(), 0);
         let light: Vec<f32> = linear(&blurred).map(|light| light[1]).collect();
-        let (sum, most) = (light.iter().sum::<f32>(), light.iter().copied().fold(0.0, f32::max));
-        assert!((sum - 1.0).abs() < 0.03 && (most - 0.071).abs() < 0.002, "{sum} {most}");
+        let (sum, max) = (light.iter().sum::<f32>(), light.iter().copied().fold(0.0, f32::max));
+        assert!((sum - 1.0).abs() < 0.03 && (max - 0.071).abs() < 0.002, "{sum} {max}");
         for (x, known) in [(0.0, 1.0), (1.0, 0.367_879_441_171_442_3), (8.0, 3.354_626_279_025_118e-4)] {
             assert!((exp_neg(x) / known - 1.0).abs() < 1e-8);
         }

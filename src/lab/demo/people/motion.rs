@@ -173,8 +173,8 @@ impl ActorMotion {
         let mut beats = Vec::new();
         let stroke_probability =
             if gesture_style == GestureStyle::Folded || gesture_style == GestureStyle::Crossing { 0.3 } else { 0.75 };
-        let said = &speech.syllables;
-        for (k, syllable) in said.iter().enumerate() {
+        let syllables = &speech.syllables;
+        for (k, syllable) in syllables.iter().enumerate() {
             if syllable.stress > 0.5 {
                 let at = (syllable.start + syllable.end) / 2.0;
                 let probability = if gesture_style == GestureStyle::Fast { 0.95 } else { stroke_probability };
@@ -196,7 +196,7 @@ impl ActorMotion {
                     if gesture_style == GestureStyle::Folded { 0.012 } else { plan.rng.random_range(0.02..0.05) };
                 beats.push(BeatDip { at, depth: depth * syllable.stress, hands });
             }
-            let gap = said.get(k + 1).map_or(secs, |next| next.start) - syllable.end;
+            let gap = syllables.get(k + 1).map_or(secs, |next| next.start) - syllable.end;
             if gap > PAUSE && plan.rng.random_bool(0.8) {
                 plan.return_to_rest(syllable.end);
             }
@@ -209,7 +209,7 @@ impl ActorMotion {
             hold(&mut begin[side]);
             moves.iter_mut().filter_map(|m| m.to[side].as_mut()).for_each(hold);
         }
-        let nods = said.windows(2).filter(|pair| pair[1].start - pair[0].end > 1.0).flat_map(|pair| {
+        let nods = syllables.windows(2).filter(|pair| pair[1].start - pair[0].end > 1.0).flat_map(|pair| {
             let depth = rng.random_range(0.05..0.16);
             [0.35, 0.8].map(|after| (pair[0].end + after, depth))
         });
@@ -285,8 +285,8 @@ fn gaze_moves(secs: f64, rng: &mut ChaCha8Rng) -> Vec<MotionTransition<[f64; 3]>
     let mut moves = Vec::new();
     let mut now = rng.random_range(0.0..1.0);
     while now < secs {
-        let most = if rng.random_bool(0.3) { 0.78 } else { 0.2 };
-        let to = [rng.random_range(-most..most), rng.random_range(-0.14..0.2), rng.random_range(-0.13..0.13)];
+        let max_yaw = if rng.random_bool(0.3) { 0.78 } else { 0.2 };
+        let to = [rng.random_range(-max_yaw..max_yaw), rng.random_range(-0.14..0.2), rng.random_range(-0.13..0.13)];
         moves.push(MotionTransition { start: now, secs: rng.random_range(0.35..0.7), to });
         now += rng.random_range(0.9..2.4);
     }

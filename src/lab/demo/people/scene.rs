@@ -6,7 +6,7 @@ use super::condition::{Condition, Seat};
 use super::lens;
 use super::lens::CameraDefects;
 use super::set;
-use super::set::SeatPlace;
+use super::set::SeatPosition;
 use super::truth;
 use super::truth::{FrameTruth, PointOwners};
 use super::view;
@@ -51,7 +51,7 @@ pub struct CapturedClip {
 }
 
 /// A clip ready to be rendered.
-pub struct PeopleScene {
+pub struct PersonScene {
     pub fps: FrameRate,
     pub n_frames: usize,
     pub camera: PinholeCamera,
@@ -65,7 +65,7 @@ pub struct PeopleScene {
     crf: u32,
 }
 
-impl PeopleScene {
+impl PersonScene {
     /// Creates a clip of `secs` seconds; `captured` motion replaces the procedural motion of the first person.
     pub fn new(
         condition: Condition,
@@ -83,12 +83,12 @@ impl PeopleScene {
         };
         let mut rng = ChaCha8Rng::seed_from_u64(seeds.camera);
         let seat = condition.seat().unwrap_or([Seat::Standing, Seat::Chair, Seat::Desk][rng.random_range(0..3)]);
-        let seat = if condition == Condition::TwoPeople && seat == Seat::Desk { Seat::Chair } else { seat };
+        let seat = if condition == Condition::TwoPersons && seat == Seat::Desk { Seat::Chair } else { seat };
         let role = ActorRole {
             gesture_style: condition.gesture_style(),
             seat,
             leans: condition == Condition::LeaningDesk,
-            place: [0.0; 2],
+            position: [0.0; 2],
             turn: rng.random_range(-0.1..0.1),
             speaks: true,
         };
@@ -98,10 +98,10 @@ impl PeopleScene {
         let ClipSeeds { body, clothes, motion, .. } = seeds;
         let mut actors =
             vec![act(ActorSeeds { body, clothes, motion }, role, &voice, captured.map(|clip| &clip.motion))];
-        if condition == Condition::TwoPeople {
+        if condition == Condition::TwoPersons {
             let side = if rng.random_bool(0.5) { 1.0 } else { -1.0 };
-            let place = [side * rng.random_range(52.0..75.0), -rng.random_range(25.0..70.0)];
-            let second = ActorRole { place, turn: -side * rng.random_range(0.0..0.35), speaks: false, ..role };
+            let position = [side * rng.random_range(52.0..75.0), -rng.random_range(25.0..70.0)];
+            let second = ActorRole { position, turn: -side * rng.random_range(0.0..0.35), speaks: false, ..role };
             // The seeds of the second person are derived from the first one's by setting a high bit, which no part of
             // a set uses.
             let [body, clothes, motion] = [body, clothes, motion].map(|seed| seed ^ (1 << 40));
@@ -109,10 +109,10 @@ impl PeopleScene {
             actors.push(act(ActorSeeds { body, clothes, motion }, second, &silent, None));
         }
         let first = &actors[0];
-        let beside = actors.get(1).map(|second| second.neck);
-        let camera = view::camera(condition, first.neck, first.unit, beside, &mut rng);
+        let second_neck = actors.get(1).map(|second| second.neck);
+        let camera = view::camera(condition, first.neck, first.unit, second_neck, &mut rng);
         let light = view::light(&mut rng);
-        let seats: Vec<SeatPlace> = actors.iter().map(seat_place).collect();
+        let seats: Vec<SeatPosition> = actors.iter().map(seat_position).collect();
         let background = set::background(&camera, &light, &seats, &mut rng);
         let wide = camera.size[0] as f64 / 640.0;
         let defects = CameraDefects {
@@ -196,6 +196,12 @@ impl PeopleScene {
     }
 }
 
-fn seat_place(actor: &Actor) -> SeatPlace {
-    SeatPlace { seat: actor.role.seat, hips: actor.hips, unit: actor.unit, turn: actor.role.turn, desk: actor.desk() }
+fn seat_position(actor: &Actor) -> SeatPosition {
+    SeatPosition {
+        seat: actor.role.seat,
+        hips: actor.hips,
+        unit: actor.unit,
+        turn: actor.role.turn,
+        desk: actor.desk(),
+    }
 }

@@ -19,7 +19,7 @@ const FLOOR_IN_FRONT: f64 = 1000.0;
 
 /// Seat and position of a body.
 #[derive(Clone, Copy, Debug)]
-pub struct SeatPlace {
+pub struct SeatPosition {
     pub seat: Seat,
     /// Hips of the upright body, cm; unit of the body (`Build::unit`); rotation to its left, radians.
     pub hips: Vec3,
@@ -30,7 +30,7 @@ pub struct SeatPlace {
 }
 
 /// Background of a clip with the seats of all persons in it.
-pub fn background(camera: &PinholeCamera, light: &Light, seats: &[SeatPlace], rng: &mut ChaCha8Rng) -> Background {
+pub fn background(camera: &PinholeCamera, light: &Light, seats: &[SeatPosition], rng: &mut ChaCha8Rng) -> Background {
     let mut solids = Solids::new(0.15);
     let wall: Colour = muted(rng, 0.12, 0.75);
     let behind = -rng.random_range(75.0..230.0);
@@ -154,7 +154,7 @@ fn lamp(solids: &mut Solids, at: Vec3, rng: &mut ChaCha8Rng) {
 
 /// Block in a seat's axes (x to the sitter's left, z forwards, origin on the floor below the hips), from its low to
 /// its high corner.
-fn seat_block(solids: &mut Solids, seat: &SeatPlace, low: Vec3, high: Vec3, colour: Colour) {
+fn seat_block(solids: &mut Solids, seat: &SeatPosition, low: Vec3, high: Vec3, colour: Colour) {
     let turn = Rotation::about([0.0, 1.0, 0.0], seat.turn);
     let middle: Vec3 = std::array::from_fn(|k| (low[k] + high[k]) / 2.0);
     let size = std::array::from_fn(|k| high[k] - low[k]);
@@ -162,7 +162,7 @@ fn seat_block(solids: &mut Solids, seat: &SeatPlace, low: Vec3, high: Vec3, colo
     solids.block(add([x, 0.0, z], turn.turn(middle)), size, turn, colour);
 }
 
-fn furnish_seat(solids: &mut Solids, seat: &SeatPlace, rng: &mut ChaCha8Rng) {
+fn furnish_seat(solids: &mut Solids, seat: &SeatPosition, rng: &mut ChaCha8Rng) {
     if seat.seat == Seat::Standing {
         return;
     }
@@ -179,7 +179,7 @@ fn furnish_seat(solids: &mut Solids, seat: &SeatPlace, rng: &mut ChaCha8Rng) {
     }
 }
 
-fn desk(seat: &SeatPlace, rng: &mut ChaCha8Rng) -> Mesh {
+fn desk(seat: &SeatPosition, rng: &mut ChaCha8Rng) -> Mesh {
     let mut solids = Solids::new(0.4);
     let wood: Colour =
         [[0.35, 0.22, 0.11], [0.65, 0.63, 0.6], [0.07, 0.05, 0.04], [0.45, 0.36, 0.25]][rng.random_range(0..4)];

@@ -13,13 +13,13 @@ const Z: Vec3 = [0.0, 0.0, 1.0];
 
 /// Position and orientation of a torso in the world.
 #[derive(Clone, Copy, Debug)]
-pub struct TorsoPlace {
+pub struct TorsoPosition {
     /// Neck, cm.
     pub neck: Vec3,
     pub turn: Rotation,
 }
 
-impl TorsoPlace {
+impl TorsoPosition {
     /// Converts a point from the torso's axes (metres, y down, z away from the viewer) to world cm.
     pub fn world(&self, [x, down, away]: Vec3) -> Vec3 {
         add(self.neck, self.turn.turn(scale([x, -down, -away], CM)))
@@ -89,10 +89,10 @@ impl SeatedRig<'_> {
     }
 
     /// Position and orientation of the torso in a posture.
-    pub fn torso(&self, posture: &TrunkPosture) -> TorsoPlace {
+    pub fn torso(&self, posture: &TrunkPosture) -> TorsoPosition {
         let mut local = vec![Rotation::IDENTITY; self.rig.skeleton.joints.len()];
         self.pose(posture, &mut local);
         let positions = self.rig.skeleton.positions(self.root(posture), &local);
-        TorsoPlace { neck: positions[self.rig.neck], turn: self.rig.skeleton.world(&local)[self.rig.chest] }
+        TorsoPosition { neck: positions[self.rig.neck], turn: self.rig.skeleton.world(&local)[self.rig.chest] }
     }
 }

@@ -105,18 +105,18 @@ impl PointOwners {
         [n_body, n_own, n_people]: [usize; 3],
     ) -> Visibility {
         let owner = &self.owners[point];
-        let Some((mesh, label, front)) = front else { return Visibility::Seen };
+        let Some((mesh, label, front)) = front else { return Visibility::Visible };
         let depth_behind_front = depth - front;
         if depth_behind_front <= 0.0 {
-            return Visibility::Seen;
+            return Visibility::Visible;
         }
         if mesh >= n_body {
             let things = (n_body..n_own).contains(&mesh) || mesh >= n_people;
-            return if things { Visibility::BehindThing } else { Visibility::BehindPerson };
+            return if things { Visibility::BehindObject } else { Visibility::BehindPerson };
         }
         let label = usize::from(label);
         if owner.joints.contains(&label) && depth_behind_front < owner.depth * self.unit {
-            return Visibility::Seen;
+            return Visibility::Visible;
         }
         match self.hand_of.get(label).copied().flatten() {
             Some(side) if owner.hand != Some(side) => Visibility::BehindHand,
@@ -138,8 +138,8 @@ impl FrameTruth {
         drawn: (&Renderer, MeshCounts),
     ) -> Self {
         let rig = &actor.rig;
-        let places = rig.skeleton.positions(pose.root, &pose.local);
-        let world = points(actor, pose, &places);
+        let positions = rig.skeleton.positions(pose.root, &pose.local);
+        let world = points(actor, pose, &positions);
         let (renderer, counts) = drawn;
         let seen = world.map(|at| camera.see(at));
         let px = seen.map(|at| camera.pixel(at));
@@ -151,7 +151,7 @@ impl FrameTruth {
             }
             owners.visibility(point, seen[point][2], renderer.label_at(px[point]), counts)
         });
-        let joints = rig.positions.map(|place| scale(camera.see(places[place]), 0.01));
+        let joints = rig.positions.map(|joint| scale(camera.see(positions[joint]), 0.01));
         let head = head_degrees(camera.axes * rig.skeleton.world(&pose.local)[rig.head]);
         let body = std::array::from_fn(|point| scale(seen[point], 0.01));
         Self { px, seen: visible, joints, body, head, mouth: pose.mouth }
@@ -159,12 +159,13 @@ impl FrameTruth {
 }
 
 /// World positions of the points in the order of the truth, cm.
-fn points(actor: &Actor, pose: &ActorPose, places: &[Vec3]) -> [Vec3; N_POINTS] {
+fn points(actor: &Actor, pose: &ActorPose, positions: &[Vec3]) -> [Vec3; N_POINTS] {
     let rig = &actor.rig;
     let turn = rig.skeleton.world(&pose.local)[rig.head];
-    let face = actor.face.map(|point| add(places[rig.head], turn.turn(point)));
-    let leg = |name: &str| rig.skeleton.find(name).map_or([0.0; 3], |joint| places[joint]);
-    let [left, right] = [L_SHOULDER, R_SHOULDER].map(|shoulder| [0, 1, 2].map(|k| places[rig.positions[shoulder + k]]));
+    let face = actor.face.map(|point| add(positions[rig.head], turn.turn(point)));
+    let leg = |name: &str| rig.skeleton.find(name).map_or([0.0; 3], |joint| positions[joint]);
+    let [left, right] =
+        [L_SHOULDER, R_SHOULDER].map(|shoulder| [0, 1, 2].map(|k| positions[rig.positions[shoulder + k]]));
     let mut all = Vec::with_capacity(N_POINTS);
     all.extend(face);
     for k in 0..3 {
@@ -174,7 +175,7 @@ fn points(actor: &Actor, pose: &ActorPose, places: &[Vec3]) -> [Vec3; N_POINTS] 
         all.push(leg(name));
     }
     for root in [L_HAND, R_HAND] {
-        all.extend((0..N_HAND).map(|point| places[rig.positions[root + point]]));
+        all.extend((0..N_HAND).map(|point| positions[rig.positions[root + point]]));
     }
     std::array::from_fn(|point| all[point])
 }
@@ -200,18 +201,18 @@ pub fn collected(frames: &[FrameTruth], fps: FrameRate, camera: &PinholeCamera, 
     let part = |from: usize, n: usize| {
         (px.slice(s![.., from..from + n, ..]).to_owned(), seen.slice(s![.., from..from + n]).to_owned())
     };
-    let (body, body_seen) = part(0, N_BODY);
-    let (left_hand, left_hand_seen) = part(N_BODY, N_HAND);
-    let (right_hand, right_hand_seen) = part(N_BODY + N_HAND, N_HAND);
+    let (body, body_visibility) = part(0, N_BODY);
+    let (left_hand, left_hand_visibility) = part(N_BODY, N_HAND);
+    let (right_hand, right_hand_visibility) = part(N_BODY + N_HAND, N_HAND);
     let neck = |t: usize| frames[t].joints[NECK];
     RenderedTruth {
         fps,
         body,
-        body_seen,
+        body_visibility,
         left_hand,
-        left_hand_seen,
+        left_hand_visibility,
         right_hand,
-        right_hand_seen,
+        right_hand_visibility,
         joints: Array3::from_shape_fn((n, N_JOINTS, 3), |(t, joint, k)| {
             sub(frames[t].joints[joint], neck(t))[k] as f32
         }),

@@ -27,26 +27,28 @@ pub fn over_edge() -> Arms {
 /// Rests of a gesture style on a seat, between which a clip changes.
 pub fn rests(gesture_style: GestureStyle, seat: Seat, rng: &mut ChaCha8Rng) -> Vec<Arms> {
     let front = usize::from(rng.random_bool(0.5));
-    let place: Vec3 = match seat {
+    let position: Vec3 = match seat {
         Seat::Standing => [0.08, 0.43, -0.19],
         Seat::Chair => [0.08, 0.38, -0.23],
         Seat::Desk => [0.08, 0.33, -0.34],
     };
-    let apart = match seat {
+    let separate = match seat {
         Seat::Standing => [posture([0.215, 0.5, -0.06], 0.3, 0.15, 0.0, 0.05, FingerShape::RELAXED); 2],
         Seat::Chair => [posture([0.14, 0.39, -0.27], 0.35, 1.25, 0.15, 0.15, FingerShape::RELAXED); 2],
         Seat::Desk => [posture([0.15, 0.33, -0.34], 0.5, 1.2, 0.1, 0.5, FingerShape::FLAT); 2],
     };
-    let interlaced = interlaced(place);
-    let stacked = swapped(folded(place, true), front);
+    let interlaced = interlaced(position);
+    let stacked = swapped(folded(position, true), front);
     match gesture_style {
-        GestureStyle::Folded => vec![interlaced, stacked, swapped(fist_in_hand(place), front)],
-        GestureStyle::Crossing => vec![swapped(arms_crossed(), front), swapped(wrists_crossed(place), front), apart],
-        GestureStyle::Low => vec![apart, stacked],
-        GestureStyle::Holding => vec![apart],
+        GestureStyle::Folded => vec![interlaced, stacked, swapped(fist_in_hand(position), front)],
+        GestureStyle::Crossing => {
+            vec![swapped(arms_crossed(), front), swapped(wrists_crossed(position), front), separate]
+        }
+        GestureStyle::Low => vec![separate, stacked],
+        GestureStyle::Holding => vec![separate],
         _ => {
             let first_rest = rng.random_range(0..3);
-            let mut all = vec![apart, interlaced, stacked];
+            let mut all = vec![separate, interlaced, stacked];
             all.rotate_left(first_rest);
             all.truncate(2);
             all

@@ -13,7 +13,7 @@ const SPEECH_PITCH: f64 = 115.0;
 const OPENING: [f64; 5] = [1.0, 0.65, 0.35, 0.7, 0.3];
 /// Time offsets in seconds over which the opening is averaged: the jaw moves slowly.
 const JAW: [f64; 5] = [-0.04, -0.02, 0.0, 0.02, 0.04];
-/// Window in seconds of the loudness of captured sound.
+/// Window in seconds of the loudness of captured audio.
 const LOUDNESS_SECS: f64 = 0.04;
 
 /// Speech and its sound.
@@ -65,7 +65,7 @@ impl Voice {
             let vowel = self.speech.syllables.get(next).map_or(0, |s| s.vowel);
             self.speech.loudness(now) * OPENING[vowel % OPENING.len()]
         };
-        JAW.iter().map(|&beside| opening(secs + beside)).sum::<f64>() / JAW.len() as f64
+        JAW.iter().map(|&offset| opening(secs + offset)).sum::<f64>() / JAW.len() as f64
     }
 
     /// Mouth opening of a silent person, who may chew, 0..1.

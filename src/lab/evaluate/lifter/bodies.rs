@@ -28,7 +28,7 @@ const MIDDLE: [f32; 2] = [640.0, 360.0];
 
 /// Body lifter of `orator lift`, and its network alone.
 pub struct Lifters {
-    whole: Lifter,
+    complete: Lifter,
     network: BodyLifter,
 }
 
@@ -38,7 +38,7 @@ impl Lifters {
     /// # Errors
     /// Weights that cannot be read.
     pub fn new(settings: &config::LiftConfig) -> Result<Self> {
-        Ok(Self { whole: Lifter::new(settings)?, network: weights::body(&settings.body_weights)? })
+        Ok(Self { complete: Lifter::new(settings)?, network: weights::body(&settings.body_weights)? })
     }
 }
 
@@ -53,7 +53,6 @@ pub struct BodyRow {
     /// Errors by |yaw|: 0 to 20, 20 to 40, 40 to 60 degrees.
     pub by_yaw: Vec<BodyErrors>,
     /// Share of the frames for which the method gave all points.
-    #[serde(rename = "told")]
     pub complete_share: f64,
 }
 
@@ -65,14 +64,14 @@ pub fn table(lifters: &Lifters, sets: &[Set], n_scenes: usize) -> Result<Vec<Bod
     let mut rows = Vec::new();
     for (set, takes) in sets {
         let (drop, clean) = (scenes(takes, Filming::Drop, n_scenes), scenes(takes, Filming::Clean, n_scenes));
-        ensure!(!drop.is_empty(), "{set}: no take lasts for a scene of 4 s");
+        ensure!(!drop.is_empty(), "every take of {set} is too short: expected at least 4 s");
         let mean = mean_pose(&clean);
         let (drop, clean) = (("drop", &drop[..]), ("clean", &clean[..]));
         let network = |scene: &FilmedScene| Ok(lifters.network.poses(&scene.seen, 1.0)?);
         rows.extend([
-            row(set, "orator lift", drop, |scene| whole(&lifters.whole, scene))?,
+            row(set, "orator lift", drop, |scene| lift(&lifters.complete, scene))?,
             row(set, "network alone", drop, network)?,
-            row(set, "orator lift", clean, |scene| whole(&lifters.whole, scene))?,
+            row(set, "orator lift", clean, |scene| lift(&lifters.complete, scene))?,
             row(set, "bone-length depth", clean, |scene| Ok(with_bone_depth(scene)))?,
             row(set, "mean depth per joint", clean, |scene| Ok(with_mean_depth(scene, &mean)))?,
             row(set, "constant mean pose", clean, |scene| Ok(vec![Some(mean); scene.truth.len()]))?,
@@ -85,9 +84,9 @@ fn row(
     set: &str,
     method: &'static str,
     (input, scenes): (&'static str, &[FilmedScene]),
-    lift: impl Fn(&FilmedScene) -> Result<Vec<Option<Pose>>>,
+    predict: impl Fn(&FilmedScene) -> Result<Vec<Option<Pose>>>,
 ) -> Result<BodyRow> {
-    let lifted = scenes.iter().map(|scene| Ok((scene, lift(scene)?))).collect::<Result<Vec<_>>>()?;
+    let lifted = scenes.iter().map(|scene| Ok((scene, predict(scene)?))).collect::<Result<Vec<_>>>()?;
     let errors = of_lifted(lifted.iter().map(|(scene, poses)| (*scene, &poses[..])));
     let band = |&(low, high): &(f64, f64)| {
         let inside = lifted.iter().filter(|(s, _)| (low..=high).contains(&s.yaw.to_degrees().abs()));
@@ -100,7 +99,7 @@ fn row(
 }
 
 /// Lifts a scene with the complete `orator lift` stage.
-fn whole(lifter: &Lifter, scene: &FilmedScene) -> Result<Vec<Option<Pose>>> {
+fn lift(lifter: &Lifter, scene: &FilmedScene) -> Result<Vec<Option<Pose>>> {
     let n_frames = scene.seen.len();
     let none = Array3::zeros((n_frames, N_HAND, 3));
     let mut body = Array3::zeros((n_frames, N_BODY, 3));
@@ -139,7 +138,7 @@ pub fn text(rows: &[BodyRow]) -> String {
         "wrist",
         "|dz|",
         "mm/frame",
-        "told",
+        "lifted",
         BANDS.map(|(low, high)| format!("{low}-{high}")).join("  ")
     );
     for same in rows.chunk_by(|a, b| a.set == b.set) {

@@ -92,16 +92,16 @@ fn row(lift: &LiftHands, set: &FingerSet, n_hands: usize, seed: u64) -> Result<H
         truths.extend(take.truths()?);
     }
     truths.retain(|t| t.counted.iter().filter(|c| **c).count() >= 3);
-    ensure!(!truths.is_empty(), "{}: no frame holds a wrist and three points of fingers", set.name);
+    ensure!(!truths.is_empty(), "no frame of {} has a wrist and at least three finger points", set.name);
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let shots: Vec<ProjectedHand> =
         (0..n_hands).map(|_| shot(&truths[rng.random_range(0..truths.len())], &mut rng)).collect();
     let seen: Vec<SeenHand> = shots.iter().map(|s| s.seen).collect();
     let lifted = lift(&seen)?;
-    let whole = set.takes.iter().all(|take| take.has_knuckles());
+    let has_knuckles = set.takes.iter().all(|take| take.has_knuckles());
     let sized: Vec<Option<HandJoints>> =
         shots.iter().zip(&lifted).map(|(s, h)| Some(to_size(&s.truth, h.as_ref()?))).collect();
-    let of = |hands: &[Option<HandJoints>]| errors(&shots, hands, whole);
+    let of = |hands: &[Option<HandJoints>]| errors(&shots, hands, has_knuckles);
     Ok(HandRow {
         set: set.name.clone(),
         size: set.takes.first().map_or("", |take| take.size.text()),
@@ -109,7 +109,7 @@ fn row(lift: &LiftHands, set: &FingerSet, n_hands: usize, seed: u64) -> Result<H
         lifted: lifted.iter().filter(|h| h.is_some()).count() as f64 / n_hands.max(1) as f64,
         lifter: of(&sized),
         flat: of(&shots.iter().map(|s| Some(flat(&s.seen))).collect::<Vec<_>>()),
-        relaxed: of(&shots.iter().map(|s| Some(at_rest(&s.seen))).collect::<Vec<_>>()),
+        relaxed: of(&shots.iter().map(|s| Some(relaxed_hand(&s.seen))).collect::<Vec<_>>()),
     })
 }
 
@@ -140,7 +140,7 @@ fn flat(seen: &SeenHand) -> HandJoints {
     seen.map(|p| p.map_or([0.0; 3], |[x, y]| [f64::from(x - x0) / PX, f64::from(y - y0) / PX, 0.0]))
 }
 
-fn at_rest(seen: &SeenHand) -> HandJoints {
+fn relaxed_hand(seen: &SeenHand) -> HandJoints {
     let points = flat(seen);
     let palm = relaxed();
     let back = palm.map(|[x, y, z]| [-x, y, -z]);
@@ -157,7 +157,7 @@ fn at_rest(seen: &SeenHand) -> HandJoints {
     if palm_fit >= back_fit { palm } else { back }
 }
 
-fn errors(shots: &[ProjectedHand], hands: &[Option<HandJoints>], whole: bool) -> HandErrors {
+fn errors(shots: &[ProjectedHand], hands: &[Option<HandJoints>], has_knuckles: bool) -> HandErrors {
     let (mut plain, mut aligned, mut above, mut n) = (Vec::new(), Vec::new(), 0, 0);
     for (shot, hand) in shots.iter().zip(hands).filter_map(|(s, h)| Some((s, h.as_ref()?))) {
         let counted: Vec<usize> = (1..N_HAND).filter(|&j| shot.truth.counted[j]).collect();
@@ -172,9 +172,9 @@ fn errors(shots: &[ProjectedHand], hands: &[Option<HandJoints>], whole: bool) ->
         }
     }
     HandErrors {
-        median_mm: median(plain).filter(|_| whole),
+        median_mm: median(plain).filter(|_| has_knuckles),
         aligned_mm: median(aligned).unwrap_or(f32::NAN),
-        above_30: whole.then_some(above as f64 / f64::from(n.max(1))),
+        above_30: has_knuckles.then_some(above as f64 / f64::from(n.max(1))),
     }
 }
 
@@ -184,7 +184,7 @@ pub fn text(rows: &[HandRow]) -> String {
     let one = |e: &HandErrors| format!("{:>5} /{:>5.1}", number(e.median_mm), e.aligned_mm);
     let mut lines = vec![format!(
         "{:<44} {:>13} {:>8} {:>14} {:>14}   size",
-        "hands: median / aligned, mm", "lifter", ">30 mm", "flat", "at rest"
+        "hands: median / aligned error, mm", "lifter", ">30 mm", "flat", "relaxed"
     )];
     lines.extend(rows.iter().map(|row| {
         let above = row.lifter.above_30.map_or_else(|| "-".to_owned(), |share| format!("{:.0} %", 100.0 * share));

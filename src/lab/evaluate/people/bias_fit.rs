@@ -1,4 +1,4 @@
-//! Least-squares fit of systematic 2D errors as a weighted sum of image vectors, and the spread of the residuals.
+//! Least-squares fit of systematic 2D errors as a weighted sum of image vectors, and the deviation of the residuals.
 
 use ndarray::Array2;
 use orator_base::math::cholesky;
@@ -7,23 +7,23 @@ use orator_base::math::order::median;
 /// Factor from median absolute deviation to standard deviation of a normal distribution.
 const MAD: f64 = 1.4826;
 /// Number of standard deviations above which an error is an outlier.
-pub const STRAY: f64 = 4.0;
+pub const OUTLIER_STDS: f64 = 4.0;
 /// Ridge penalty as a share of the data's scale, which keeps weights of unused vectors at 0.
 const PENALTY: f64 = 1e-3;
 
 /// Weights of `N` vectors that best explain the errors. Each round excludes errors whose residual with the previous
-/// round's weights exceeds its entry of `most`. `errors` iterates over error and vectors of every point, once per
-/// round.
+/// round's weights exceeds its entry of `max_residuals`. `errors` iterates over error and vectors of every point, once
+/// per round.
 pub fn weights<const N: usize, I: Iterator<Item = ([f64; 2], [[f64; 2]; N])>>(
-    most: &[f64],
+    max_residuals: &[f64],
     errors: impl Fn() -> I,
 ) -> [f64; N] {
     let mut weights = [0.0; N];
-    for &most in most {
+    for &max_residual in max_residuals {
         let (mut a, mut b, mut n) = (Array2::zeros((N, N)), Array2::zeros((N, 1)), 0.0);
         for (error, basis) in errors() {
-            let off = rest(error, &basis, &weights);
-            if off[0].hypot(off[1]) > most {
+            let off = residual(error, &basis, &weights);
+            if off[0].hypot(off[1]) > max_residual {
                 continue;
             }
             n += 1.0;
@@ -42,7 +42,7 @@ pub fn weights<const N: usize, I: Iterator<Item = ([f64; 2], [[f64; 2]; N])>>(
 }
 
 /// Residual of an error after subtracting the weighted vectors.
-pub fn rest<const N: usize>(error: [f64; 2], basis: &[[f64; 2]; N], weights: &[f64; N]) -> [f64; 2] {
+pub fn residual<const N: usize>(error: [f64; 2], basis: &[[f64; 2]; N], weights: &[f64; N]) -> [f64; 2] {
     [0, 1].map(|k| error[k] - basis.iter().zip(weights).map(|(vector, weight)| weight * vector[k]).sum::<f64>())
 }
 

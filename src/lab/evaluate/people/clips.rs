@@ -42,12 +42,12 @@ impl RenderedClip {
     }
 
     /// Whether each frame is accepted, [T].
-    pub fn kept(&self) -> Vec<bool> {
-        let mut kept = vec![false; self.n_frames()];
+    pub fn accepted(&self) -> Vec<bool> {
+        let mut accepted = vec![false; self.n_frames()];
         for interval in &self.intervals.intervals {
-            kept[interval.start.min(self.n_frames())..interval.end.min(self.n_frames())].fill(true);
+            accepted[interval.start.min(self.n_frames())..interval.end.min(self.n_frames())].fill(true);
         }
-        kept
+        accepted
     }
 
     /// Shoulder width in a frontal view at the neck's distance, px.
@@ -65,11 +65,11 @@ impl RenderedClip {
 
     /// Points of a hand (0 left, 1 right): detected [T, 21, 3], true [T, 21, 2], and their visibility.
     pub fn hand(&self, side: usize) -> HandArrays<'_> {
-        let (found, truth, seen) = match side {
-            0 => (&self.keypoints.left_hand, &self.truth.left_hand, &self.truth.left_hand_seen),
-            _ => (&self.keypoints.right_hand, &self.truth.right_hand, &self.truth.right_hand_seen),
+        let (found, truth, visibility) = match side {
+            0 => (&self.keypoints.left_hand, &self.truth.left_hand, &self.truth.left_hand_visibility),
+            _ => (&self.keypoints.right_hand, &self.truth.right_hand, &self.truth.right_hand_visibility),
         };
-        HandArrays { found: found.view(), truth: truth.view(), seen: seen.view() }
+        HandArrays { found: found.view(), truth: truth.view(), visibility: visibility.view() }
     }
 }
 
@@ -81,7 +81,7 @@ pub struct HandArrays<'a> {
     /// x px, y px; [T, 21, 2].
     pub truth: ndarray::ArrayView3<'a, f32>,
     /// [T, 21].
-    pub seen: ndarray::ArrayView2<'a, Visibility>,
+    pub visibility: ndarray::ArrayView2<'a, Visibility>,
 }
 
 /// Reads the clips of the folder `dir` that the configuration's run has lifted, optionally only those of `part`.
@@ -91,18 +91,22 @@ pub struct HandArrays<'a> {
 pub fn read(dir: &Path, config_file: &Path, part: Option<&str>) -> Result<Vec<RenderedClip>> {
     let config = config::load(config_file, &[])?;
     let path = dir.join(LIST);
-    let text = std::fs::read_to_string(&path)
-        .with_context(|| format!("cannot read {}; `orator-lab demo draw --people` writes it", path.display()))?;
+    let text = std::fs::read_to_string(&path).with_context(|| {
+        format!(
+            "cannot read {}: expected the list of clips that `orator-lab demo draw DIR --people N` writes",
+            path.display()
+        )
+    })?;
     let list: Vec<ListedClip> =
-        serde_json::from_str(&text).with_context(|| format!("{} is no list of rendered clips", path.display()))?;
+        serde_json::from_str(&text).with_context(|| format!("invalid list of rendered clips {}", path.display()))?;
     let units = units(&config);
-    let wanted = list.iter().filter(|clip| part.is_none_or(|part| clip.part == part));
-    let clips = wanted.map(|listed| read_clip(dir, listed, &units, &config)).collect::<Result<Vec<_>>>()?;
+    let selected = list.iter().filter(|clip| part.is_none_or(|part| clip.part == part));
+    let clips = selected.map(|listed| read_clip(dir, listed, &units, &config)).collect::<Result<Vec<_>>>()?;
     ensure!(
         !clips.is_empty(),
-        "{} lists no clip{}",
-        path.display(),
-        part.map_or(String::new(), |p| format!(" of part {p}"))
+        "no clip{} in {}",
+        part.map_or(String::new(), |p| format!(" of part `{p}`")),
+        path.display()
     );
     Ok(clips)
 }
@@ -113,23 +117,26 @@ fn units(config: &Config) -> Vec<Unit> {
 
 fn read_clip(dir: &Path, listed: &ListedClip, units: &[Unit], config: &Config) -> Result<RenderedClip> {
     let video = dir.join(&listed.video);
-    let whole = video.canonicalize().with_context(|| format!("cannot find {}", video.display()))?;
-    let unit = units.iter().find(|unit| unit.source.canonicalize().is_ok_and(|source| source == whole));
-    let unit = unit.with_context(|| format!("{} names no video {}", config.file.display(), video.display()))?;
+    let absolute = video.canonicalize().with_context(|| format!("cannot find {}", video.display()))?;
+    let unit = units.iter().find(|unit| unit.source.canonicalize().is_ok_and(|source| source == absolute));
+    let unit = unit.with_context(|| {
+        format!("no entry of {} matches the video {}; add it to `videos`", config.file.display(), video.display())
+    })?;
     let work = &config.settings.work.dir;
     let lifted = Artifact::LiftIntervals.path(work, unit);
     let bytes = std::fs::read(&lifted).with_context(|| {
         format!("cannot read {}; run `orator run -c {} --to lift`", lifted.display(), config.file.display())
     })?;
-    let intervals =
-        serde_json::from_slice(&bytes).with_context(|| format!("{} holds no intervals", lifted.display()))?;
+    let intervals = serde_json::from_slice(&bytes).with_context(|| {
+        format!("invalid list of intervals {}; remove it and run `orator run` again", lifted.display())
+    })?;
     let path = Artifact::Keypoints.path(work, unit);
     let keypoints = keypoints_npz::read(&path)?;
     let times = keypoints_npz::read_extras(&path)?.time_secs;
     let truth = at_times(&RenderedTruth::read(&dir.join(&listed.truth))?, times.as_slice().unwrap_or(&[]));
     ensure!(
         truth.n_frames() == keypoints.n_frames(),
-        "{}: {} frames of keypoints and {} times",
+        "{}: {} frames of keypoints, but {} frame times: expected equal numbers",
         path.display(),
         keypoints.n_frames(),
         truth.n_frames()
@@ -145,11 +152,11 @@ fn at_times(truth: &RenderedTruth, times: &[f64]) -> RenderedTruth {
     RenderedTruth {
         fps: truth.fps,
         body: truth.body.select(Axis(0), &frames),
-        body_seen: truth.body_seen.select(Axis(0), &frames),
+        body_visibility: truth.body_visibility.select(Axis(0), &frames),
         left_hand: truth.left_hand.select(Axis(0), &frames),
-        left_hand_seen: truth.left_hand_seen.select(Axis(0), &frames),
+        left_hand_visibility: truth.left_hand_visibility.select(Axis(0), &frames),
         right_hand: truth.right_hand.select(Axis(0), &frames),
-        right_hand_seen: truth.right_hand_seen.select(Axis(0), &frames),
+        right_hand_visibility: truth.right_hand_visibility.select(Axis(0), &frames),
         joints: truth.joints.select(Axis(0), &frames),
         body_joints: truth.body_joints.select(Axis(0), &frames),
         neck: truth.neck.select(Axis(0), &frames),
@@ -179,9 +186,9 @@ pub fn true_keypoints(clip: &RenderedClip) -> Keypoints {
     Keypoints {
         fps: found.fps,
         image_size: found.image_size,
-        body: exact(&found.body, &truth.body, &truth.body_seen),
-        left_hand: exact(&found.left_hand, &truth.left_hand, &truth.left_hand_seen),
-        right_hand: exact(&found.right_hand, &truth.right_hand, &truth.right_hand_seen),
+        body: exact(&found.body, &truth.body, &truth.body_visibility),
+        left_hand: exact(&found.left_hand, &truth.left_hand, &truth.left_hand_visibility),
+        right_hand: exact(&found.right_hand, &truth.right_hand, &truth.right_hand_visibility),
     }
 }
 
@@ -238,15 +245,15 @@ pub mod tests {
             left_hand: found(&left),
             right_hand: found(&right),
         };
-        let all_seen = |points: usize| Array2::from_elem((n, points), Visibility::Seen);
+        let all_visible = |points: usize| Array2::from_elem((n, points), Visibility::Visible);
         let truth = RenderedTruth {
             fps,
             body,
-            body_seen: all_seen(N_BODY),
+            body_visibility: all_visible(N_BODY),
             left_hand: left,
-            left_hand_seen: all_seen(N_HAND),
+            left_hand_visibility: all_visible(N_HAND),
             right_hand: right,
-            right_hand_seen: all_seen(N_HAND),
+            right_hand_visibility: all_visible(N_HAND),
             joints,
             body_joints: Array3::zeros((n, N_BODY, 3)),
             neck: Array2::from_shape_fn((n, 3), |(_, k)| [0.0, 0.0, 2.0][k]),
@@ -272,8 +279,8 @@ pub mod tests {
     #[test]
     fn exact_keypoints_miss_what_is_outside() {
         let mut clip = exact();
-        clip.truth.left_hand_seen[[3, 5]] = Visibility::Outside;
-        clip.truth.left_hand_seen[[3, 6]] = Visibility::BehindThing;
+        clip.truth.left_hand_visibility[[3, 5]] = Visibility::Outside;
+        clip.truth.left_hand_visibility[[3, 6]] = Visibility::BehindObject;
         let keypoints = true_keypoints(&clip);
         assert_eq!((keypoints.left_hand[[3, 5, 2]], keypoints.left_hand[[3, 6, 2]]), (0.0, 1.0));
         assert_eq!(keypoints.left_hand[[3, 6, 0]], clip.truth.left_hand[[3, 6, 0]]);

@@ -3,7 +3,7 @@
 
 use super::joints::LiftedErrors;
 use super::points::GROUPS;
-use super::table::PeopleRow;
+use super::table::ConditionRow;
 
 /// Table of text.
 #[derive(Clone, Debug, PartialEq)]
@@ -18,13 +18,13 @@ pub struct Grid {
 }
 
 /// Grids of the rows of one model set.
-pub fn grids(rows: &[PeopleRow]) -> Vec<Grid> {
+pub fn grids(rows: &[ConditionRow]) -> Vec<Grid> {
     vec![points(rows), hands(rows), seconds(rows), joints(rows)]
 }
 
 /// Grids of all model sets as text, followed by `last` if given.
-pub fn text(rows: &[PeopleRow], last: Option<&Grid>) -> String {
-    let of_set = |rows: &[PeopleRow]| {
+pub fn text(rows: &[ConditionRow], last: Option<&Grid>) -> String {
+    let of_set = |rows: &[ConditionRow]| {
         let grids: Vec<String> = grids(rows).iter().map(Grid::text).collect();
         format!("model set {}\n\n{}", rows[0].set, grids.join("\n"))
     };
@@ -61,66 +61,82 @@ pub fn percent(share: f64) -> String {
     number(100.0 * share, 1)
 }
 
-fn points(rows: &[PeopleRow]) -> Grid {
-    let cells = |row: &PeopleRow| {
+fn points(rows: &[ConditionRow]) -> Grid {
+    let cells = |row: &ConditionRow| {
         let cell = |k: usize| {
             let e = &row.points[k];
             let numbers = [e.median, e.p95, e.bias, e.scatter].map(percent);
-            if e.n_seen == 0 || e.found == 0.0 { "-".to_owned() } else { numbers.join(" / ") }
+            if e.n_visible == 0 || e.found == 0.0 { "-".to_owned() } else { numbers.join(" / ") }
         };
         (row.condition.clone(), (0..GROUPS.len()).map(cell).collect())
     };
     Grid {
         title: "2D points",
-        note: "Distance of points that can be seen from the truth, % of the shoulder width: median / 95 % / bias (mean error of a clip) / scatter (median about it).",
+        note: "Error of visible points, % of the shoulder width: median / 95th percentile / bias (mean error of a \
+               clip) / scatter (median distance from the bias).",
         heads: GROUPS.iter().map(|(name, _)| (*name).to_owned()).collect(),
         rows: rows.iter().map(cells).collect(),
     }
 }
 
-fn hands(rows: &[PeopleRow]) -> Grid {
-    let cells = |PeopleRow { condition, hands: h, head, .. }: &PeopleRow| {
-        let mut cells = vec![h.n_seen.to_string()];
-        cells.extend([h.missed, h.stolen, h.swapped, h.astray].map(percent));
+fn hands(rows: &[ConditionRow]) -> Grid {
+    let cells = |ConditionRow { condition, hands: h, head, .. }: &ConditionRow| {
+        let mut cells = vec![h.n_visible.to_string()];
+        cells.extend([h.missed, h.other_hand, h.swapped, h.misplaced].map(percent));
         cells.push(h.n_hidden.to_string());
-        cells.extend([h.invented, h.median, h.p95].map(percent));
+        cells.extend([h.false_positives, h.median, h.p95].map(percent));
         cells.extend([head.yaw, head.pitch, head.roll].map(|degrees| number(degrees, 1)));
         cells.push(percent(head.found));
         (condition.clone(), cells)
     };
     Grid {
         title: "hands and head",
-        note: "Hands that can be seen, in all frames, and % of them missed, stolen (the other hand's points), swapped, astray; hidden hands and % of them invented; distance of a right hand's points, % of the shoulder width. Head: mean error of its angles, degrees, and % of the frames with angles.",
+        note: "Visible hands in all frames, and % of them missed, detected on the other hand, swapped, misplaced; \
+               hidden hands, and % of them detected (false positives); error of the points of correct hands, % of the \
+               shoulder width. Head: mean absolute error of the angles, degrees, and % of the frames with angles.",
         heads: heads(&[
-            "seen", "missed", "stolen", "swapped", "astray", "hidden", "invented", "median", "95 %", "yaw", "pitch",
-            "roll", "found",
+            "visible",
+            "missed",
+            "other hand",
+            "swapped",
+            "misplaced",
+            "hidden",
+            "false pos.",
+            "median",
+            "95 %",
+            "yaw",
+            "pitch",
+            "roll",
+            "detected",
         ]),
         rows: rows.iter().map(cells).collect(),
     }
 }
 
-fn seconds(rows: &[PeopleRow]) -> Grid {
-    let cells = |PeopleRow { condition, seconds: s, mask: m, .. }: &PeopleRow| {
+fn seconds(rows: &[ConditionRow]) -> Grid {
+    let cells = |ConditionRow { condition, seconds: s, mask: m, .. }: &ConditionRow| {
         let mut cells: Vec<String> =
-            [s.total, s.kept, s.kept_wrongly, s.refused_wrongly].map(|secs| number(secs, 1)).into();
-        cells.extend([m.truly_seen, m.masked].map(percent));
+            [s.total, s.accepted, s.false_accepts, s.false_rejects].map(|secs| number(secs, 1)).into();
+        cells.extend([m.truly_visible, m.masked].map(percent));
         (condition.clone(), cells)
     };
     Grid {
         title: "seconds",
-        note: "Wrongly kept: a hand is invented, stolen, swapped or astray, or a point of an arm far off; wrongly refused: all is seen and right. Mask: % of the joints it calls seen that can be seen; recall: % of those that can be seen which it calls so.",
-        heads: heads(&["total", "kept", "kept wrongly", "refused wrongly", "mask", "recall"]),
+        note: "False accepts: a hand is a false positive, on the other hand, swapped or misplaced, or an arm point is \
+               far off; false rejects: both hands and arms are visible and correct. Mask precision: % of the joints \
+               marked visible that are visible; recall: % of the visible joints that are marked visible.",
+        heads: heads(&["total", "accepted", "false accepts", "false rejects", "mask precision", "mask recall"]),
         rows: rows.iter().map(cells).collect(),
     }
 }
 
-fn joints(rows: &[PeopleRow]) -> Grid {
-    let lines = |row: &PeopleRow| {
+fn joints(rows: &[ConditionRow]) -> Grid {
+    let lines = |row: &ConditionRow| {
         let LiftedErrors { lifted, of_true_keypoints, mean_pose } = row.joints;
         let named = [
             (row.condition.clone(), lifted),
             ("  exact keypoints".to_owned(), of_true_keypoints),
-            ("  clip's mean pose".to_owned(), mean_pose),
+            ("  mean pose of the clip".to_owned(), mean_pose),
         ];
         named.map(|(name, e)| {
             let errors = [e.mpjpe, e.p_mpjpe, e.elbow, e.elbow_depth, e.wrist, e.wrist_depth, e.hand];
@@ -129,7 +145,8 @@ fn joints(rows: &[PeopleRow]) -> Grid {
     };
     Grid {
         title: "3D joints, mm",
-        note: "Errors of shoulders, elbows and wrists about the neck in kept frames, one scale for every 60 frames; |dz|: along the line of sight; hand: fingers about their wrist.",
+        note: "Errors of shoulders, elbows and wrists relative to the neck in accepted frames, one scale factor per 60 \
+               frames; |dz|: along the line of sight; hand: fingers relative to their wrist.",
         heads: heads(&["MPJPE", "P-MPJPE", "elbow", "|dz|", "wrist", "|dz|", "hand", "frames"]),
         rows: rows.iter().flat_map(lines).collect(),
     }

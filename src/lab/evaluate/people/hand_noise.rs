@@ -1,7 +1,7 @@
 //! Errors of a hand model on rendered persons, fitted as the noise model with which the hand lifter is trained
 //! (`train::scene::hand_noise`).
 
-use super::bias_fit::{self, STRAY, deviation};
+use super::bias_fit::{self, OUTLIER_STDS, deviation};
 use super::clips::RenderedClip;
 use super::hands::{HandOutcome, outcomes};
 use crate::rendered_truth::Visibility;
@@ -35,19 +35,19 @@ pub fn fit(set: &str, clips: &[RenderedClip]) -> HandNoise {
     let bias: [[f64; N_BASIS]; N_POINTS] = std::array::from_fn(|point| bias(&hands, point));
     for hand in &mut hands {
         for ((error, basis), bias) in hand.errors.iter_mut().zip(&hand.basis).zip(&bias) {
-            *error = bias_fit::rest(*error, basis, bias);
+            *error = bias_fit::residual(*error, basis, bias);
         }
     }
-    let whole = |hand: &HandResidual, k: usize| hand.errors.iter().map(|e| e[k]).sum::<f64>() / N_POINTS as f64;
-    let wholes: Vec<f64> = hands.iter().flat_map(|hand| [whole(hand, 0), whole(hand, 1)]).collect();
+    let mean_error = |hand: &HandResidual, k: usize| hand.errors.iter().map(|e| e[k]).sum::<f64>() / N_POINTS as f64;
+    let mean_errors: Vec<f64> = hands.iter().flat_map(|hand| [mean_error(hand, 0), mean_error(hand, 1)]).collect();
     let n_hidden = hands.iter().flat_map(|hand| hand.hidden).filter(|h| *h).count();
     HandNoise {
         set: set.to_owned(),
         bias,
-        hand: deviation(&wholes),
-        seen: finger_noise(&hands, false, whole),
-        hidden: finger_noise(&hands, true, whole),
-        hides: n_hidden as f64 / (N_FINGERS * hands.len()).max(1) as f64,
+        hand: deviation(&mean_errors),
+        visible: finger_noise(&hands, false, mean_error),
+        hidden: finger_noise(&hands, true, mean_error),
+        hidden_share: n_hidden as f64 / (N_FINGERS * hands.len()).max(1) as f64,
     }
 }
 
@@ -55,7 +55,7 @@ impl HandResidual {
     /// `None` if the hand is not detected, entirely misplaced, or partly outside the image.
     fn new(clip: &RenderedClip, t: usize, side: usize) -> Option<Self> {
         let hand = clip.hand(side);
-        if (0..N_HAND).any(|j| hand.found[[t, j, 2]] <= 0.0 || hand.seen[[t, j]] == Visibility::Outside) {
+        if (0..N_HAND).any(|j| hand.found[[t, j, 2]] <= 0.0 || hand.visibility[[t, j]] == Visibility::Outside) {
             return None;
         }
         let root = [L_HAND, R_HAND][side];
@@ -67,7 +67,7 @@ impl HandResidual {
             std::array::from_fn(|point| [0, 1].map(|k| found(point + 1)[k] - truth[point + 1][k]));
         let is_hidden = |finger: usize| {
             let points = 1 + N_OF_FINGER * finger..=N_OF_FINGER * (finger + 1);
-            points.filter(|&j| hand.seen[[t, j]] != Visibility::Seen).count() >= HIDDEN_POINTS
+            points.filter(|&j| hand.visibility[[t, j]] != Visibility::Visible).count() >= HIDDEN_POINTS
         };
         let mean = errors.iter().map(|e| e[0].hypot(e[1])).sum::<f64>() / N_POINTS as f64;
         (mean < 1.0).then(|| Self {
@@ -84,24 +84,24 @@ fn bias(hands: &[HandResidual], point: usize) -> [f64; N_BASIS] {
     bias_fit::weights(&[f64::INFINITY, 0.4], || seen().map(|hand| (hand.errors[point], hand.basis[point])))
 }
 
-fn finger_noise(hands: &[HandResidual], hidden: bool, whole: impl Fn(&HandResidual, usize) -> f64) -> FingerNoise {
+fn finger_noise(hands: &[HandResidual], hidden: bool, mean_error: impl Fn(&HandResidual, usize) -> f64) -> FingerNoise {
     let (mut fingers, mut points) = (Vec::new(), Vec::new());
     for hand in hands {
         for finger in (0..N_FINGERS).filter(|&finger| hand.hidden[finger] == hidden) {
             let of_finger = &hand.errors[N_OF_FINGER * finger..N_OF_FINGER * (finger + 1)];
             for k in 0..2 {
                 let mean = of_finger.iter().map(|e| e[k]).sum::<f64>() / N_OF_FINGER as f64;
-                fingers.push(mean - whole(hand, k));
+                fingers.push(mean - mean_error(hand, k));
                 points.extend(of_finger.iter().map(|e| e[k] - mean));
             }
         }
     }
     let finger = deviation(&fingers);
-    let strays: Vec<f64> = fingers.iter().map(|v| v.abs()).filter(|v| *v > STRAY * finger).collect();
+    let outliers: Vec<f64> = fingers.iter().map(|v| v.abs()).filter(|v| *v > OUTLIER_STDS * finger).collect();
     FingerNoise {
         finger,
-        strays: strays.len() as f64 / fingers.len().max(1) as f64,
-        stray_finger: Ordered::new(strays).quantile(0.68).unwrap_or(finger),
+        outlier_share: outliers.len() as f64 / fingers.len().max(1) as f64,
+        outlier_finger_std: Ordered::new(outliers).quantile(0.68).unwrap_or(finger),
         point: deviation(&points),
     }
 }
@@ -114,16 +114,16 @@ mod tests {
     use rand_chacha::ChaCha8Rng;
 
     #[test]
-    fn noise_that_was_made_is_found_again() {
-        let mut made = HandNoise {
+    fn the_fit_recovers_known_noise() {
+        let mut known = HandNoise {
             set: String::new(),
             bias: [[0.0; N_BASIS]; N_POINTS],
             hand: 0.03,
-            seen: FingerNoise { finger: 0.05, point: 0.02, ..FingerNoise::default() },
+            visible: FingerNoise { finger: 0.05, point: 0.02, ..FingerNoise::default() },
             hidden: FingerNoise::default(),
-            hides: 0.0,
+            hidden_share: 0.0,
         };
-        made.bias[6] = [0.0, 0.0, 0.4];
+        known.bias[6] = [0.0, 0.0, 0.4];
         let mut rng = ChaCha8Rng::seed_from_u64(3);
         let mut clips = Vec::new();
         for _ in 0..40 {
@@ -131,7 +131,7 @@ mod tests {
             for t in 0..clip.n_frames() {
                 let palm = f64::from(clip.px_of_bone(t, R_HAND, R_HAND + 9));
                 let mut hand = std::array::from_fn(|j| [0, 1].map(|k| f64::from(clip.truth.right_hand[[t, j, k]])));
-                made.apply(&mut hand, palm, 1.0, true, &mut rng);
+                known.apply(&mut hand, palm, 1.0, true, &mut rng);
                 for (j, point) in hand.iter().enumerate() {
                     (0..2).for_each(|k| clip.keypoints.right_hand[[t, j, k]] = point[k] as f32);
                 }
@@ -141,13 +141,13 @@ mod tests {
         }
         let found = fit("found", &clips);
         let near = |a: f64, b: f64, off: f64| assert!((a - b).abs() < off, "{a} {b}: {found:?}");
-        near(found.seen.point, 0.02, 0.006);
-        near(found.seen.finger, 0.05, 0.012);
+        near(found.visible.point, 0.02, 0.006);
+        near(found.visible.finger, 0.05, 0.012);
         near(found.hand, 0.03, 0.012);
         let hand: [[f64; 2]; N_HAND] =
             std::array::from_fn(|j| [0, 1].map(|k| f64::from(exact().truth.right_hand[[0, j, k]])));
         let along =
             |bias: &HandNoise, k: usize| basis(&hand, 7).iter().zip(bias.bias[6]).map(|(v, w)| v[k] * w).sum::<f64>();
-        (0..2).for_each(|k| near(along(&found, k), along(&made, k), 0.5));
+        (0..2).for_each(|k| near(along(&found, k), along(&known, k), 0.5));
     }
 }

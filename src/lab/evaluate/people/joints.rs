@@ -46,8 +46,8 @@ pub struct LiftedErrors {
     pub mean_pose: JointErrors,
 }
 
-/// Motions of clips as lifted from what was found, for the mask, and their errors. `lifter` must leave the camera's axes
-/// as they are (`level = false`).
+/// Motions of clips as lifted from the detected keypoints (for the mask), and their errors. `lifter` must retain the
+/// camera axes (`level = false`).
 pub fn measure(lifter: &Lifter, clips: &[&RenderedClip]) -> Result<(Vec<Motion>, LiftedErrors)> {
     let mut sums = [ErrorSums::default(); 3];
     let mut motions = Vec::new();
@@ -58,16 +58,16 @@ pub fn measure(lifter: &Lifter, clips: &[&RenderedClip]) -> Result<(Vec<Motion>,
         for interval in intervals {
             for start in (interval.start..interval.end).step_by(SEGMENT) {
                 let frames: Vec<usize> = (start..(start + SEGMENT).min(interval.end)).collect();
-                let told: Vec<usize> =
+                let usable: Vec<usize> =
                     frames.into_iter().filter(|&t| is_lifted(&found, t) && is_lifted(&exact, t)).collect();
-                if told.is_empty() {
+                if usable.is_empty() {
                     continue;
                 }
                 let of_motion = |motion: &Motion| {
-                    told.iter().map(|&t| motion.joints.index_axis(Axis(0), t).to_owned()).collect::<Vec<_>>()
+                    usable.iter().map(|&t| motion.joints.index_axis(Axis(0), t).to_owned()).collect::<Vec<_>>()
                 };
                 let truth: Vec<Array2<f32>> =
-                    told.iter().map(|&t| clip.truth.joints.index_axis(Axis(0), t).to_owned()).collect();
+                    usable.iter().map(|&t| clip.truth.joints.index_axis(Axis(0), t).to_owned()).collect();
                 let mean = clip.truth.joints.mean_axis(Axis(0)).unwrap_or_else(|| Array2::zeros((N_JOINTS, 3)));
                 sums[0].add(&of_motion(&found), &truth);
                 sums[1].add(&of_motion(&exact), &truth);
@@ -104,7 +104,7 @@ impl ErrorSums {
             let [from, to]: [Vec<Vec3>; 2] = [(p, grow), (q, true_grow)].map(|(frame, grow)| {
                 std::iter::once(NECK).chain(ARMS).map(|joint| place(frame, grow, joint, NECK)).collect()
             });
-            let apart = |joint: usize| vec3::norm(vec3::sub(from[joint], to[joint]));
+            let distance = |joint: usize| vec3::norm(vec3::sub(from[joint], to[joint]));
             let depth = |joint: usize| (from[joint][2] - to[joint][2]).abs();
             let aligned = procrustes::similarity(&from, &to);
             let after =
@@ -112,11 +112,11 @@ impl ErrorSums {
             let both = |of: &dyn Fn(usize) -> f64, [a, b]: [usize; 2]| (of(a) + of(b)) / 2.0;
             let (elbows, wrists) = ([R_ELBOW, L_ELBOW], [R_WRIST, L_WRIST]);
             let n_arms = ARMS.count() as f64;
-            self.body.mpjpe += ARMS.map(apart).sum::<f64>() / n_arms;
+            self.body.mpjpe += ARMS.map(distance).sum::<f64>() / n_arms;
             self.body.p_mpjpe += ARMS.map(after).sum::<f64>() / n_arms;
-            self.body.elbow += both(&apart, elbows);
+            self.body.elbow += both(&distance, elbows);
             self.body.elbow_depth += both(&depth, elbows);
-            self.body.wrist += both(&apart, wrists);
+            self.body.wrist += both(&distance, wrists);
             self.body.wrist_depth += both(&depth, wrists);
             self.body.n_frames += 1;
             for root in [L_HAND, R_HAND] {

@@ -1,17 +1,17 @@
-//! Errors of the whole pipeline on rendered people, whose truth is known: `points` (2D keypoints), `hands` (missed,
-//! invented, stolen, swapped), `head` (its angles), `kept` (what the intervals keep and the mask says), `joints` (3D),
-//! `table` (all of it by condition and by model set), `grid` (the table as text) and `gap` (beside real clips).
-//! `noise` and `hand_noise` with `bias_fit`: the errors as the noise by which lifters are trained.
+//! Errors of the complete pipeline on rendered persons: `points` (2D keypoints), `hands` (missed, false positives,
+//! other hand, swapped), `head` (angles), `accepted` (intervals and mask), `joints` (3D), `table` (all errors by
+//! condition and model set), `grid` (the table as text), `page` (as HTML) and `keypoint_statistics` (comparison with
+//! real clips). `noise` and `hand_noise` with `bias_fit`: the errors as the noise model with which lifters are trained.
 
+pub mod accepted;
 pub mod bias_fit;
 pub mod clips;
-pub mod gap;
 pub mod grid;
 pub mod hand_noise;
 pub mod hands;
 pub mod head;
 pub mod joints;
-pub mod kept;
+pub mod keypoint_statistics;
 pub mod noise;
 pub mod page;
 pub mod points;

@@ -1,7 +1,7 @@
 //! Errors of a model set on rendered persons, fitted as the noise model with which lifters are trained
 //! (`train::scene::noise`): least squares for the bias, then robust deviations of the residuals.
 
-use super::bias_fit::{self, STRAY, deviation};
+use super::bias_fit::{self, OUTLIER_STDS, deviation};
 use super::clips::RenderedClip;
 use crate::rendered_truth::Visibility;
 use crate::train::scene::noise::{FrameNoise, KeypointNoise, N_BASIS, PointNoise, Runs, basis, kind};
@@ -35,7 +35,7 @@ pub fn fit(set: &str, clips: &[RenderedClip]) -> KeypointNoise {
 impl PointTrack {
     fn new(clip: &RenderedClip, point: usize) -> Self {
         let coco = COCO[point];
-        let seen = |t: usize| clip.truth.body_seen[[t, coco]];
+        let seen = |t: usize| clip.truth.body_visibility[[t, coco]];
         let error = |t: usize| {
             let is_found = clip.keypoints.body[[t, coco, 2]] > SEEN_SCORE;
             if !is_found || seen(t) == Visibility::Outside {
@@ -48,7 +48,7 @@ impl PointTrack {
         Self {
             errors: frames.clone().map(error).collect(),
             inside: frames.clone().map(|t| seen(t) != Visibility::Outside).collect(),
-            hidden: frames.map(|t| !matches!(seen(t), Visibility::Seen | Visibility::Outside)).collect(),
+            hidden: frames.map(|t| !matches!(seen(t), Visibility::Visible | Visibility::Outside)).collect(),
         }
     }
 }
@@ -58,7 +58,7 @@ fn fit_point(tracks: &[PointTrack]) -> PointNoise {
     let (mut clip_means, mut seen, mut hidden) = (Vec::new(), Vec::new(), Vec::new());
     for track in tracks {
         let rest: Vec<Option<[f64; 2]>> =
-            track.errors.iter().map(|e| e.map(|(error, basis)| bias_fit::rest(error, &basis, &bias))).collect();
+            track.errors.iter().map(|e| e.map(|(error, basis)| bias_fit::residual(error, &basis, &bias))).collect();
         let middle = [0, 1].map(|k| median(rest.iter().flatten().map(|e| e[k])).unwrap_or(0.0));
         if rest.iter().flatten().count() > 10 {
             clip_means.extend(middle);
@@ -68,16 +68,16 @@ fn fit_point(tracks: &[PointTrack]) -> PointNoise {
             into.push(about.iter().zip(&track.hidden).map(|(e, h)| e.filter(|_| *h == state)).collect::<Vec<_>>());
         }
     }
-    let hides = runs(tracks.iter().map(|track| track.hidden.iter().map(|h| Some(*h)).collect()));
+    let occlusions = runs(tracks.iter().map(|track| track.hidden.iter().map(|h| Some(*h)).collect()));
     let gaps = runs(tracks.iter().map(|track| {
         track.errors.iter().zip(&track.inside).map(|(e, inside)| inside.then_some(e.is_none())).collect()
     }));
     PointNoise {
         bias,
         clip: deviation(&clip_means),
-        seen: frame_noise(&seen),
+        visible: frame_noise(&seen),
         hidden: frame_noise(&hidden),
-        hides,
+        occlusions,
         gaps,
     }
 }
@@ -92,23 +92,23 @@ fn bias(tracks: &[PointTrack]) -> [f64; N_BASIS] {
 
 fn frame_noise(tracks: &[Vec<Option<[f64; 2]>>]) -> FrameNoise {
     let all: Vec<f64> = tracks.iter().flatten().flatten().flatten().copied().collect();
-    let most = deviation(&all);
-    let strays: Vec<f64> = all.iter().copied().filter(|v| v.abs() > STRAY * most).collect();
+    let std = deviation(&all);
+    let outliers: Vec<f64> = all.iter().copied().filter(|v| v.abs() > OUTLIER_STDS * std).collect();
     let (mut product, mut square) = (0.0, 0.0);
     for pair in tracks.iter().flat_map(|track| track.windows(2)) {
         let (Some(a), Some(b)) = (pair[0], pair[1]) else { continue };
         for k in 0..2 {
-            if a[k].abs().max(b[k].abs()) <= STRAY * most {
+            if a[k].abs().max(b[k].abs()) <= OUTLIER_STDS * std {
                 product += a[k] * b[k];
                 square += (a[k] * a[k] + b[k] * b[k]) / 2.0;
             }
         }
     }
-    let stray_deviation = Ordered::new(strays.iter().map(|v| v.abs())).quantile(0.68).unwrap_or(0.0);
+    let outlier_std = Ordered::new(outliers.iter().map(|v| v.abs())).quantile(0.68).unwrap_or(0.0);
     FrameNoise {
-        deviation: most,
-        stray_deviation,
-        strays: strays.len() as f64 / (all.len() as f64).max(1.0),
+        deviation: std,
+        outlier_std,
+        outlier_share: outliers.len() as f64 / (all.len() as f64).max(1.0),
         correlation: if square > 0.0 { (product / square).clamp(0.0, 0.99) } else { 0.0 },
     }
 }
@@ -125,7 +125,7 @@ fn runs(tracks: impl Iterator<Item = Vec<Option<bool>>>) -> Runs {
             }
         }
     }
-    let rate = |part: f64, whole: f64, of_none: f64| if whole > 0.0 { part / whole } else { of_none };
+    let rate = |part: f64, whole: f64, default: f64| if whole > 0.0 { part / whole } else { default };
     Runs { begin: rate(begun, outside, 0.0), end: rate(ended, inside, 1.0) }
 }
 
@@ -137,12 +137,12 @@ mod tests {
     use rand_chacha::ChaCha8Rng;
 
     #[test]
-    fn noise_that_was_made_is_found_again() {
-        let mut made = KeypointNoise { set: "made".to_owned(), points: Default::default() };
-        made.points[3] = PointNoise {
+    fn the_fit_recovers_known_noise() {
+        let mut known = KeypointNoise { set: "known".to_owned(), points: Default::default() };
+        known.points[3] = PointNoise {
             bias: [0.08, 0.0, 0.0, 0.0],
             clip: 0.02,
-            seen: FrameNoise { deviation: 0.01, correlation: 0.6, ..FrameNoise::default() },
+            visible: FrameNoise { deviation: 0.01, correlation: 0.6, ..FrameNoise::default() },
             gaps: Runs { begin: 0.05, end: 0.3 },
             ..PointNoise::default()
         };
@@ -152,7 +152,7 @@ mod tests {
                 let mut clip = exact();
                 let frame = |t: usize| COCO.map(|c| Some([0, 1].map(|k| clip.truth.body[[t, c, k]])));
                 let mut body: Vec<SeenBody> = (0..clip.n_frames()).map(frame).collect();
-                made.apply(&mut body, f64::from(clip.shoulders_px(0)), 1.0, true, &mut rng);
+                known.apply(&mut body, f64::from(clip.shoulders_px(0)), 1.0, true, &mut rng);
                 for (t, frame) in body.iter().enumerate() {
                     for (point, coco) in COCO.into_iter().enumerate() {
                         let [x, y] = frame[point].unwrap_or_default();
@@ -169,12 +169,12 @@ mod tests {
         // A single pose does not determine the weights, only their sum.
         let frame: SeenBody = COCO.map(|c| Some([0, 1].map(|k| exact().truth.body[[3, c, k]])));
         let vectors = basis(&frame, 3, f64::from(exact().shoulders_px(3))).unwrap();
-        let along = |bias| bias_fit::rest([0.0; 2], &vectors, bias);
-        (0..2).for_each(|k| near(along(&found.bias)[k], along(&made.points[3].bias)[k], 0.01));
+        let along = |bias| bias_fit::residual([0.0; 2], &vectors, bias);
+        (0..2).for_each(|k| near(along(&found.bias)[k], along(&known.points[3].bias)[k], 0.01));
         near(found.clip, 0.02, 0.005);
-        near(found.seen.deviation, 0.01, 0.002);
+        near(found.visible.deviation, 0.01, 0.002);
         near(found.gaps.begin, 0.05, 0.01);
         near(found.gaps.end, 0.3, 0.04);
-        assert!(found.seen.correlation > 0.4, "{found:?}");
+        assert!(found.visible.correlation > 0.4, "{found:?}");
     }
 }

@@ -1,13 +1,13 @@
 //! HTML page of the errors on rendered persons: the grids of each model set.
 
 use crate::evaluate::people::grid::{Grid, grids};
-use crate::evaluate::people::table::PeopleRow;
+use crate::evaluate::people::table::ConditionRow;
 use orator_report::html::{Node, Page, Section, node, table};
 use serde_json::Value;
 
 /// Text of the page; `last`: a grid of its own section.
-pub fn html(rows: &[PeopleRow], last: Option<&Grid>) -> String {
-    let sets: Vec<&[PeopleRow]> = rows.chunk_by(|a, b| a.set == b.set).collect();
+pub fn html(rows: &[ConditionRow], last: Option<&Grid>) -> String {
+    let sets: Vec<&[ConditionRow]> = rows.chunk_by(|a, b| a.set == b.set).collect();
     let n_clips: usize = sets.iter().map(|rows| rows.last().map_or(0, |all| all.n_clips)).max().unwrap_or(0);
     let names: Vec<&str> = sets.iter().map(|rows| rows[0].set.as_str()).collect();
     let body = sets.iter().flat_map(|rows| {
@@ -15,10 +15,14 @@ pub fn html(rows: &[PeopleRow], last: Option<&Grid>) -> String {
         std::iter::once(title).chain(grids(rows).iter().flat_map(shown).collect::<Vec<_>>())
     });
     let mut sections = vec![Section { id: "sets", title: "By condition", body: body.collect() }];
-    sections.extend(last.map(|grid| Section { id: "gap", title: "Without truth", body: shown(grid).into() }));
+    sections.extend(last.map(|grid| Section {
+        id: "keypoints",
+        title: "Keypoints without ground truth",
+        body: shown(grid).into(),
+    }));
     let page = Page {
         title: "Errors on rendered people".to_owned(),
-        lead: format!("{n_clips} clips of rendered people whose truth is known; model sets: {}.", names.join(", ")),
+        lead: format!("{n_clips} clips of rendered people with ground truth; model sets: {}.", names.join(", ")),
         sections,
         style: "",
         script: "",

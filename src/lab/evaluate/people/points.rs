@@ -23,11 +23,11 @@ pub const GROUPS: [(&str, &[usize]); 6] = [
 pub struct PointErrors {
     pub points: &'static str,
     /// Number of visible points over all frames.
-    pub n_seen: usize,
+    pub n_visible: usize,
     /// Share of the visible points that were detected, 0..1.
     pub found: f64,
     /// Share of the hidden points that were detected, 0..1.
-    pub invented: f64,
+    pub false_positives: f64,
     /// Error relative to the shoulder width: median and 95th percentile.
     pub median: f64,
     pub p95: f64,
@@ -44,18 +44,18 @@ pub fn errors(clips: &[&RenderedClip]) -> Vec<PointErrors> {
 
 fn of_group(name: &'static str, points: &[usize], clips: &[&RenderedClip]) -> PointErrors {
     let (mut distances, mut scatters, mut biases) = (Vec::new(), Vec::new(), Vec::new());
-    let (mut n_seen, mut n_found, mut n_hidden, mut n_invented) = (0, 0, 0, 0);
+    let (mut n_visible, mut n_found, mut n_hidden, mut n_false_positives) = (0, 0, 0, 0);
     for clip in clips {
         for &point in points {
             let mut errors: Vec<[f64; 2]> = Vec::new();
             for t in 0..clip.n_frames() {
                 let is_found = clip.keypoints.body[[t, point, 2]] > SEEN_SCORE;
-                if clip.truth.body_seen[[t, point]] != Visibility::Seen {
+                if clip.truth.body_visibility[[t, point]] != Visibility::Visible {
                     n_hidden += 1;
-                    n_invented += usize::from(is_found);
+                    n_false_positives += usize::from(is_found);
                     continue;
                 }
-                n_seen += 1;
+                n_visible += 1;
                 if is_found {
                     n_found += 1;
                     errors.push(error(clip, t, point));
@@ -73,9 +73,9 @@ fn of_group(name: &'static str, points: &[usize], clips: &[&RenderedClip]) -> Po
     let distances = Ordered::new(distances);
     PointErrors {
         points: name,
-        n_seen,
-        found: share(n_found, n_seen),
-        invented: share(n_invented, n_hidden),
+        n_visible,
+        found: share(n_found, n_visible),
+        false_positives: share(n_false_positives, n_hidden),
         median: distances.quantile(0.5).unwrap_or(f64::NAN),
         p95: distances.quantile(0.95).unwrap_or(f64::NAN),
         bias: biases.iter().sum::<f64>() / (biases.len() as f64).max(1.0),
@@ -109,13 +109,13 @@ mod tests {
             clip.keypoints.body[[t, coco::L_WRIST, 1]] += shake * shoulders;
         }
         clip.keypoints.body[[5, coco::R_WRIST, 2]] = 0.0;
-        clip.truth.body_seen[[7, coco::R_WRIST]] = Visibility::BehindBody;
+        clip.truth.body_visibility[[7, coco::R_WRIST]] = Visibility::BehindBody;
         let errors = errors(&[&clip]);
         let of = |name: &str| errors.iter().find(|e| e.points == name).unwrap();
         let (shoulders, wrists, elbows) = (of("shoulders"), of("wrists"), of("elbows"));
         assert!((shoulders.bias - 0.05).abs() < 1e-3 && shoulders.scatter < 1e-3, "{shoulders:?}");
         assert!(wrists.bias < 1e-3 && (wrists.p95 - 0.02).abs() < 1e-3, "{wrists:?}");
-        assert_eq!((wrists.n_seen, wrists.invented), (79, 1.0));
+        assert_eq!((wrists.n_visible, wrists.false_positives), (79, 1.0));
         assert!((wrists.found - 78.0 / 79.0).abs() < 1e-9);
         assert!(elbows.median < 1e-3 && elbows.found == 1.0);
     }

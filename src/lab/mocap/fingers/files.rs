@@ -45,7 +45,9 @@ fn read_set(path: &Path) -> Result<FingerSet> {
         }
     }
     match first_error {
-        Some(error) if takes.is_empty() => Err(error.context(format!("no fingers in {}", path.display()))),
+        Some(error) if takes.is_empty() => {
+            Err(error.context(format!("no file with finger joints in {}", path.display())))
+        }
         _ => Ok(FingerSet { name, takes }),
     }
 }
@@ -60,7 +62,7 @@ pub fn read(path: &Path) -> Result<Vec<FingerTake>> {
         Some("npz") if smplx::is_smplx(path)? => of_smplx(path),
         Some("npz") => of_ted(path),
         Some("txt") => Ok(vec![labels::read(path)?]),
-        _ => bail!("{}: fingers are read from .bvh, .npz and .txt files", path.display()),
+        _ => bail!("unsupported file {}: expected fingers as .bvh, .npz or .txt", path.display()),
     }
 }
 
@@ -77,8 +79,8 @@ fn of_bvh(path: &Path) -> Result<Vec<FingerTake>> {
     if found.is_empty() {
         let names: Vec<&str> = bvh.joints.iter().map(|j| j.name.as_str()).take(40).collect();
         bail!(
-            "{}: no finger joints; names must tell the side (left, right, l, r) and the finger (thumb, index, middle, \
-             ring, pinky or little), like LeftHandIndex1, b_l_index1 or thumb_01_r; it has: {}",
+            "no finger joints in {}: expected names with a side (left, right, l, r) and a finger (thumb, index, \
+             middle, ring, pinky, little), such as LeftHandIndex1, b_l_index1 or thumb_01_r; found {}",
             path.display(),
             names.join(" ")
         );
@@ -87,14 +89,19 @@ fn of_bvh(path: &Path) -> Result<Vec<FingerTake>> {
     let take = |(side, joints): (Side, [Option<usize>; N_HAND])| {
         let frames: Vec<Fingers> = positions.iter().map(|p| joints.map(|j| j.map(|j| p[j]))).collect();
         let size = if joints[9].is_some() && joints[10].is_some() { Size::Phalanx } else { Size::Palm };
-        FingerTake::whole(&stem(path), side, frames, size)
+        FingerTake::all_counted(&stem(path), side, frames, size)
     };
     Ok(found.into_iter().map(take).collect())
 }
 
 fn of_smplx(path: &Path) -> Result<Vec<FingerTake>> {
     let take = |(side, frames): (Side, Vec<smplx::HandFrame>)| {
-        FingerTake::whole(&stem(path), side, frames.into_iter().map(|hand| hand.map(Some)).collect(), Size::Phalanx)
+        FingerTake::all_counted(
+            &stem(path),
+            side,
+            frames.into_iter().map(|hand| hand.map(Some)).collect(),
+            Size::Phalanx,
+        )
     };
     Ok(smplx::hands(path)?.into_iter().map(take).collect())
 }
@@ -107,7 +114,7 @@ fn of_ted(path: &Path) -> Result<Vec<FingerTake>> {
         let hand = ted::hand(side);
         let point = |t: usize, j: usize| std::array::from_fn(|k| joints[[t, j, k]]);
         let frames = (0..joints.shape()[0]).map(|t| hand.map(|j| Some(point(t, j?)))).collect();
-        FingerTake::whole(&stem(path), side, frames, Size::Palm)
+        FingerTake::all_counted(&stem(path), side, frames, Size::Palm)
     };
     Ok([Side::Left, Side::Right].map(take).into())
 }
@@ -154,13 +161,13 @@ mod tests {
     }
 
     #[test]
-    fn a_folder_without_fingers_says_why() {
+    fn the_error_of_a_folder_without_fingers_has_a_reason() {
         let dir = tempfile::tempdir().unwrap();
-        let says = |paths: &[PathBuf]| format!("{:#}", read_all(paths).err().unwrap());
-        assert!(says(&[dir.path().to_owned()]).contains("no .bvh"));
+        let error = |paths: &[PathBuf]| format!("{:#}", read_all(paths).err().unwrap());
+        assert!(error(&[dir.path().to_owned()]).contains("no .bvh"));
         std::fs::write(dir.path().join("a.txt"), "1 2 3").unwrap();
-        assert!(says(&[dir.path().to_owned()]).contains("3 numbers a line"));
-        assert!(says(&[dir.path().join("a.fbx")]).contains("a.fbx"));
-        assert!(says(&[dir.path().join("none.txt")]).contains("none.txt"));
+        assert!(error(&[dir.path().to_owned()]).contains("3 numbers per line"));
+        assert!(error(&[dir.path().join("a.fbx")]).contains("a.fbx"));
+        assert!(error(&[dir.path().join("none.txt")]).contains("none.txt"));
     }
 }

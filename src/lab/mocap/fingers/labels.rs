@@ -31,25 +31,28 @@ const NYU_PALM: f64 = 0.75;
 pub fn read(path: &Path) -> Result<FingerTake> {
     let text = std::fs::read_to_string(path).with_context(|| format!("cannot read {}", path.display()))?;
     let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-    parse(&text, name).with_context(|| format!("{} holds no hand labels", path.display()))
+    parse(&text, name).with_context(|| format!("invalid hand labels {}", path.display()))
 }
 
 fn parse(text: &str, name: String) -> Result<FingerTake> {
     let lines = text.lines().enumerate().filter(|(_, line)| !line.trim().is_empty());
     let number = |n: usize, word: &str| {
-        word.parse::<f64>().ok().filter(|v| v.is_finite()).with_context(|| format!("line {}: `{word}`", n + 1))
+        word.parse::<f64>()
+            .ok()
+            .filter(|v| v.is_finite())
+            .with_context(|| format!("invalid number `{word}` in line {}", n + 1))
     };
     let rows: Vec<Vec<f64>> = lines
         .map(|(n, line)| line.split_ascii_whitespace().map(|word| number(n, word)).collect())
         .collect::<Result<_>>()?;
-    let width = rows.first().context("it is empty")?.len();
+    let width = rows.first().context("the file is empty")?.len();
     if let Some(n) = rows.iter().position(|row| row.len() != width) {
-        bail!("frame {} has {} numbers, those before it {width}", n + 1, rows[n].len());
+        bail!("frame {} has {} numbers: expected {width}, as in frame 1", n + 1, rows[n].len());
     }
     match width {
         42 => Ok(nyu(&rows, name)),
         48 => icvl(&rows, name),
-        _ => bail!("{width} numbers a line; known are 42 (NYU, 14 points) and 48 (ICVL, 16 points)"),
+        _ => bail!("{width} numbers per line: expected 42 (NYU, 14 points) or 48 (ICVL, 16 points)"),
     }
 }
 
@@ -84,9 +87,9 @@ fn icvl(rows: &[Vec<f64>], name: String) -> Result<FingerTake> {
     let mut hands: Vec<Fingers> = vec![[None; N_HAND]; frames.len()];
     for (finger, [_, one, two, _]) in BONES.into_iter().enumerate() {
         let [first, second, third] = [1, 2, 3].map(|k| 3 * finger + k);
-        let apart = frames.iter().map(|p| vec3::norm(vec3::sub(p[second], p[first])));
+        let distances = frames.iter().map(|p| vec3::norm(vec3::sub(p[second], p[first])));
         // Half the length of the two bones: in most frames fingers are straight, and labels err to both sides.
-        let together = lower_quantile(apart, 0.7).context("no frame")?;
+        let together = lower_quantile(distances, 0.7).context("the file has no frame")?;
         let a = together * one / (one + two);
         for (p, hand) in frames.iter().zip(&mut hands) {
             let joint = joint_between(p[first], p[second], p[third], a, together - a);
@@ -99,8 +102,8 @@ fn icvl(rows: &[Vec<f64>], name: String) -> Result<FingerTake> {
         }
     }
     let size = |hand: &Fingers| Some(vec3::norm(vec3::sub(hand[10]?, hand[9]?)) as f32);
-    let phalanx = f64::from(lower_median(hands.iter().filter_map(size)).context("no frame")?);
-    ensure!(phalanx > 1e-3, "all points of the middle finger lie in one place");
+    let phalanx = f64::from(lower_median(hands.iter().filter_map(size)).context("the file has no frame")?);
+    ensure!(phalanx > 1e-3, "all points of the middle finger coincide");
     let palm = phalanx * BONES[2][0] / BONES[2][1];
     for (p, hand) in frames.iter().zip(&mut hands) {
         let knuckles = [5, 9, 13, 17].map(|j| hand[j].unwrap_or_default());
@@ -115,9 +118,9 @@ fn icvl(rows: &[Vec<f64>], name: String) -> Result<FingerTake> {
 /// towards `third`.
 fn joint_between(first: Vec3, second: Vec3, third: Vec3, a: f64, b: f64) -> Vec3 {
     let along = vec3::sub(second, first);
-    let apart = vec3::norm(along).min(a + b).max((a - b).abs() + 1e-9);
+    let distance = vec3::norm(along).min(a + b).max((a - b).abs() + 1e-9);
     let along = vec3::unit(along, 1e-9).unwrap_or([0.0, 1.0, 0.0]);
-    let foot = (a * a - b * b + apart * apart) / (2.0 * apart);
+    let foot = (a * a - b * b + distance * distance) / (2.0 * distance);
     let height = (a * a - foot * foot).max(0.0).sqrt();
     let bent = vec3::across(vec3::sub(third, second), along);
     let side = vec3::unit(bent, 1e-9).unwrap_or_default();

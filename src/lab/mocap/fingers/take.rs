@@ -79,7 +79,7 @@ pub struct Truth {
 
 impl FingerTake {
     /// One hand of the file `name`, all of whose points are evaluated.
-    pub fn whole(name: &str, side: Side, frames: Vec<Fingers>, size: Size) -> Self {
+    pub fn all_counted(name: &str, side: Side, frames: Vec<Fingers>, size: Size) -> Self {
         Self { name: format!("{name} {side:?}"), side, frames, counted: [true; N_HAND], size }
     }
 
@@ -95,7 +95,8 @@ impl FingerTake {
     pub fn truths(&self) -> Result<Vec<Truth>> {
         let lengths = self.frames.iter().filter_map(|f| self.size.length(f)).map(|l| l as f32);
         let length = lower_median(lengths.filter(|l| *l > 0.0));
-        let length = length.with_context(|| format!("{}: no frame has its {}", self.name, self.size.text()))?;
+        let length = length
+            .with_context(|| format!("no frame of {} has the reference segment ({})", self.name, self.size.text()))?;
         let grow = self.size.reference() / f64::from(length);
         let flip = if self.side == Side::Left { -1.0 } else { 1.0 };
         let place = |p: Option<Vec3>, wrist: Vec3| {
@@ -123,13 +124,13 @@ mod tests {
         fingers[4] = None;
         for size in [Size::Phalanx, Size::Palm, Size::MiddleEnd] {
             let frames = vec![fingers; 3];
-            let take = FingerTake::whole("a", Side::Left, frames, size);
+            let take = FingerTake::all_counted("a", Side::Left, frames, size);
             let truths = take.truths().unwrap();
             assert!(!truths[0].there[4] && !truths[0].counted[0] && truths[0].counted[20]);
             let off = (0..N_HAND).filter(|&j| j != 4).map(|j| vec3::norm(vec3::sub(truths[0].hand[j], relaxed()[j])));
             assert!(off.fold(0.0, f64::max) < 1e-6);
         }
-        let take = FingerTake::whole("none", Side::Left, vec![[None; N_HAND]], Size::Palm);
+        let take = FingerTake::all_counted("none", Side::Left, vec![[None; N_HAND]], Size::Palm);
         assert!(format!("{:#}", take.truths().unwrap_err()).contains("none"));
     }
 }

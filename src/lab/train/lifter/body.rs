@@ -23,7 +23,7 @@ const CAPTURED: f64 = 0.35;
 const RENDERED: f64 = 0.4;
 /// Share of the captured scenes in which one arm comes from another take.
 const MIXED: f64 = 0.35;
-/// Least and greatest number of frames of a scene, and the number of windows cut from it.
+/// Smallest and largest number of frames of a scene, and the number of windows cut from it.
 const SCENE_FRAMES: std::ops::RangeInclusive<usize> = 30..=84;
 const WINDOWS: usize = 4;
 /// Number of evaluation scenes per set, and the number for a brief evaluation.
@@ -168,8 +168,8 @@ impl TrainingTask for BodyLifterTask {
     fn errors(&self, brief: bool) -> Result<Vec<String>> {
         let n = if brief { N_SCENES_BRIEF } else { N_SCENES };
         let mut lines = Vec::new();
-        let by_rule = ("made by rule".to_owned(), Vec::new());
-        for (set, takes) in self.held_out.iter().chain([&by_rule]) {
+        let procedural = ("procedural gestures".to_owned(), Vec::new());
+        for (set, takes) in self.held_out.iter().chain([&procedural]) {
             for (filming, input) in [(Filming::Drop, "drop "), (Filming::Clean, "clean")] {
                 let scenes = scenes(takes, filming, n);
                 if scenes.is_empty() {

@@ -41,8 +41,8 @@ fn input_indices(batch: usize, down: ConvAxis, across: ConvAxis) -> Vec<u32> {
     for (b, row) in (0..batch).flat_map(|b| (0..down.n_out).map(move |row| (b, row))) {
         for (column, offset) in (0..across.n_out).flat_map(|column| (0..9).map(move |offset| (column, offset))) {
             let (y, x) = (at(down, row, offset / 3), at(across, column, offset % 3));
-            let place = y.zip(x).map(|(y, x)| ((b * down.n_in + y) * across.n_in + x) as u32);
-            input_indices.push(place.unwrap_or(u32::MAX));
+            let index = y.zip(x).map(|(y, x)| ((b * down.n_in + y) * across.n_in + x) as u32);
+            input_indices.push(index.unwrap_or(u32::MAX));
         }
     }
     input_indices

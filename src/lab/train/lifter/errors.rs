@@ -102,16 +102,16 @@ fn to_reference(pose: &Pose, scale: f64) -> Pose {
 }
 
 fn of_frame(p: &Pose, q: &Pose) -> BodyErrors {
-    let apart = |j: usize| vec3::norm(vec3::sub(p[j], q[j]));
+    let distance = |j: usize| vec3::norm(vec3::sub(p[j], q[j]));
     let with_neck = |pose: &Pose| pose[COUNTED].iter().copied().chain([[0.0; 3]]).collect::<Vec<Vec3>>();
     let (from, to) = (with_neck(p), with_neck(q));
     let aligned = procrustes::similarity(&from, &to);
     let after = |j: usize| vec3::norm(vec3::sub(aligned.map_or(from[j], |s| s.apply(from[j])), to[j]));
     let n = COUNTED.len() as f64;
     BodyErrors {
-        mpjpe: COUNTED.map(apart).sum::<f64>() / n,
+        mpjpe: COUNTED.map(distance).sum::<f64>() / n,
         p_mpjpe: (0..COUNTED.len()).map(after).sum::<f64>() / n,
-        wrist: (apart(R_WRIST) + apart(L_WRIST)) / 2.0,
+        wrist: (distance(R_WRIST) + distance(L_WRIST)) / 2.0,
         wrist_depth: [R_WRIST, L_WRIST].map(|j| (p[j][2] - q[j][2]).abs()).iter().sum::<f64>() / 2.0,
         ..BodyErrors::default()
     }

@@ -3,7 +3,7 @@
 //! network (`orator_nn::lifter::hand`) that the pipeline uses.
 
 use super::conv3x3::Conv3x3;
-use super::score_maps::{Crop, N_MAPS, PLACES, assembled, score_maps};
+use super::score_maps::{Crop, MAP_SIZE, N_MAPS, assembled, score_maps};
 use candle_core::{D, Device, Module, Result, Tensor};
 use candle_nn::Linear;
 use orator_base::motion::view::hand::{HandJoints, SeenHand};
@@ -47,7 +47,7 @@ impl Tower {
             n_in = n_out;
         }
         // The side's two values are appended to the flattened output of the convolutions.
-        let mut n_in = (PLACES / 8) * (PLACES / 8) * n_in + 2;
+        let mut n_in = (MAP_SIZE / 8) * (MAP_SIZE / 8) * n_in + 2;
         let mut layers = Vec::new();
         for (i, n_out) in widths.into_iter().enumerate() {
             layers.push(params.linear(&format!("{name}.dense{i}"), [n_in, n_out], Init::Glorot, 1e-4)?);
@@ -106,7 +106,7 @@ impl HeatmapLifter {
             for ((i, crop), maps) in batch.iter().zip(maps.chunks_exact_mut(N_MAPS)) {
                 score_maps(&mirrored[*i], Crop { side: CROP_SCALE * crop.side, ..*crop }, maps);
             }
-            let maps = Tensor::from_vec(maps, (batch.len(), PLACES, PLACES, MAPS), &Device::Cpu)?;
+            let maps = Tensor::from_vec(maps, (batch.len(), MAP_SIZE, MAP_SIZE, MAPS), &Device::Cpu)?;
             let rows = self.forward(&maps, &right_sides(batch.len(), &maps)?, &mut Mode::Eval)?.to_vec2::<f32>()?;
             for ((i, _), row) in batch.iter().zip(rows) {
                 let at = |j: usize| std::array::from_fn(|k| f64::from(row[3 * j + k]));
@@ -165,7 +165,7 @@ mod tests {
         let of = |part: &str| params.trainables().filter(|(n, _)| n.contains(part)).map(|(_, v)| v.elem_count()).sum();
         let (prior, view): (usize, usize) = (of("pose_prior"), of("view_point"));
         assert_eq!((prior, view), (1_637_279, 2_238_403), "1.64 M and 2.24 M");
-        let maps = Tensor::zeros((2, PLACES, PLACES, MAPS), DType::F32, &Device::Cpu)?;
+        let maps = Tensor::zeros((2, MAP_SIZE, MAP_SIZE, MAPS), DType::F32, &Device::Cpu)?;
         let sides = Tensor::new(&[[0f32, 1.0], [1.0, 0.0]], &Device::Cpu)?;
         assert_eq!(net.forward(&maps, &sides, &mut Mode::Eval)?.dims(), [2, 72]);
         Ok(())

@@ -3,7 +3,7 @@
 //! them right ones.
 
 use super::heatmap_network::{HeatmapLifter, NAME, right_sides};
-use super::score_maps::{Crop, PLACES, canonical, score_maps};
+use super::score_maps::{Crop, MAP_SIZE, canonical, score_maps};
 use crate::train::scene::hand::{errors, sample_hand};
 use crate::train::scene::hand_shape::normal;
 use crate::train::supervised::TrainingTask;
@@ -53,7 +53,7 @@ impl TrainingTask for HeatmapLifterTask {
     }
 
     fn metadata(&self) -> Value {
-        json!({ "config": { "places": PLACES, "points": N_HAND } })
+        json!({ "config": { "places": MAP_SIZE, "points": N_HAND } })
     }
 
     fn params(&self) -> &Params {
@@ -61,7 +61,7 @@ impl TrainingTask for HeatmapLifterTask {
     }
 
     fn shape_in(&self) -> Vec<usize> {
-        vec![PLACES, PLACES, N_HAND]
+        vec![MAP_SIZE, MAP_SIZE, N_HAND]
     }
 
     fn weights(&self) -> Vec<f32> {
@@ -89,8 +89,8 @@ impl TrainingTask for HeatmapLifterTask {
     }
 
     /// Mean squared error of the points plus that of the rotation matrix.
-    fn loss(&self, out: &Tensor, wanted: &Tensor, _weights: &Tensor) -> candle_core::Result<Tensor> {
-        let off = (out.reshape(wanted.shape())? - wanted)?.sqr()?;
+    fn loss(&self, out: &Tensor, target: &Tensor, _weights: &Tensor) -> candle_core::Result<Tensor> {
+        let off = (out.reshape(target.shape())? - target)?.sqr()?;
         off.narrow(1, 0, N_HAND)?.mean_all()? + off.narrow(1, N_HAND, 3)?.mean_all()?
     }
 

@@ -8,14 +8,14 @@ use orator_base::motion::view::hand::{HandJoints, SeenHand};
 use orator_base::types::pose2d::N_HAND;
 
 /// Width and height of a score map.
-pub const PLACES: usize = 32;
+pub const MAP_SIZE: usize = 32;
 /// Width of the crop in px, and px averaged into one score.
 const CROP: f64 = 256.0;
 const POOLED: usize = 8;
 /// A score is exp(-d^2 / SIGMA^2), d in px of the crop.
 const SIGMA: f64 = 25.0;
 /// Number of values of all maps: [32, 32, 21].
-pub const N_MAPS: usize = PLACES * PLACES * N_HAND;
+pub const N_MAPS: usize = MAP_SIZE * MAP_SIZE * N_HAND;
 
 /// A square of the image: centre and side in px.
 #[derive(Clone, Copy, Debug)]
@@ -32,8 +32,8 @@ impl Crop {
         let n = there().count().max(1) as f64;
         let middle = || [0, 1].map(|k| there().map(|p| p[k]).sum::<f64>() / n);
         let centre = seen[9].map_or_else(middle, |p| p.map(f64::from));
-        let reach = there().map(|p| (p[0] - centre[0]).hypot(p[1] - centre[1])).fold(0.0, f64::max);
-        (reach > 1e-6 && reach.is_finite()).then_some(Self { centre, side: 2.0 * reach })
+        let radius = there().map(|p| (p[0] - centre[0]).hypot(p[1] - centre[1])).fold(0.0, f64::max);
+        (radius > 1e-6 && radius.is_finite()).then_some(Self { centre, side: 2.0 * radius })
     }
 }
 
@@ -50,16 +50,16 @@ pub fn score_maps(seen: &SeenHand, crop: Crop, maps: &mut [f32]) {
         let [across, down] = at.map(profile);
         for (y, down) in down.iter().enumerate() {
             for (x, across) in across.iter().enumerate() {
-                maps[(y * PLACES + x) * N_HAND + j] = (across * down) as f32;
+                maps[(y * MAP_SIZE + x) * N_HAND + j] = (across * down) as f32;
             }
         }
     }
 }
 
 /// Means of exp(-(x - at)^2 / SIGMA^2) over 8 px each.
-fn profile(at: f64) -> [f64; PLACES] {
-    std::array::from_fn(|place| {
-        let scores = (0..POOLED).map(|k| (-(((place * POOLED + k) as f64 - at) / SIGMA).powi(2)).exp());
+fn profile(at: f64) -> [f64; MAP_SIZE] {
+    std::array::from_fn(|cell| {
+        let scores = (0..POOLED).map(|k| (-(((cell * POOLED + k) as f64 - at) / SIGMA).powi(2)).exp());
         scores.sum::<f64>() / POOLED as f64
     })
 }
@@ -81,12 +81,12 @@ pub fn canonical(hand: &HandJoints) -> Option<(HandJoints, [Vec3; 3])> {
 
 /// The hand in camera axes from its canonical frame, relative to the wrist; the inverse of `canonical` up to scale.
 pub fn assembled(own: &HandJoints, axes: &[Vec3; 3]) -> HandJoints {
-    let place = |p: Vec3| {
+    let to_camera = |p: Vec3| {
         let [x, y, z] = [0, 1, 2].map(|k| vec3::scale(axes[k], if k == 2 { -p[k] } else { p[k] }));
         vec3::add(x, vec3::add(y, z))
     };
-    let wrist = place(own[0]);
-    own.map(|p| vec3::sub(place(p), wrist))
+    let wrist = to_camera(own[0]);
+    own.map(|p| vec3::sub(to_camera(p), wrist))
 }
 
 #[cfg(test)]
@@ -120,9 +120,9 @@ mod tests {
             (0..64).map(|k| score(8 * px + k % 8, 8 * py + k / 8)).sum::<f64>() / 64.0
         };
         for (px, py) in [(28, 25), (26, 27), (0, 0)] {
-            assert!((f64::from(maps[(py * PLACES + px) * N_HAND + 4]) - mean(px, py)).abs() < 1e-6);
+            assert!((f64::from(maps[(py * MAP_SIZE + px) * N_HAND + 4]) - mean(px, py)).abs() < 1e-6);
         }
-        assert!((0..PLACES * PLACES).all(|k| maps[k * N_HAND] == 0.0), "a point not seen has an empty map");
+        assert!((0..MAP_SIZE * MAP_SIZE).all(|k| maps[k * N_HAND] == 0.0), "a point not seen has an empty map");
         assert!(Crop::around(&[Some([3.0, 3.0]); N_HAND]).is_none());
     }
 }

@@ -1,5 +1,5 @@
 //! Synthetic camera views of a moving upper body: ground truth in camera axes, and 2D keypoints with the noise, bias,
-//! outliers and gaps of a detector. The ranges of angles, focal lengths and noise are noted beside each draw.
+//! outliers and gaps of a detector. The ranges of angles, focal lengths and noise are documented at each draw.
 
 use super::body_motion;
 use super::body_motion::{Proportions, turn};
@@ -63,8 +63,8 @@ impl FilmedScene {
         rng: &mut ChaCha8Rng,
     ) -> Option<Self> {
         let training = filming == Filming::Training;
-        let mut poses = stretch(take, training, n_frames, rng)?;
-        if let Some(other) = other.and_then(|other| stretch(other, training, n_frames, rng)) {
+        let mut poses = excerpt(take, training, n_frames, rng)?;
+        if let Some(other) = other.and_then(|other| excerpt(other, training, n_frames, rng)) {
             poses.iter_mut().zip(&other).for_each(|(pose, other)| replace_left_arm(pose, other));
         }
         let unchanged = training && take.rendered;
@@ -200,20 +200,20 @@ fn drop_hips(seen: &mut [SeenBody], shoulders_px: f64, training: bool, rng: &mut
 
 /// Places the hips straight below the shoulders, as many detectors do when a desk or the image border hides them.
 fn guess_hips(seen: &mut [SeenBody], shoulders_px: f64, rng: &mut ChaCha8Rng) {
-    let (below, apart) = (rng.random_range(0.8..1.7), rng.random_range(0.25..0.75));
+    let (below, width) = (rng.random_range(0.8..1.7), rng.random_range(0.25..0.75));
     let aside = 0.1 * normal(rng);
     for frame in seen.iter_mut() {
         let (Some(right), Some(left)) = (frame[R_SHOULDER], frame[L_SHOULDER]) else { continue };
         for (hip, side) in [(R_HIP, -0.5), (L_HIP, 0.5)] {
             let middle = [0, 1].map(|k| f64::from(right[k] + left[k]) / 2.0);
-            let place = [aside + side * apart + 0.02 * normal(rng), below + 0.02 * normal(rng)];
-            frame[hip] = frame[hip].map(|_| [0, 1].map(|k| (middle[k] + shoulders_px * place[k]) as f32));
+            let position = [aside + side * width + 0.02 * normal(rng), below + 0.02 * normal(rng)];
+            frame[hip] = frame[hip].map(|_| [0, 1].map(|k| (middle[k] + shoulders_px * position[k]) as f32));
         }
     }
 }
 
 /// A random excerpt of a take at `FPS`, rotated so that it faces the camera on average.
-fn stretch(take: &BodyTake, training: bool, n_frames: usize, rng: &mut ChaCha8Rng) -> Option<Vec<Pose>> {
+fn excerpt(take: &BodyTake, training: bool, n_frames: usize, rng: &mut ChaCha8Rng) -> Option<Vec<Pose>> {
     let speed = if training { rng.random_range(-0.5f64..0.4).exp() } else { 1.0 };
     let step = speed * take.fps / FPS;
     let room = take.poses.len() as f64 - 1.0 - step * (n_frames as f64 - 1.0);
@@ -268,7 +268,7 @@ fn facing(poses: &[Pose]) -> f64 {
     (-across[2]).atan2(across[0])
 }
 
-/// The pose with bone directions kept and bone lengths replaced.
+/// The pose with unchanged bone directions and other bone lengths.
 fn with_bone_lengths(pose: &Pose, bones: &Proportions) -> Pose {
     let along = |from: Vec3, to: Vec3, length: f64| {
         vec3::scale(vec3::unit(vec3::sub(to, from), 1e-9).unwrap_or([0.0, 1.0, 0.0]), length)

@@ -93,9 +93,9 @@ pub fn gesture(rng: &mut ChaCha8Rng, n_frames: usize, frame_secs: f64) -> Vec<Po
     };
     let joined = rng.random_bool(0.12);
     let swivel = Swivel::sample(rng, habit.back);
-    let sway = [0.14, 0.10, 0.08, 0.55, 0.30, 0.2, 0.025, 0.02, 0.04].map(|most| SlowSwing::sample(rng, most));
+    let sway = [0.14, 0.10, 0.08, 0.55, 0.30, 0.2, 0.025, 0.02, 0.04].map(|max| SlowSwing::sample(rng, max));
     let lean = rng.random_range(-0.1..0.6);
-    let reach = rng.random_range(0.0..0.06);
+    let forward_lean = rng.random_range(0.0..0.06);
     let beat = BeatStroke::sample(rng);
     (0..n_frames)
         .map(|frame| {
@@ -105,7 +105,7 @@ pub fn gesture(rng: &mut ChaCha8Rng, n_frames: usize, frame_secs: f64) -> Vec<Po
             for (side, shoulder, track) in [(1.0, L_SHOULDER, &left), (-1.0, R_SHOULDER, &right)] {
                 let mut wrist = vec3::add(if joined { left.at(t) } else { track.at(t) }, beat.at(t, side));
                 wrist[0] = if joined { side * 0.03 + s[6] } else { side * wrist[0] };
-                let ahead = reach * (-wrist[2] / 0.4).clamp(-0.2, 1.0);
+                let ahead = forward_lean * (-wrist[2] / 0.4).clamp(-0.2, 1.0);
                 let at = [side * body.shoulders / 2.0, -s[6] * side - s[7], -ahead - s[8] * side];
                 let (elbow, wrist) = bend(at, wrist, body.upper_arm, body.forearm, swivel.pole(t, side));
                 (pose[shoulder], pose[shoulder + 1], pose[shoulder + 2]) = (at, elbow, wrist);
@@ -152,18 +152,18 @@ struct WristPath {
 impl WristPath {
     fn sample(rng: &mut ChaCha8Rng, habit: &Habit, secs: f64) -> Self {
         let pace = rng.random_range(0.8..1.7);
-        let place = |rng: &mut ChaCha8Rng| {
+        let random_wrist = |rng: &mut ChaCha8Rng| {
             let rests = rng.random_bool(habit.rests);
             let ranges = if rests { habit.rest } else { habit.gestures[rng.random_range(0..habit.gestures.len())] };
             ranges.map(|(low, high)| rng.random_range(low..high))
         };
-        let start = place(rng);
+        let start = random_wrist(rng);
         let mut last = start;
         let mut moves = Vec::new();
         let mut t = -rng.random_range(0.0..2.0);
         while t < secs {
-            let whole = rng.random_bool(0.6);
-            let next = if whole { place(rng) } else { last.map(|v| v + rng.random_range(-0.12..0.12)) };
+            let is_new_target = rng.random_bool(0.6);
+            let next = if is_new_target { random_wrist(rng) } else { last.map(|v| v + rng.random_range(-0.12..0.12)) };
             let far = vec3::norm(vec3::sub(next, last));
             let takes = pace * rng.random_range(0.2..0.45) * (0.4 + far / 0.3);
             moves.push((t, t + takes, next));
@@ -182,13 +182,13 @@ impl WristPath {
     }
 
     fn at(&self, t: f64) -> Vec3 {
-        let mut place = self.start;
+        let mut position = self.start;
         for &(leaves, arrives, next) in self.moves.iter().take_while(|m| m.0 < t) {
             let s = ((t - leaves) / (arrives - leaves)).min(1.0);
             let share = s * s * s * (10.0 - 15.0 * s + 6.0 * s * s); // minimum jerk
-            place = std::array::from_fn(|k| place[k] + share * (next[k] - place[k]));
+            position = std::array::from_fn(|k| position[k] + share * (next[k] - position[k]));
         }
-        place
+        position
     }
 }
 
@@ -203,8 +203,8 @@ struct Swivel {
 impl Swivel {
     fn sample(rng: &mut ChaCha8Rng, mean_back: (f64, f64)) -> Self {
         let (out, back) = (SlowSwing::sample(rng, 0.25), SlowSwing::sample(rng, 0.25));
-        let (least, most) = mean_back;
-        Self { out, back, mean_out: rng.random_range(0.0..1.1), mean_back: rng.random_range(least..most) }
+        let (min, max) = mean_back;
+        Self { out, back, mean_out: rng.random_range(0.0..1.1), mean_back: rng.random_range(min..max) }
     }
 
     fn pole(&self, t: f64, side: f64) -> Vec3 {
@@ -221,8 +221,8 @@ struct SlowSwing {
 }
 
 impl SlowSwing {
-    fn sample(rng: &mut ChaCha8Rng, most: f64) -> Self {
-        let (mean, swing) = (rng.random_range(-most..most), 0.5 * rng.random_range(0.0..most));
+    fn sample(rng: &mut ChaCha8Rng, max: f64) -> Self {
+        let (mean, swing) = (rng.random_range(-max..max), 0.5 * rng.random_range(0.0..max));
         Self { mean, swing, rate: TAU * rng.random_range(0.05..0.6), phase: rng.random_range(0.0..TAU) }
     }
 
@@ -233,20 +233,20 @@ impl SlowSwing {
 
 /// Small fast oscillation added to the wrist position, like beat gestures.
 struct BeatStroke {
-    reach: Vec3,
+    amplitude: Vec3,
     rate: f64,
     phase: f64,
 }
 
 impl BeatStroke {
     fn sample(rng: &mut ChaCha8Rng) -> Self {
-        let most = if rng.random_bool(0.4) { rng.random_range(0.005..0.05) } else { 0.004 };
-        let reach = std::array::from_fn(|_| rng.random_range(-most..most));
-        Self { reach, rate: TAU * rng.random_range(0.8..3.5), phase: rng.random_range(0.0..TAU) }
+        let max = if rng.random_bool(0.4) { rng.random_range(0.005..0.05) } else { 0.004 };
+        let amplitude = std::array::from_fn(|_| rng.random_range(-max..max));
+        Self { amplitude, rate: TAU * rng.random_range(0.8..3.5), phase: rng.random_range(0.0..TAU) }
     }
 
     fn at(&self, t: f64, side: f64) -> Vec3 {
-        vec3::scale(self.reach, (self.rate * t + self.phase + 0.3 * side).sin())
+        vec3::scale(self.amplitude, (self.rate * t + self.phase + 0.3 * side).sin())
     }
 }
 

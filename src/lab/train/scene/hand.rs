@@ -106,17 +106,22 @@ pub fn errors(
     let n = if brief { n / 10 } else { n };
     let samples: Vec<HandSample> = (0..n).map(|_| sample_hand(&mut rng)).collect();
     let seen: Vec<SeenHand> = samples.iter().map(|s| s.seen).collect();
-    let (mut with, mut hands) = (Vec::new(), Vec::new());
+    let (mut lifted, mut hands) = (Vec::new(), Vec::new());
     for (sample, hand) in samples.iter().zip(lift(&seen)?) {
         if let Some(hand) = hand {
-            with.push(sample);
+            lifted.push(sample);
             hands.push(hand);
         }
     }
-    let mut lines = vec![format!("hands made by rule lifter        {}", SyntheticHandErrors::measure(&with, &hands))];
+    let mut lines =
+        vec![format!("{:32} {}", "procedural hands, lifter", SyntheticHandErrors::measure(&lifted, &hands))];
     if !brief {
-        let flat: Vec<HandJoints> = with.iter().map(|s| flat_hand(s)).collect();
-        lines.push(format!("hands made by rule flat, in scale {}", SyntheticHandErrors::measure(&with, &flat)));
+        let flat: Vec<HandJoints> = lifted.iter().map(|s| flat_hand(s)).collect();
+        lines.push(format!(
+            "{:32} {}",
+            "procedural hands, flat baseline",
+            SyntheticHandErrors::measure(&lifted, &flat)
+        ));
     }
     Ok(lines)
 }

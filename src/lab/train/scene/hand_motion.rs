@@ -123,9 +123,9 @@ impl HandMotion {
             let upper = vec3::unit(vec3::sub(*elbow, *shoulder), 1e-6).unwrap_or([0.0, 1.0, 0.0]);
             let fore = vec3::unit(vec3::sub(*wrist, *elbow), 1e-6).unwrap_or(upper);
             // The thumb direction follows the forearm and is pulled towards its anatomical direction.
-            let carried = last.map_or(thumb, |last| Rotation::between(last, fore).turn(thumb));
-            let wanted = vec3::across(vec3::sub([0.0, -0.3, -0.6], upper), fore);
-            let both = vec3::add(vec3::scale(carried, 0.5), wanted);
+            let transported = last.map_or(thumb, |last| Rotation::between(last, fore).turn(thumb));
+            let anatomical = vec3::across(vec3::sub([0.0, -0.3, -0.6], upper), fore);
+            let both = vec3::add(vec3::scale(transported, 0.5), anatomical);
             thumb = vec3::unit(vec3::across(both, fore), 1e-6).unwrap_or_else(|| vec3::any_across(fore));
             last = Some(fore);
             let x = vec3::scale(thumb, side);

@@ -27,10 +27,12 @@ pub struct HandNoise {
     /// Standard deviation per axis of the error common to all points (the wrist's own error).
     pub hand: f64,
     /// Noise of visible fingers, and of hidden ones.
-    pub seen: FingerNoise,
+    #[serde(rename = "seen")]
+    pub visible: FingerNoise,
     pub hidden: FingerNoise,
     /// Share of the fingers that are hidden, 0..1.
-    pub hides: f64,
+    #[serde(rename = "hides")]
+    pub hidden_share: f64,
 }
 
 /// Noise of a finger, per axis.
@@ -39,8 +41,10 @@ pub struct FingerNoise {
     /// Standard deviation of the error common to a finger's points, of regular fingers and of outliers, and the share
     /// of outliers.
     pub finger: f64,
-    pub stray_finger: f64,
-    pub strays: f64,
+    #[serde(rename = "stray_finger")]
+    pub outlier_finger_std: f64,
+    #[serde(rename = "strays")]
+    pub outlier_share: f64,
     /// Standard deviation of a point's own error.
     pub point: f64,
 }
@@ -65,18 +69,18 @@ impl HandNoise {
     ) {
         let exact = *hand;
         let size = palm_px * scale;
-        let whole = [0, 1].map(|_| self.hand * normal(rng));
+        let common = [0, 1].map(|_| self.hand * normal(rng));
         for finger in 0..N_FINGERS {
-            let noise = if rng.random_bool(self.hides.clamp(0.0, 1.0)) { self.hidden } else { self.seen };
-            let is_stray = rng.random_bool(noise.strays.clamp(0.0, 1.0));
-            let deviation = if is_stray { noise.stray_finger } else { noise.finger };
+            let noise = if rng.random_bool(self.hidden_share.clamp(0.0, 1.0)) { self.hidden } else { self.visible };
+            let is_outlier = rng.random_bool(noise.outlier_share.clamp(0.0, 1.0));
+            let deviation = if is_outlier { noise.outlier_finger_std } else { noise.finger };
             let of_finger = [0, 1].map(|_| deviation * normal(rng));
             let first = 1 + N_OF_FINGER * finger;
             for (j, point) in hand.iter_mut().enumerate().skip(first).take(N_OF_FINGER) {
                 let bias = basis(&exact, j);
                 for k in 0..2 {
                     let own = noise.point * normal(rng);
-                    point[k] += size * (whole[k] + of_finger[k] + own);
+                    point[k] += size * (common[k] + of_finger[k] + own);
                     if with_bias {
                         point[k] += bias.iter().zip(self.bias[j - 1]).map(|(v, weight)| weight * v[k]).sum::<f64>();
                     }
@@ -97,9 +101,9 @@ mod tests {
             set: String::new(),
             bias: [[0.0; N_BASIS]; N_POINTS],
             hand: 0.03,
-            seen: FingerNoise { finger: 0.04, point: 0.02, ..FingerNoise::default() },
+            visible: FingerNoise { finger: 0.04, point: 0.02, ..FingerNoise::default() },
             hidden: FingerNoise::default(),
-            hides: 0.0,
+            hidden_share: 0.0,
         };
         let mut rng = ChaCha8Rng::seed_from_u64(1);
         let mut sum = 0.0;

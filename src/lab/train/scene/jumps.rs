@@ -12,7 +12,7 @@ const SCENE_SHARE: f64 = 0.3;
 const MAX_ERRORS: usize = 2;
 /// Duration of an error in frames.
 const FRAMES: std::ops::RangeInclusive<usize> = 2..=32;
-/// Least and greatest displacement of a jump in shoulder widths.
+/// Smallest and largest displacement of a jump in shoulder widths.
 const DISTANCE: [f64; 2] = [0.4, 4.0];
 /// Share of the errors that swap the wrists.
 const SWAP_SHARE: f64 = 0.25;
@@ -36,9 +36,9 @@ pub fn disturb(seen: &mut [SeenBody], shoulders_px: f64, rng: &mut ChaCha8Rng) -
             let distance = shoulders_px * rng.random_range(DISTANCE[0].ln()..DISTANCE[1].ln()).exp();
             let angle = rng.random_range(0.0..std::f64::consts::TAU);
             let shake = 0.03 * shoulders_px;
-            for place in seen[frames.clone()].iter_mut().filter_map(|frame| frame[point].as_mut()) {
-                place[0] += (distance * angle.cos() + shake * normal(rng)) as f32;
-                place[1] += (distance * angle.sin() + shake * normal(rng)) as f32;
+            for position in seen[frames.clone()].iter_mut().filter_map(|frame| frame[point].as_mut()) {
+                position[0] += (distance * angle.cos() + shake * normal(rng)) as f32;
+                position[1] += (distance * angle.sin() + shake * normal(rng)) as f32;
             }
         }
         disturbed[frames].fill(true);

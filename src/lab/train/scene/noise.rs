@@ -37,10 +37,12 @@ pub struct PointNoise {
     /// Standard deviation per axis of the clip's mean error that the bias does not explain.
     pub clip: f64,
     /// Noise of frames in which the point is visible, and in which it is hidden.
-    pub seen: FrameNoise,
+    #[serde(rename = "seen")]
+    pub visible: FrameNoise,
     pub hidden: FrameNoise,
     /// Runs of frames in which the point is hidden, and in which it is not detected.
-    pub hides: Runs,
+    #[serde(rename = "hides")]
+    pub occlusions: Runs,
     pub gaps: Runs,
 }
 
@@ -49,9 +51,11 @@ pub struct PointNoise {
 pub struct FrameNoise {
     /// Standard deviation of regular frames, and of outliers.
     pub deviation: f64,
-    pub stray_deviation: f64,
+    #[serde(rename = "stray_deviation")]
+    pub outlier_std: f64,
     /// Share of outliers, 0..1.
-    pub strays: f64,
+    #[serde(rename = "strays")]
+    pub outlier_share: f64,
     /// Correlation between successive frames, 0..1.
     pub correlation: f64,
 }
@@ -95,7 +99,7 @@ pub fn measured() -> &'static MeasuredNoise {
 }
 
 fn parse(text: &str) -> Result<MeasuredNoise> {
-    serde_json::from_str(text).context("the built-in keypoint noise")
+    serde_json::from_str(text).context("invalid built-in models/keypoint_noise.json")
 }
 
 /// Index of a point's kind in `KeypointNoise::points`.
@@ -142,24 +146,25 @@ impl KeypointNoise {
         for point in 0..N_POINTS {
             let noise = &self.points[kind(point)];
             let random_direction = [normal(rng), normal(rng)];
-            let hidden = noise.hides.sample(body.len(), rng);
+            let hidden = noise.occlusions.sample(body.len(), rng);
             let missing = noise.gaps.sample(body.len(), rng);
             let clip = [0, 1].map(|_| noise.clip * normal(rng));
             let mut correlated = [normal(rng), normal(rng)];
             for (t, frame) in body.iter_mut().enumerate() {
-                let of_frame = if hidden[t] { noise.hidden } else { noise.seen };
-                let keep = of_frame.correlation.clamp(0.0, 0.99);
-                correlated = correlated.map(|v| keep * v + (1.0 - keep * keep).sqrt() * normal(rng));
-                let is_stray = rng.random_bool(of_frame.strays.clamp(0.0, 1.0));
-                let stray = [0, 1].map(|_| if is_stray { of_frame.stray_deviation * normal(rng) } else { 0.0 });
-                let Some(place) = frame[point].as_mut() else { continue };
+                let of_frame = if hidden[t] { noise.hidden } else { noise.visible };
+                let correlation = of_frame.correlation.clamp(0.0, 0.99);
+                correlated =
+                    correlated.map(|v| correlation * v + (1.0 - correlation * correlation).sqrt() * normal(rng));
+                let is_outlier = rng.random_bool(of_frame.outlier_share.clamp(0.0, 1.0));
+                let outlier = [0, 1].map(|_| if is_outlier { of_frame.outlier_std * normal(rng) } else { 0.0 });
+                let Some(position) = frame[point].as_mut() else { continue };
                 let bias = basis(&exact[t], point, shoulders_px).map_or([0.0; 2], |basis| {
                     [0, 1].map(|k| basis.iter().zip(noise.bias).map(|(vector, weight)| weight * vector[k]).sum::<f64>())
                 });
                 let bias = if with_bias { bias } else { random_direction.map(|v| 0.7 * v * bias[0].hypot(bias[1])) };
                 for k in 0..2 {
-                    let off = bias[k] + clip[k] + of_frame.deviation * correlated[k] + stray[k];
-                    place[k] += (shoulders_px * scale * off) as f32;
+                    let off = bias[k] + clip[k] + of_frame.deviation * correlated[k] + outlier[k];
+                    position[k] += (shoulders_px * scale * off) as f32;
                 }
                 if missing[t] {
                     frame[point] = None;

@@ -1,7 +1,7 @@
 //! The first 64 principal components of the corpus' motion windows, computed by orthogonal iteration (Golub and Van
 //! Loan, Matrix Computations, 4th edition, 8.2.4).
 
-use super::corpus::{Corpus, CorpusPiece};
+use super::corpus::{Corpus, CorpusClip};
 use anyhow::{Result, ensure};
 use candle_core::{Device, Tensor};
 use ndarray::{Array1, Array2, Axis, s};
@@ -38,16 +38,20 @@ pub struct FittedBasis {
 /// # Errors
 /// Fewer than 640 windows; the file cannot be written.
 pub fn fit(corpus: &Corpus, seed: u64, out: &Path) -> Result<FittedBasis> {
-    let weights = weights(&corpus.pieces);
-    let (n_windows, covariance) = covariance(&corpus.pieces, &weights);
-    ensure!(n_windows > 10 * N, "{n_windows} windows of motion are too few for a basis of {N}");
+    let weights = weights(&corpus.clips);
+    let (n_windows, covariance) = covariance(&corpus.clips, &weights);
+    ensure!(
+        n_windows > 10 * N,
+        "too little motion for a basis of {N} components: expected more than {} windows, found {n_windows}",
+        10 * N
+    );
     let directions = directions(&covariance, seed);
     let share = |covariance: &Array2<f64>| {
         let held: f64 = directions.columns().into_iter().map(|v| v.dot(&covariance.dot(&v))).sum();
         held / covariance.diag().sum()
     };
-    let held_out = corpus.held_out.iter().map(|(set, pieces)| {
-        let (_, covariance) = self::covariance(pieces, &weights);
+    let held_out = corpus.held_out.iter().map(|(set, clips)| {
+        let (_, covariance) = self::covariance(clips, &weights);
         (set.clone(), share(&covariance))
     });
     let fitted = FittedBasis {
@@ -68,10 +72,10 @@ pub fn fit(corpus: &Corpus, seed: u64, out: &Path) -> Result<FittedBasis> {
 
 /// Weight of each joint: 1 for the arms; for the fingers the factor that gives all of them together the variance of
 /// the arms.
-fn weights(pieces: &[CorpusPiece]) -> Array1<f32> {
+fn weights(clips: &[CorpusClip]) -> Array1<f32> {
     let (mut n, mut sum, mut squares) = (0.0, Array1::<f64>::zeros(N_COORDINATES), Array1::<f64>::zeros(N_COORDINATES));
-    for piece in pieces {
-        for pose in basis::poses(piece.joints.view()).outer_iter() {
+    for clip in clips {
+        for pose in basis::poses(clip.joints.view()).outer_iter() {
             let pose = pose.mapv(f64::from);
             n += 1.0;
             squares += &(&pose * &pose);
@@ -88,7 +92,7 @@ fn weights(pieces: &[CorpusPiece]) -> Array1<f32> {
 }
 
 /// Number of windows, and their covariance matrix [2070, 2070].
-fn covariance(pieces: &[CorpusPiece], weights: &Array1<f32>) -> (usize, Array2<f64>) {
+fn covariance(clips: &[CorpusClip], weights: &Array1<f32>) -> (usize, Array2<f64>) {
     let size = WINDOW * N_COORDINATES;
     let (mut n, mut sum, mut products) = (0, Array1::<f64>::zeros(size), Array2::<f64>::zeros((size, size)));
     let mut rows: Vec<f64> = Vec::new();
@@ -100,8 +104,8 @@ fn covariance(pieces: &[CorpusPiece], weights: &Array1<f32>) -> (usize, Array2<f
         sum += &windows.sum_axis(Axis(0));
         ndarray::linalg::general_mat_mul(1.0, &windows.t(), &windows, 1.0, &mut products);
     };
-    for piece in pieces {
-        let poses = basis::poses(piece.joints.view());
+    for clip in clips {
+        let poses = basis::poses(clip.joints.view());
         for start in (0..(poses.nrows() + 1).saturating_sub(WINDOW)).step_by(STRIDE) {
             let window = poses.slice(s![start..start + WINDOW, ..]);
             rows.extend(window.indexed_iter().map(|((_, i), v)| f64::from(v * weights[i / 3])));

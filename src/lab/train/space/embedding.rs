@@ -4,7 +4,7 @@
 //! finger bones.
 
 use super::auto_encoder::AutoEncoder;
-use super::corpus::{Corpus, CorpusPiece};
+use super::corpus::{Corpus, CorpusClip};
 use crate::train::supervised::TrainingTask;
 use anyhow::Result;
 use candle_core::{Device, Tensor};
@@ -34,9 +34,9 @@ pub struct EmbeddingTask {
     corpus: Corpus,
     /// Loss weight of each coordinate, [1, 138, 1].
     weights: Tensor,
-    /// Bone directions [T, 138] of each piece.
+    /// Bone directions [T, 138] of each clip.
     directions: Vec<Array2<f32>>,
-    /// Cumulative number of windows, up to and including each piece.
+    /// Cumulative number of windows, up to and including each clip.
     ends: Vec<usize>,
 }
 
@@ -54,9 +54,9 @@ impl EmbeddingTask {
     pub fn new(corpus: Corpus, seed: u64) -> Result<Self> {
         let mut params = Params::new(seed);
         let net = AutoEncoder::new(&mut params, &Config::default())?;
-        let directions: Vec<Array2<f32>> = corpus.pieces.iter().map(|piece| directions(piece.joints.view())).collect();
-        let ends = directions.iter().scan(0, |end, piece| {
-            *end += (piece.nrows() + 1).saturating_sub(WINDOW);
+        let directions: Vec<Array2<f32>> = corpus.clips.iter().map(|clip| directions(clip.joints.view())).collect();
+        let ends = directions.iter().scan(0, |end, clip| {
+            *end += (clip.nrows() + 1).saturating_sub(WINDOW);
             Some(*end)
         });
         let ends = ends.collect();
@@ -66,15 +66,15 @@ impl EmbeddingTask {
         Ok(Self { params, net, corpus, weights, directions, ends })
     }
 
-    /// Errors over the windows of `pieces`: of the network, and of the corpus' mean pose.
-    fn measure(&self, pieces: &[CorpusPiece]) -> Result<[EmbeddingErrors; 2]> {
+    /// Errors over the windows of `clips`: of the network, and of the corpus' mean pose.
+    fn measure(&self, clips: &[CorpusClip]) -> Result<[EmbeddingErrors; 2]> {
         let mut errors = [EmbeddingErrors::default(); 2];
-        for piece in pieces {
+        for clip in clips {
             let starts: Vec<usize> =
-                (0..(piece.joints.shape()[0] + 1).saturating_sub(WINDOW)).step_by(EVALUATION_STRIDE).collect();
+                (0..(clip.joints.shape()[0] + 1).saturating_sub(WINDOW)).step_by(EVALUATION_STRIDE).collect();
             for starts in starts.chunks(EVALUATION_BATCH) {
                 let windows: Vec<ArrayView3<f32>> =
-                    starts.iter().map(|&start| piece.joints.slice(s![start..start + WINDOW, .., ..])).collect();
+                    starts.iter().map(|&start| clip.joints.slice(s![start..start + WINDOW, .., ..])).collect();
                 let numbers: Vec<f32> = windows
                     .iter()
                     .flat_map(|window| directions(*window).reversed_axes().iter().copied().collect::<Vec<_>>())
@@ -131,7 +131,7 @@ impl EmbeddingErrors {
     fn line(&self) -> String {
         let mean = |sum: f64| sum / self.n.max(1) as f64;
         format!(
-            "arms {:5.1} mm, fingers from their wrist {:5.1} mm, bones {:4.1} degrees",
+            "arms {:5.1} mm, fingers relative to their wrist {:5.1} mm, bones {:4.1} degrees",
             mean(self.arms_mm),
             mean(self.fingers_mm),
             mean(self.degrees)
@@ -150,10 +150,10 @@ fn weights() -> Vec<f32> {
 }
 
 /// Mean and standard deviation of each of the 138 coordinates.
-fn statistics(pieces: &[Array2<f32>]) -> (Vec<f32>, Vec<f32>) {
+fn statistics(clips: &[Array2<f32>]) -> (Vec<f32>, Vec<f32>) {
     let mut sums = [(0.0f64, 0.0f64); N_COORDINATES];
     let mut n = 0.0;
-    for row in pieces.iter().flat_map(|piece| piece.outer_iter()) {
+    for row in clips.iter().flat_map(|clip| clip.outer_iter()) {
         n += 1.0;
         for ((sum, squares), v) in sums.iter_mut().zip(row) {
             *sum += f64::from(*v);
@@ -189,9 +189,9 @@ impl TrainingTask for EmbeddingTask {
     fn sample(&self, rng: &mut ChaCha8Rng, x: &mut [f32], _: &mut [f32]) {
         let Some(&n) = self.ends.last().filter(|n| **n > 0) else { return };
         let at = rng.random_range(0..n);
-        let piece = self.ends.partition_point(|&end| end <= at);
-        let start = at - if piece == 0 { 0 } else { self.ends[piece - 1] };
-        let window = self.directions[piece].slice(s![start..start + WINDOW, ..]).reversed_axes();
+        let clip = self.ends.partition_point(|&end| end <= at);
+        let start = at - if clip == 0 { 0 } else { self.ends[clip - 1] };
+        let window = self.directions[clip].slice(s![start..start + WINDOW, ..]).reversed_axes();
         x.iter_mut().zip(window).for_each(|(to, from)| *to = *from);
     }
 
@@ -213,11 +213,11 @@ impl TrainingTask for EmbeddingTask {
 
     fn errors(&self, brief: bool) -> Result<Vec<String>> {
         let mut lines = Vec::new();
-        for (set, pieces) in &self.corpus.held_out {
-            let [network, mean] = self.measure(pieces)?;
+        for (set, clips) in &self.corpus.held_out {
+            let [network, mean] = self.measure(clips)?;
             lines.push(format!("{set:32} {}", network.line()));
             if !brief {
-                lines.push(format!("{:32} {}", "  the mean pose", mean.line()));
+                lines.push(format!("{:32} {}", "  baseline: mean pose", mean.line()));
             }
         }
         Ok(lines)

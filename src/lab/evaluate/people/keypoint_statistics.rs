@@ -18,7 +18,7 @@ const N_GROUPS: usize = 4;
 
 /// Keypoint statistics over clips. Lengths are relative to a clip's median shoulder distance in the image.
 #[derive(Clone, Debug, Serialize)]
-pub struct KeypointLook {
+pub struct KeypointStatistics {
     /// Name of the configuration, and number of clips with keypoints.
     pub name: String,
     pub n_clips: usize,
@@ -30,14 +30,14 @@ pub struct KeypointLook {
     pub hands: f64,
     pub hand_jitter: f64,
     /// Median distance of the hand's wrist from the body's.
-    pub wrists_apart: f64,
+    pub wrist_distance: f64,
 }
 
 /// Statistics of the keypoints of a configuration's videos; videos without keypoints are skipped.
 ///
 /// # Errors
 /// No video has keypoints.
-pub fn look(config_file: &Path) -> Result<KeypointLook> {
+pub fn of_config(config_file: &Path) -> Result<KeypointStatistics> {
     let config = config::load(config_file, &[])?;
     let units = config::videos::all(&config).into_iter().flat_map(|videos| videos.units);
     let files =
@@ -45,7 +45,7 @@ pub fn look(config_file: &Path) -> Result<KeypointLook> {
     let clips = files.map(|path| keypoints_npz::read(&path)).collect::<Result<Vec<_>>>()?;
     ensure!(
         !clips.is_empty(),
-        "{}: no video has keypoints; run `orator run -c {} --to pose2d`",
+        "no video of {} has keypoints; run `orator run -c {} --to pose2d`",
         config_file.display(),
         config_file.display()
     );
@@ -53,10 +53,10 @@ pub fn look(config_file: &Path) -> Result<KeypointLook> {
     Ok(measure(&name, &clips))
 }
 
-fn measure(name: &str, clips: &[Keypoints]) -> KeypointLook {
+fn measure(name: &str, clips: &[Keypoints]) -> KeypointStatistics {
     let mut scores: [Vec<f64>; N_GROUPS] = Default::default();
     let mut jitter: [Vec<f64>; N_GROUPS] = Default::default();
-    let (mut hand_jitter, mut apart) = (Vec::new(), Vec::new());
+    let (mut hand_jitter, mut wrist_distances) = (Vec::new(), Vec::new());
     let (mut n_hands, mut n_frames) = (0, 0);
     for clip in clips {
         let width = |t: usize| {
@@ -84,7 +84,7 @@ fn measure(name: &str, clips: &[Keypoints]) -> KeypointLook {
                 n_hands += 1;
                 if clip.body[[t, wrist, 2]] > SEEN_SCORE {
                     let [dx, dy] = [0, 1].map(|k| hand[[t, 0, k]] - clip.body[[t, wrist, k]]);
-                    apart.push(f64::from(dx.hypot(dy)) / shoulders);
+                    wrist_distances.push(f64::from(dx.hypot(dy)) / shoulders);
                 }
             }
             for point in 1..hand.shape()[1] {
@@ -94,14 +94,14 @@ fn measure(name: &str, clips: &[Keypoints]) -> KeypointLook {
         }
     }
     let middle = |values: Vec<f64>| Ordered::new(values).quantile(0.5).unwrap_or(f64::NAN);
-    KeypointLook {
+    KeypointStatistics {
         name: name.to_owned(),
         n_clips: clips.len(),
         scores: scores.map(middle),
         jitter: jitter.map(middle),
         hands: share(n_hands, n_frames),
         hand_jitter: middle(hand_jitter),
-        wrists_apart: middle(apart),
+        wrist_distance: middle(wrist_distances),
     }
 }
 
@@ -111,10 +111,11 @@ fn second_differences(
     points: ArrayView3<f32>,
     point: usize,
     about: Option<usize>,
-    least: f32,
+    min_score: f32,
 ) -> impl Iterator<Item = f64> {
     let at = move |t: usize, k: usize| points[[t, point, k]] - about.map_or(0.0, |root| points[[t, root, k]]);
-    let found = move |t: usize| points[[t, point, 2]] > least && about.is_none_or(|root| points[[t, root, 2]] > least);
+    let found =
+        move |t: usize| points[[t, point, 2]] > min_score && about.is_none_or(|root| points[[t, root, 2]] > min_score);
     let middle = 1..points.shape()[0].saturating_sub(1).max(1);
     let lengths: Vec<f64> = middle
         .filter(|&t| found(t - 1) && found(t) && found(t + 1))
@@ -127,24 +128,25 @@ fn second_differences(
 }
 
 /// Grid of the statistics, one row per configuration.
-pub fn grid(looks: &[KeypointLook]) -> Grid {
+pub fn grid(statistics: &[KeypointStatistics]) -> Grid {
     let names = |what: &str| GROUPS.iter().take(N_GROUPS).map(|(name, _)| format!("{what} {name}")).collect::<Vec<_>>();
     let mut heads = vec!["clips".to_owned()];
     heads.extend(names("score"));
     heads.extend(names("jitter"));
-    heads.extend(["hands", "jitter fingers", "wrists apart"].map(str::to_owned));
-    let row = |look: &KeypointLook| {
-        let mut cells = vec![look.n_clips.to_string()];
-        cells.extend(look.scores.map(|score| number(score, 2)));
-        cells.extend(look.jitter.map(percent));
-        cells.extend([look.hands, look.hand_jitter, look.wrists_apart].map(percent));
-        (look.name.clone(), cells)
+    heads.extend(["hands", "jitter fingers", "wrist distance"].map(str::to_owned));
+    let row = |row: &KeypointStatistics| {
+        let mut cells = vec![row.n_clips.to_string()];
+        cells.extend(row.scores.map(|score| number(score, 2)));
+        cells.extend(row.jitter.map(percent));
+        cells.extend([row.hands, row.hand_jitter, row.wrist_distance].map(percent));
+        (row.name.clone(), cells)
     };
     Grid {
-        title: "without truth",
-        note: "Median scores; jitter: median second difference, % of the shoulders in the picture; % of hands found; distance of the hand's wrist from the body's, % of the shoulders.",
+        title: "keypoints without ground truth",
+        note: "Median scores; jitter: median second difference in time; % of hands detected; median distance between \
+               the wrists of hand and body model. Lengths in % of the shoulder distance in the image.",
         heads,
-        rows: looks.iter().map(row).collect(),
+        rows: statistics.iter().map(row).collect(),
     }
 }
 
@@ -154,9 +156,9 @@ mod tests {
     use crate::evaluate::people::clips::tests::exact;
 
     #[test]
-    fn a_shake_is_jitter_and_a_shifted_hand_is_apart() {
+    fn a_shake_is_jitter_and_a_shifted_hand_has_a_wrist_distance() {
         let mut clip = exact().keypoints;
-        let still = measure("still", std::slice::from_ref(&clip));
+        let steady = measure("steady", std::slice::from_ref(&clip));
         for t in 0..clip.n_frames() {
             clip.body[[t, coco::L_ELBOW, 0]] += if t % 2 == 0 { 2.0 } else { -2.0 };
             clip.body[[t, coco::R_ELBOW, 0]] += if t % 2 == 0 { 2.0 } else { -2.0 };
@@ -168,7 +170,7 @@ mod tests {
         let shaken = measure("shaken", &[clip]);
         let shoulders = 800.0 * 0.36 / 2.0;
         assert!((shaken.jitter[2] - 8.0 / shoulders).abs() < 0.01, "{shaken:?}");
-        assert!((shaken.wrists_apart - 30.0 / shoulders).abs() < 0.01 && still.wrists_apart < 1e-3);
-        assert!((shaken.hand_jitter - still.hand_jitter).abs() < 1e-4 && shaken.hands == 1.0);
+        assert!((shaken.wrist_distance - 30.0 / shoulders).abs() < 0.01 && steady.wrist_distance < 1e-3);
+        assert!((shaken.hand_jitter - steady.hand_jitter).abs() < 1e-4 && shaken.hands == 1.0);
     }
 }

@@ -134,9 +134,9 @@ pub fn random(seed: u64) -> Appearance {
 
 /// Nose, left eye, right eye, left ear, right ear (COCO order) on the surface of a person of this appearance, cm, in
 /// the axes of the head joint.
-pub fn face(rig: &Rig, looks: &Appearance) -> [Vec3; 5] {
+pub fn face(rig: &Rig, appearance: &Appearance) -> [Vec3; 5] {
     let stance = Stance::new(rig);
-    let head = HeadForm::new(rig, &stance, looks);
+    let head = HeadForm::new(rig, &stance, appearance);
     let at_front = |x: f64, y: f64| [x, y, head.front(x, y)];
     let [ex, ey, ez] = EYE;
     let [ax, ay, az] = EAR;
@@ -193,10 +193,10 @@ mod tests {
 
     #[test]
     fn every_point_of_the_face_lies_on_the_skin_or_the_eyes() {
-        let (rig, looks) = (rig(), Appearance::plain());
+        let (rig, appearance) = (rig(), Appearance::plain());
         let local = vec![Rotation::IDENTITY; rig.skeleton.joints.len()];
-        let meshes = Avatar::new(&rig, &looks).posed(&rig, rig.root, &local, 0.0);
-        let points = face(&rig, &looks);
+        let meshes = Avatar::new(&rig, &appearance).posed(&rig, rig.root, &local, 0.0);
+        let points = face(&rig, &appearance);
         let [nose, left, right, left_ear, right_ear] = points;
         assert!(left[0] > 0.0 && left_ear[0] > left[0] && nose[2] > left[2] && left[2] > left_ear[2]);
         assert!((left[0] + right[0]).abs() < 1e-9 && (left_ear[0] + right_ear[0]).abs() < 1e-9);

@@ -1,44 +1,44 @@
-//! Checks whether words with gestures move their hand to the right place, and which frames belong to them.
+//! Checks whether words with gestures move their hand to the right position, and which frames belong to them.
 
 use ndarray::{Array2, ArrayView3};
 use orator_base::types::time::FrameRate;
 use orator_test_support::rule::dataset::SpokenClip;
 use orator_test_support::rule::rule::WRISTS;
 use orator_test_support::rule::rule::{HOLD, RETURN, RuleGestures, STROKE, WORD_DELAY};
-use orator_test_support::rule::words::{N_PLACES, WordGesture, gesture};
+use orator_test_support::rule::words::{N_TARGETS, WordGesture, gesture};
 use serde::Serialize;
 
-/// Least time in seconds to the nearest other word with a gesture for a word to count as isolated.
-const ALONE_SECS: f64 = 5.0;
+/// Shortest time in seconds to the nearest other word with a gesture for a word to count as isolated.
+const ISOLATED_SECS: f64 = 5.0;
 /// Two-sided normal quantile of a 95 % interval.
 const Z: f64 = 1.96;
 
-/// Counts of words, and of those whose hand at the end of the stroke is nearest to the word's own place.
+/// Counts of words, and of those whose hand at the end of the stroke is nearest to the target of the word.
 #[derive(Clone, Copy, Debug, Default, Serialize)]
-pub struct PlaceShare {
+pub struct PositionShare {
     pub n_words: usize,
-    pub n_right: usize,
+    pub n_correct: usize,
 }
 
-/// Correct places of all words with gestures, and of those without another such word within 5 s.
+/// Correct positions of all words with gestures, and of those without another such word within 5 s.
 #[derive(Clone, Copy, Debug, Default, Serialize)]
-pub struct WordPlaces {
-    pub all: PlaceShare,
-    pub alone: PlaceShare,
+pub struct WordPositions {
+    pub all: PositionShare,
+    pub isolated: PositionShare,
 }
 
-impl PlaceShare {
-    /// Expected share of correct places without knowledge of the word.
-    pub const CHANCE: f64 = 1.0 / N_PLACES as f64;
+impl PositionShare {
+    /// Expected share of correct positions without knowledge of the word.
+    pub const CHANCE: f64 = 1.0 / N_TARGETS as f64;
 
-    fn add(&mut self, is_right: bool) {
+    fn add(&mut self, is_correct: bool) {
         self.n_words += 1;
-        self.n_right += usize::from(is_right);
+        self.n_correct += usize::from(is_correct);
     }
 
-    /// Share of correct places; 0 if there are no words.
+    /// Share of correct positions; 0 if there are no words.
     pub fn share(&self) -> f64 {
-        self.n_right as f64 / self.n_words.max(1) as f64
+        self.n_correct as f64 / self.n_words.max(1) as f64
     }
 
     /// 95 % interval of the share (Wilson 1927).
@@ -50,13 +50,13 @@ impl PlaceShare {
     }
 }
 
-impl WordPlaces {
+impl WordPositions {
     /// Counts the words of a clip for predicted joints [T, 49, 3], metres, relative to the neck.
     pub fn count(&mut self, clip: &SpokenClip, predicted: ArrayView3<f32>, fps: FrameRate) {
-        let (speech, said) = (clip.speech(), clip.words());
-        let rule = RuleGestures::of_habits(&clip.habits(), &speech, &said);
+        let (speech, words) = (clip.speech(), clip.words());
+        let rule = RuleGestures::of_habits(&clip.habits(), &speech, &words);
         let strokes: Vec<(f64, WordGesture)> =
-            said.iter().filter_map(|word| gesture(&word.word).map(|gesture| (word.start_secs, gesture))).collect();
+            words.iter().filter_map(|word| gesture(&word.word).map(|gesture| (word.start_secs, gesture))).collect();
         for (n, (start, own)) in strokes.iter().enumerate() {
             let end = start + WORD_DELAY + STROKE;
             let t = (end * fps.per_sec()).round() as usize;
@@ -64,23 +64,23 @@ impl WordPlaces {
                 continue;
             }
             let wrist: [f64; 3] = std::array::from_fn(|k| f64::from(predicted[[t, WRISTS[own.hand], k]]));
-            let distance = |place: &usize| -> f64 {
-                let at = rule.wrist_at(WordGesture { place: *place, ..*own }, fps.secs(t));
+            let distance = |target: &usize| -> f64 {
+                let at = rule.wrist_at(WordGesture { target: *target, ..*own }, fps.secs(t));
                 (0..3).map(|k| (wrist[k] - at[k]).powi(2)).sum()
             };
-            let nearest = (0..N_PLACES).min_by(|a, b| distance(a).total_cmp(&distance(b)));
-            let is_right = nearest == Some(own.place);
-            self.all.add(is_right);
-            let is_near = |m: usize| strokes.get(m).is_some_and(|(other, _)| (other - start).abs() <= ALONE_SECS);
+            let nearest = (0..N_TARGETS).min_by(|a, b| distance(a).total_cmp(&distance(b)));
+            let is_correct = nearest == Some(own.target);
+            self.all.add(is_correct);
+            let is_near = |m: usize| strokes.get(m).is_some_and(|(other, _)| (other - start).abs() <= ISOLATED_SECS);
             if !is_near(n + 1) && !n.checked_sub(1).is_some_and(is_near) {
-                self.alone.add(is_right);
+                self.isolated.add(is_correct);
             }
         }
     }
 }
 
 /// Steps between frames [T - 1, 2] in which no word moves the left or the right hand.
-pub fn of_beats(clip: &SpokenClip, fps: FrameRate) -> Array2<bool> {
+pub fn without_words(clip: &SpokenClip, fps: FrameRate) -> Array2<bool> {
     let mut steps = Array2::from_elem((clip.n_frames.saturating_sub(1), 2), true);
     for word in clip.words() {
         let Some(WordGesture { hand, .. }) = gesture(&word.word) else { continue };
@@ -98,26 +98,26 @@ mod tests {
     use orator_test_support::rule::dataset::RULE_OF_WORDS;
 
     #[test]
-    fn the_rule_is_right_and_rest_is_chance() {
+    fn the_rule_is_correct_and_motion_without_words_is_at_chance() {
         let fps = FrameRate::new(15, 1);
-        let (mut of_rule, mut of_beats) = (WordPlaces::default(), WordPlaces::default());
+        let (mut of_rule, mut without_words) = (WordPositions::default(), WordPositions::default());
         for number in 0..12 {
             let clip =
                 SpokenClip { rule: RULE_OF_WORDS, seed: 1, split: Split::Test, number, n_frames: 900, habits: 0 };
             of_rule.count(&clip, clip.predictable().joints.view(), fps);
             let beats = RuleGestures::of_habits(&clip.habits(), &clip.speech(), &[]).motion(clip.n_frames, fps);
-            of_beats.count(&clip, beats.joints.view(), fps);
+            without_words.count(&clip, beats.joints.view(), fps);
         }
-        assert!(of_rule.all.n_words > 80 && of_rule.alone.n_words > 10, "{of_rule:?}");
-        assert!(of_rule.all.share() == 1.0 && of_rule.alone.share() == 1.0, "{of_rule:?}");
-        let [low, high] = of_beats.all.interval();
-        assert!(low < PlaceShare::CHANCE && PlaceShare::CHANCE < high, "{of_beats:?}");
+        assert!(of_rule.all.n_words > 80 && of_rule.isolated.n_words > 10, "{of_rule:?}");
+        assert!(of_rule.all.share() == 1.0 && of_rule.isolated.share() == 1.0, "{of_rule:?}");
+        let [low, high] = without_words.all.interval();
+        assert!(low < PositionShare::CHANCE && PositionShare::CHANCE < high, "{without_words:?}");
     }
 
     #[test]
     fn an_interval_is_wilsons() {
         // Wilson's interval of 8 of 10, as published tables give it.
-        let [low, high] = PlaceShare { n_words: 10, n_right: 8 }.interval();
+        let [low, high] = PositionShare { n_words: 10, n_correct: 8 }.interval();
         assert!((low - 0.490).abs() < 1e-3 && (high - 0.943).abs() < 1e-3, "{low} {high}");
     }
 }
