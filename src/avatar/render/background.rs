@@ -16,7 +16,7 @@ pub struct Background {
 pub trait StaticScene: Debug + Send + Sync {
     /// Inverse depth of each sample, 1/cm; 0 where there is no surface. Shape: pixels of the image, row by row, four
     /// samples each.
-    fn nearness(&self) -> &[[f32; 4]];
+    fn beat_proximity(&self) -> &[[f32; 4]];
 
     /// Mesh, label and depth (cm) at a pixel index; `None` where there is no surface.
     fn label(&self, at: usize) -> Option<(u16, u16, f64)>;

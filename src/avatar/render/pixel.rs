@@ -57,8 +57,8 @@ pub fn is_empty(triangles: &[u32; 4]) -> bool {
 
 /// Index of the sample nearest to the camera.
 #[inline(always)]
-pub fn nearest(nearness: &[f32; 4]) -> usize {
-    (1..4).fold(0, |best, k| if nearness[k] > nearness[best] { k } else { best })
+pub fn nearest(beat_proximity: &[f32; 4]) -> usize {
+    (1..4).fold(0, |best, k| if beat_proximity[k] > beat_proximity[best] { k } else { best })
 }
 
 /// A surface within a pixel.
@@ -75,7 +75,7 @@ struct PixelSurface {
 #[inline(always)]
 fn for_surfaces(
     surfaces: &Surfaces,
-    (triangles, nearness): (&[u32; 4], &[f32; 4]),
+    (triangles, beat_proximity): (&[u32; 4], &[f32; 4]),
     [x, y]: [usize; 2],
     mut each: impl FnMut(PixelSurface),
 ) {
@@ -88,7 +88,7 @@ fn for_surfaces(
         let mut n = 1;
         for other in k + 1..4 {
             if is_pending[other] {
-                let is_near = (nearness[k] - nearness[other]).abs() < SAME_SURFACE_RATIO * nearness[k];
+                let is_near = (beat_proximity[k] - beat_proximity[other]).abs() < SAME_SURFACE_RATIO * beat_proximity[k];
                 if is_near && surfaces.triangles[triangles[other] as usize].mesh == mesh {
                     is_pending[other] = false;
                     n += 1;
@@ -165,8 +165,8 @@ impl Shading {
 
     /// Whether all samples show the surface of the first one.
     #[inline(always)]
-    fn is_one_surface(&mut self, surfaces: &Surfaces, triangles: &[u32; 4], nearness: &[f32; 4]) -> bool {
-        let [a, b, c, d] = *nearness;
+    fn is_one_surface(&mut self, surfaces: &Surfaces, triangles: &[u32; 4], beat_proximity: &[f32; 4]) -> bool {
+        let [a, b, c, d] = *beat_proximity;
         let tolerance = SAME_SURFACE_RATIO * a;
         if !((a - b).abs() < tolerance && (a - c).abs() < tolerance && (a - d).abs() < tolerance) {
             return false;
@@ -202,14 +202,14 @@ impl Shading {
         &mut self,
         surfaces: &Surfaces,
         shadows: &ShadowMap,
-        (triangles, nearness): (&[[u32; 4]], &[[f32; 4]]),
+        (triangles, beat_proximity): (&[[u32; 4]], &[[f32; 4]]),
         [left, y]: [usize; 2],
         front: &mut [(u32, f32)],
         image: &mut [u8],
     ) {
         let srgb = Srgb::tables();
         let mut row = std::mem::take(&mut self.row);
-        let n = triangles.len().min(nearness.len()).min(front.len()).min(row.len());
+        let n = triangles.len().min(beat_proximity.len()).min(front.len()).min(row.len());
         let (mut at, mut n_runs) = (0, 0);
         while at < n {
             let first = triangles[at][0];
@@ -223,13 +223,13 @@ impl Shading {
                     at = end;
                     continue;
                 }
-                for (front, nearness) in front[at..end].iter_mut().zip(&nearness[at..end]) {
-                    let [a, b, c, d] = *nearness;
+                for (front, beat_proximity) in front[at..end].iter_mut().zip(&beat_proximity[at..end]) {
+                    let [a, b, c, d] = *beat_proximity;
                     *front = (first, a.max(b).max(c.max(d)));
                 }
                 self.draw_run(surfaces, shadows, first, [left + at, y], &mut row[at..end]);
             } else {
-                let (samples, pixel) = ((&triangles[at], &nearness[at]), [left + at, y]);
+                let (samples, pixel) = ((&triangles[at], &beat_proximity[at]), [left + at, y]);
                 let nearest = nearest(samples.1);
                 front[at] = (samples.0[nearest], samples.1[nearest]);
                 row[at] = steps(if self.is_one_surface(surfaces, samples.0, samples.1) {

@@ -77,10 +77,10 @@ impl Renderer {
         }
         let (x, y) = (x as usize, y as usize);
         let at = y * self.size[0] + x;
-        let (number, nearness) =
+        let (number, beat_proximity) =
             if (self.spans[y][0]..self.spans[y][1]).contains(&x) { self.front[at] } else { (NO_TRIANGLE, 0.0) };
         if let Some(triangle) = self.surfaces.triangles.get(number as usize) {
-            return Some((usize::from(triangle.mesh), triangle.label, 1.0 / f64::from(nearness)));
+            return Some((usize::from(triangle.mesh), triangle.label, 1.0 / f64::from(beat_proximity)));
         }
         let (mesh, label, depth) = self.scene.as_ref()?.label(at)?;
         Some((self.n_meshes + usize::from(mesh), label, depth))
@@ -88,13 +88,13 @@ impl Renderer {
 
     fn fill(&mut self, image: &mut Image) {
         let Self { size: [width, _], visibility, surfaces, shading, shadows, front, spans, scene, .. } = self;
-        let background = scene.as_ref().map(|scene| scene.nearness());
+        let background = scene.as_ref().map(|scene| scene.beat_proximity());
         visibility.visit(surfaces, background, |band, rows, columns| {
             let [left, right] = columns;
             spans[rows[0]..rows[1]].fill(columns);
             for y in rows[0]..rows[1] {
                 let (there, at) = (band.at(left, y)..band.at(right, y), y * *width + left..y * *width + right);
-                let samples = (&band.triangles[there.clone()], &band.nearness[there]);
+                let samples = (&band.triangles[there.clone()], &band.beat_proximity[there]);
                 let pixels = &mut image.data[3 * at.start..3 * at.end];
                 shading.draw_row(surfaces, shadows, samples, [left, y], &mut front[at], pixels);
             }

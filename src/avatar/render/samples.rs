@@ -25,7 +25,7 @@ pub struct FlatTriangle {
     /// Corners, in subpixels from the centre of the top left pixel.
     pub corners: [[i32; 2]; 3],
     /// Inverse depth of the corners, 1/cm.
-    pub nearness: [f32; 3],
+    pub beat_proximity: [f32; 3],
 }
 
 impl FlatTriangle {
@@ -57,7 +57,7 @@ pub struct RowBand {
     width: usize,
     rows: [usize; 2],
     /// Inverse depth, 1/cm; 0 is infinity. Shape: [BAND_ROWS, width]
-    pub nearness: Vec<[f32; 4]>,
+    pub beat_proximity: Vec<[f32; 4]>,
     pub triangles: Vec<[u32; 4]>,
     /// Minimum inverse depth in each cell, valid after `update_cells`.
     cells: Vec<f32>,
@@ -67,7 +67,7 @@ impl RowBand {
     pub fn new(width: usize) -> Self {
         let n = width * BAND_ROWS;
         let cells = vec![0.0; width.div_ceil(CELL) * BAND_ROWS / CELL];
-        Self { width, rows: [0; 2], nearness: vec![[0.0; 4]; n], triangles: vec![[NO_TRIANGLE; 4]; n], cells }
+        Self { width, rows: [0; 2], beat_proximity: vec![[0.0; 4]; n], triangles: vec![[NO_TRIANGLE; 4]; n], cells }
     }
 
     /// Resets the band to other rows and clears a range of columns; `background` is the inverse depth of the background
@@ -79,9 +79,9 @@ impl RowBand {
             match background {
                 Some(background) => {
                     let there = y * self.width;
-                    self.nearness[row.clone()].copy_from_slice(&background[there + columns[0]..there + columns[1]]);
+                    self.beat_proximity[row.clone()].copy_from_slice(&background[there + columns[0]..there + columns[1]]);
                 }
-                None => self.nearness[row.clone()].fill([0.0; 4]),
+                None => self.beat_proximity[row.clone()].fill([0.0; 4]),
             }
             self.triangles[row].fill([NO_TRIANGLE; 4]);
         }
@@ -101,7 +101,7 @@ impl RowBand {
                 let mut least = [f32::INFINITY; 4];
                 for y in cell_y * CELL..((cell_y + 1) * CELL).min(self.rows[1] - self.rows[0]) {
                     let ends = [cell_x * CELL, (cell_x + 1) * CELL].map(|x| x.clamp(columns[0], columns[1]));
-                    for pixel in &self.nearness[y * self.width + ends[0]..y * self.width + ends[1]] {
+                    for pixel in &self.beat_proximity[y * self.width + ends[0]..y * self.width + ends[1]] {
                         (0..4).for_each(|k| least[k] = if pixel[k] < least[k] { pixel[k] } else { least[k] });
                     }
                 }
@@ -113,7 +113,7 @@ impl RowBand {
     /// Whether a triangle is behind everything in the cells that it may touch.
     pub fn is_hidden(&self, triangle: &FlatTriangle, extent: Extent) -> bool {
         let ([first, last], [top, bottom]) = (extent[0].map(usize::from), self.rows_of(extent));
-        let nearest = triangle.nearness[0].max(triangle.nearness[1]).max(triangle.nearness[2]);
+        let nearest = triangle.beat_proximity[0].max(triangle.beat_proximity[1]).max(triangle.beat_proximity[2]);
         let n_columns = self.width.div_ceil(CELL);
         ((top - self.rows[0]) / CELL..(bottom - self.rows[0]).div_ceil(CELL))
             .all(|y| (first / CELL..last.div_ceil(CELL)).all(|x| nearest < self.cells[y * n_columns + x]))
@@ -138,7 +138,7 @@ impl RowBand {
 
     #[inline(always)]
     fn fill_with<T: EdgeInteger>(&mut self, triangle: &FlatTriangle, extent: Extent, number: u32) {
-        let FlatTriangle { corners, nearness } = triangle;
+        let FlatTriangle { corners, beat_proximity } = triangle;
         let area = triangle.area();
         let sign = area.signum() as i32;
         let ([left, right], [top, bottom]) = (extent[0].map(usize::from), self.rows_of(extent));
@@ -159,7 +159,7 @@ impl RowBand {
         let [a, b, c] = *corners;
         let from_a = [(b[0] - a[0]) as f32, (b[1] - a[1]) as f32];
         let from_b = [(c[0] - a[0]) as f32, (c[1] - a[1]) as f32];
-        let rise = [nearness[1] - nearness[0], nearness[2] - nearness[0]];
+        let rise = [beat_proximity[1] - beat_proximity[0], beat_proximity[2] - beat_proximity[0]];
         let per_area = 1.0 / area as f32;
         let slope = [
             (rise[0] * from_b[1] - rise[1] * from_a[1]) * per_area,
@@ -168,7 +168,7 @@ impl RowBand {
         let mut first = [0.0; 4];
         for (first, offset) in first.iter_mut().zip(SAMPLE_OFFSETS) {
             let (right, down) = ((start[0] + offset[0] - a[0]) as f32, (start[1] + offset[1] - a[1]) as f32);
-            *first = nearness[0] + slope[0] * right + slope[1] * down;
+            *first = beat_proximity[0] + slope[0] * right + slope[1] * down;
         }
         let per_pixel = [slope[0] * SUBPIXELS as f32, slope[1] * SUBPIXELS as f32];
         self.fill_rows(&Setup { edges, steps, first, per_pixel, number }, [left, right], [top, bottom]);
@@ -181,7 +181,7 @@ impl RowBand {
         let Setup { mut edges, steps, mut first, per_pixel, number } = *setup;
         for y in top..bottom {
             let columns = self.at(left, y)..self.at(right, y);
-            let pixels = self.nearness[columns.clone()].iter_mut().zip(&mut self.triangles[columns]);
+            let pixels = self.beat_proximity[columns.clone()].iter_mut().zip(&mut self.triangles[columns]);
             let ([mut e0, mut e1, mut e2], mut here) = (edges, first);
             let mut is_entered = false;
             for (front, triangles) in pixels {
@@ -196,7 +196,7 @@ impl RowBand {
                     e2[k] = e2[k] + steps[2][0];
                 }
                 let mut new = here;
-                here.iter_mut().for_each(|nearness| *nearness += per_pixel[0]);
+                here.iter_mut().for_each(|beat_proximity| *beat_proximity += per_pixel[0]);
                 if outer[0] & outer[1] & outer[2] & outer[3] < 0 {
                     // Thin triangles may pass between samples, so the row ends only where all samples are beyond one
                     // edge.

@@ -69,7 +69,7 @@ pub struct Surfaces {
     /// Points in camera axes, cm.
     camera_points: Vec<[f32; 3]>,
     corners: Vec<[i32; 2]>,
-    nearness: Vec<f32>,
+    beat_proximity: Vec<f32>,
     vertices: Vec<Vertex>,
     /// Points in light axes, cm.
     light_points: Vec<[f32; 3]>,
@@ -96,11 +96,11 @@ impl Surfaces {
             for ((&point, &normal), &colour) in mesh.points.iter().zip(&mesh.normals).zip(&mesh.colours) {
                 let from_eye = sub(point, self.eye);
                 let camera_point = [dot(rows[0], from_eye), dot(rows[1], from_eye), dot(rows[2], from_eye)];
-                let (corner, nearness) = projection.project(camera_point);
+                let (corner, beat_proximity) = projection.project(camera_point);
                 is_beyond &= (NEAR_CM as f32..FAR_CM).contains(&camera_point[2]);
                 self.camera_points.push(camera_point);
                 self.corners.push(corner);
-                self.nearness.push(nearness);
+                self.beat_proximity.push(beat_proximity);
                 self.vertices.push(Vertex { point, normal, colour, gloss });
                 self.light_points.push(ShadowMap::light_space(&self.axes, point));
             }
@@ -130,7 +130,7 @@ impl Surfaces {
     fn clear(&mut self) {
         self.camera_points.clear();
         self.corners.clear();
-        self.nearness.clear();
+        self.beat_proximity.clear();
         self.vertices.clear();
         self.light_points.clear();
         self.starts.clear();
@@ -176,12 +176,12 @@ impl Surfaces {
                     colour: mixed(a.colour, b.colour),
                     gloss: a.gloss,
                 };
-                let (corner, nearness) = projection.project(camera_point);
+                let (corner, beat_proximity) = projection.project(camera_point);
                 corners[n_corners] = self.camera_points.len() as u32;
                 n_corners += 1;
                 self.camera_points.push(camera_point);
                 self.corners.push(corner);
-                self.nearness.push(nearness);
+                self.beat_proximity.push(beat_proximity);
                 self.vertices.push(vertex);
                 // The unclipped triangle casts the shadow.
                 self.light_points.push(self.light_points[from]);
@@ -199,7 +199,7 @@ impl Surfaces {
         let [a, b, c] = [a as usize, b as usize, c as usize];
         FlatTriangle {
             corners: [self.corners[a], self.corners[b], self.corners[c]],
-            nearness: [self.nearness[a], self.nearness[b], self.nearness[c]],
+            beat_proximity: [self.beat_proximity[a], self.beat_proximity[b], self.beat_proximity[c]],
         }
     }
 
@@ -248,7 +248,7 @@ impl Surfaces {
 
     /// Whether the depth varies so little within a triangle that its radiance is nearly linear in the image.
     pub fn is_planar(&self, triangle: &SurfaceTriangle) -> bool {
-        let [a, b, c] = self.flat(triangle).nearness;
+        let [a, b, c] = self.flat(triangle).beat_proximity;
         a.max(b).max(c) < MAX_PLANAR_RATIO * a.min(b).min(c)
     }
 
@@ -280,7 +280,7 @@ impl Surfaces {
         let sign = if triangle.is_inner { 1.0 } else { -1.0 };
         let shares: [f32; 3] = std::array::from_fn(|n| {
             let [p, q] = [corners[(n + 1) % 3], corners[(n + 2) % 3]];
-            ((p[0] * q[1] - p[1] * q[0]) * sign).max(0.0) * flat.nearness[n]
+            ((p[0] * q[1] - p[1] * q[0]) * sign).max(0.0) * flat.beat_proximity[n]
         });
         let sum = shares[0] + shares[1] + shares[2];
         let shares = if sum > 0.0 { shares.map(|v| v / sum) } else { [1.0, 0.0, 0.0] };
@@ -320,13 +320,13 @@ impl Projection {
     /// Position in the image and inverse depth; points nearer than `NEAR_CM` are clipped elsewhere.
     #[inline(always)]
     fn project(&self, [x, y, z]: [f32; 3]) -> ([i32; 2], f32) {
-        let nearness = 1.0 / z;
+        let beat_proximity = 1.0 / z;
         let part = |v: f32, k: usize| {
-            let at = (self.middle[k] + v * nearness * self.parts + 0.5).clamp(-MAX_COORDINATE, MAX_COORDINATE);
+            let at = (self.middle[k] + v * beat_proximity * self.parts + 0.5).clamp(-MAX_COORDINATE, MAX_COORDINATE);
             let whole = at as i32;
             whole - i32::from((whole as f32) > at)
         };
-        ([part(x, 0), part(y, 1)], nearness)
+        ([part(x, 0), part(y, 1)], beat_proximity)
     }
 }
 

@@ -27,8 +27,8 @@ fn text(report: &BatchReport) -> String {
     for sound in &report.sounds {
         let facts = |key: &str| sound.facts.get(key).cloned().unwrap_or_default();
         let word = match (sound.ended, &sound.error) {
-            (BatchState::Made, _) => "made",
-            (BatchState::Fresh, _) => "up to date",
+            (BatchState::Created, _) => "made",
+            (BatchState::UpToDate, _) => "up to date",
             (BatchState::Failed, error) => {
                 text += &format!("{:width$}  failed  {}\n", sound.out, error.as_deref().unwrap_or_default());
                 continue;
@@ -49,7 +49,7 @@ fn text(report: &BatchReport) -> String {
     if n_listed > MAX_LISTED {
         text += &format!("and {} more\n", n_listed - MAX_LISTED);
     }
-    let BatchReport { made, fresh, failed, out_folder, sounds } = report;
+    let BatchReport { created: made, up_to_date: fresh, failed, out_folder, sounds } = report;
     let sounds = counted(sounds.len(), "sound");
     text + &format!("{sounds}: {made} made, {fresh} up to date, {failed} failed; in {}", out_folder.display())
 }

@@ -3,7 +3,7 @@
 
 use super::log::MetricsLog;
 use super::progress_log::ProgressLog;
-use super::resume::kept_checkpoint;
+use super::resume::last_checkpoint;
 use crate::generate::model::BEST;
 use anyhow::{Context, Result, bail};
 use orator_base::stage::progress::Progress;
@@ -128,7 +128,7 @@ pub fn run<T: ValidatedTraining>(
             }
             return Err(stopped(training, folder)?.into());
         }
-        let report = training.step().with_context(|| kept_checkpoint(folder, section))?;
+        let report = training.step().with_context(|| last_checkpoint(folder, section))?;
         let step = training.n_done();
         task.advance(1);
         if step.is_multiple_of(LOG_EVERY) {

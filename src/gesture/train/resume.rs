@@ -81,7 +81,7 @@ pub fn ensure_not_diverged(step: usize, losses: &[(&str, f64)], gradient_norm: f
 }
 
 /// Error context of a diverged training: the newest checkpoint and advice.
-pub fn kept_checkpoint(folder: &Path, section: &str) -> String {
+pub fn last_checkpoint(folder: &Path, section: &str) -> String {
     let advice = format!("a smaller {section}.learning_rate may help");
     match checkpoint::list(folder).ok().and_then(|mut all| all.pop()) {
         Some((step, path)) => format!("the checkpoint of step {step} is kept: {}; {advice}", path.display()),

@@ -19,7 +19,7 @@ const BLOCK: usize = 8;
 #[derive(Clone, Debug)]
 struct Scenery {
     /// Inverse depth of each sample, 1/cm; 0 where nothing is hit.
-    nearness: Vec<[f32; 4]>,
+    beat_proximity: Vec<[f32; 4]>,
     /// Mesh and label at each pixel's centre.
     labels: Vec<Option<(u16, u16)>>,
     light: Vec<PixelLight>,
@@ -40,7 +40,7 @@ pub fn background(camera: &PinholeCamera, meshes: &[&Mesh], light: &Light, behin
     let mut image = behind;
     let n = size[0] * size[1];
     let (mut pixels, mut labels) = (vec![PixelLight::default(); n], vec![None; n]);
-    let mut nearness = vec![[0.0; 4]; n];
+    let mut beat_proximity = vec![[0.0; 4]; n];
     VisibleTriangles::new(size).visit(&surfaces, None, |band, rows, columns| {
         for (x, y) in (rows[0]..rows[1]).flat_map(|y| (columns[0]..columns[1]).map(move |x| (x, y))) {
             let (at, there) = (y * size[0] + x, band.at(x, y));
@@ -48,32 +48,32 @@ pub fn background(camera: &PinholeCamera, meshes: &[&Mesh], light: &Light, behin
             if is_empty(triangles) {
                 continue;
             }
-            nearness[at] = band.nearness[there];
-            let mut pixel = shading.light(&surfaces, (triangles, &nearness[at]), [x, y]);
+            beat_proximity[at] = band.beat_proximity[there];
+            let mut pixel = shading.light(&surfaces, (triangles, &beat_proximity[at]), [x, y]);
             let lit = shadows.lit(shadows.query(pixel.shadow_point));
             let there = srgb.linears(image.pixel(x, y));
             let uncovered = 1.0 - pixel.cover;
             pixel.own.iter_mut().zip(there).for_each(|(own, there)| *own += uncovered * there);
             pixel.key.iter_mut().for_each(|v| *v *= lit);
             image.data[3 * at..3 * at + 3].copy_from_slice(&srgb.bytes(compressed(pixel.sum(1.0))));
-            let front = surfaces.triangles.get(triangles[nearest(&nearness[at])] as usize);
+            let front = surfaces.triangles.get(triangles[nearest(&beat_proximity[at])] as usize);
             labels[at] = front.map(|triangle| (triangle.mesh, triangle.label));
             pixels[at] = pixel;
         }
     });
     let blocks = blocks(size, &pixels);
-    let scene = Scenery { nearness, labels, light: pixels, blocks };
+    let scene = Scenery { beat_proximity, labels, light: pixels, blocks };
     Background { image, scene: Some(Arc::new(scene)) }
 }
 
 impl StaticScene for Scenery {
-    fn nearness(&self) -> &[[f32; 4]] {
-        &self.nearness
+    fn beat_proximity(&self) -> &[[f32; 4]] {
+        &self.beat_proximity
     }
 
     fn label(&self, at: usize) -> Option<(u16, u16, f64)> {
         let (mesh, label) = self.labels[at]?;
-        let nearest = self.nearness[at].iter().copied().fold(0.0, f32::max);
+        let nearest = self.beat_proximity[at].iter().copied().fold(0.0, f32::max);
         Some((mesh, label, 1.0 / f64::from(nearest)))
     }
 

@@ -128,10 +128,10 @@ fn networks_of_both_trainings_stand_in_one_table() {
         answer.errors
     };
     assert!(fails(&["gan", "gan/best.safetensors"]).contains("given twice"));
-    assert!(fails(&["gan", "nowhere"]).contains("nowhere is not there"));
-    assert!(fails(&["data"]).contains("holds no checkpoint"));
+    assert!(fails(&["gan", "nowhere"]).contains("nowhere does not exist"));
+    assert!(fails(&["data"]).contains("no checkpoint in data"));
     let lifter = concat!(env!("CARGO_MANIFEST_DIR"), "/models/body_lifter.safetensors");
-    assert!(fails(&["gan", lifter]).contains("body_lifter.safetensors is a checkpoint of neither"));
+    assert!(fails(&["gan", lifter]).contains("body_lifter.safetensors is not a checkpoint of `orator train gan` or"));
     std::fs::write(project.dir().join("other.safetensors"), "x").unwrap();
     assert!(fails(&["gan", "other.safetensors"]).contains("other.safetensors"));
 }

@@ -86,7 +86,7 @@ fn what_cannot_be_begun_with_is_named() {
     };
     assert!(fails(&dir.join("nowhere"), &settings()).contains("nowhere"));
     std::fs::create_dir(dir.join("empty")).unwrap();
-    assert!(fails(&dir.join("empty"), &settings()).contains("holds no checkpoint"));
+    assert!(fails(&dir.join("empty"), &settings()).contains("no checkpoint in"));
     let of_anna = dir.join("anna-gan");
     train(&anna, &GanConfig { steps: 2.into(), ..settings() }, &of_anna, &Silent).unwrap();
     let paper = GanConfig { preset: NetworkPreset::Paper, ..settings() };

@@ -47,12 +47,12 @@ impl FigureView {
     pub fn project(&self, [x, y, z]: [f32; 3]) -> ([f32; 2], f32) {
         let (sin, cos) = self.yaw_degrees.to_radians().sin_cos();
         let (across, depth) = (cos * x + sin * z, cos * z - sin * x);
-        let scale = self.px_per_metre * self.nearness(depth);
+        let scale = self.px_per_metre * self.beat_proximity(depth);
         ([self.neck_px[0] + scale * across, self.neck_px[1] + scale * y], depth)
     }
 
     /// Magnification at a depth, relative to the neck's depth.
-    fn nearness(&self, depth: f32) -> f32 {
+    fn beat_proximity(&self, depth: f32) -> f32 {
         1.0 / (1.0 + (depth / self.camera_metres).max(-0.8))
     }
 }
@@ -137,7 +137,7 @@ const SEAM_FROM: [f32; 4] = [1.0, 0.15, 0.2, 0.2];
 impl DrawnLimb {
     fn draw(&self, image: &mut Image, view: &FigureView) -> anyhow::Result<()> {
         let [(a, near), (b, far)] = self.ends.map(|end| view.project(end));
-        let radius = |k: usize, depth: f32| (self.radii[k] * view.px_per_metre * view.nearness(depth)).max(1.0);
+        let radius = |k: usize, depth: f32| (self.radii[k] * view.px_per_metre * view.beat_proximity(depth)).max(1.0);
         let (ra, rb) = (radius(0, near), radius(1, far));
         if let Some(seam) = view.seam.filter(|_| self.seam_from < 1.0) {
             // Outlines run along the sides only, so that they do not cut into the parent limb.

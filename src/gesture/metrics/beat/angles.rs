@@ -1,7 +1,7 @@
 //! Beat consistency of the trimodal convention (Liu et al. 2022 on the dataset of Yoon et al.; `get_BCscore` of Yi et
 //! al. 2023): beats are local minima of the change of the angle between neighbouring bones.
 
-use super::consistency::nearness;
+use super::consistency::beat_proximity;
 use crate::metrics::definition::{Better, Definition, MetricFamily};
 use crate::metrics::pair::PairedFrames;
 use crate::metrics::sums::BlockSums;
@@ -49,7 +49,7 @@ pub(crate) fn metric(fps: f64) -> MetricFamily {
                         None => sums[0] = f64::NAN,
                         Some(beats) if beats.is_empty() => {}
                         Some(beats) => {
-                            sums[0] += nearness(onset, beats, SIGMA);
+                            sums[0] += beat_proximity(onset, beats, SIGMA);
                             sums[1] += 1.0;
                         }
                     }
