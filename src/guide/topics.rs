@@ -24,7 +24,7 @@ pub const TOPICS: [Topic; 14] = [
     topic!("keypoints", "keypoints of OpenPose, MMPose, AlphaPose, MediaPipe and PATS in place of videos"),
     topic!("training", "training: settings, recipes, fine-tuning, validation, checkpoints; speech to motion"),
     topic!("animation", "joints to BVH, GLB, JSON and MP4: rig, smoothing, constraints"),
-    topic!("evaluation", "metrics, baselines, verdicts, conventions, comparison of results, rendered people"),
+    topic!("evaluation", "metrics, baselines, conclusions, conventions, comparison of results, rendered people"),
     topic!("results", "measured results of detectors, recipes and fine-tuning; speed; the commands that print them"),
     topic!("study", "user studies: the study file, clips and films, the page, the answers and what they say"),
     topic!("models", "the pose models: origin, licences, fetching, adding one"),

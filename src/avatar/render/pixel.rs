@@ -88,7 +88,8 @@ fn for_surfaces(
         let mut n = 1;
         for other in k + 1..4 {
             if is_pending[other] {
-                let is_near = (beat_proximity[k] - beat_proximity[other]).abs() < SAME_SURFACE_RATIO * beat_proximity[k];
+                let is_near =
+                    (beat_proximity[k] - beat_proximity[other]).abs() < SAME_SURFACE_RATIO * beat_proximity[k];
                 if is_near && surfaces.triangles[triangles[other] as usize].mesh == mesh {
                     is_pending[other] = false;
                     n += 1;

@@ -79,7 +79,8 @@ impl RowBand {
             match background {
                 Some(background) => {
                     let there = y * self.width;
-                    self.beat_proximity[row.clone()].copy_from_slice(&background[there + columns[0]..there + columns[1]]);
+                    self.beat_proximity[row.clone()]
+                        .copy_from_slice(&background[there + columns[0]..there + columns[1]]);
                 }
                 None => self.beat_proximity[row.clone()].fill([0.0; 4]),
             }

@@ -10,9 +10,11 @@ use anyhow::Result;
 use orator_base::text::counted;
 use orator_base::text::length;
 use orator_gesture::evaluate::clips::clips::EvalClips;
+use orator_gesture::evaluate::conclusion::conclusion::{
+    Answer, Conclusion, better_than_constant_pose, depends_on_audio,
+};
+use orator_gesture::evaluate::conclusion::text;
 use orator_gesture::evaluate::table::table::{PredictorRow, Table};
-use orator_gesture::evaluate::verdict::text;
-use orator_gesture::evaluate::verdict::verdict::{Answer, Verdict, better_than_nothing, depends_on_audio};
 use serde_json::json;
 
 /// HTML of the page.
@@ -60,7 +62,7 @@ fn with_checkpoint_note(table: &Table, body: Vec<Node>) -> Vec<Node> {
 
 /// Conclusions with the votes that support them, the compared predictors, and notes.
 fn meaning(table: &Table) -> Vec<Node> {
-    let card = |(own, verdict): (&PredictorRow, Verdict)| {
+    let card = |(own, verdict): (&PredictorRow, Conclusion)| {
         let class = format!("card verdict {}", verdict.word.replace(' ', "-"));
         let votes = verdict.votes.iter().map(|vote| {
             let (class, words) = match vote.answer {
@@ -75,7 +77,7 @@ fn meaning(table: &Table) -> Vec<Node> {
         let card = node("div").class(class).child(node("p").text(format!("{of}{}", verdict.sentence)));
         card.child(node("ul").class("votes").children(votes))
     };
-    let verdicts = |own| [(own, better_than_nothing(table, own)), (own, depends_on_audio(table, own))];
+    let verdicts = |own| [(own, better_than_constant_pose(table, own)), (own, depends_on_audio(table, own))];
     let mut body = vec![node("div").class("verdicts").children(table.predictions().flat_map(verdicts).map(card))];
     let rows = table.rows.iter().map(|row| {
         let name = node("th").attr("scope", "row").text(row.name());

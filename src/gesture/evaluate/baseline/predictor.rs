@@ -15,7 +15,11 @@ pub fn motion(speaker: &GestureGenerator, sound: &Sound, n_frames: usize) -> Res
     let mut sound = sound.clone();
     sound.samples.resize(sound.samples.len().max(n_needed), 0.0);
     let (predicted, posture) = speaker.motion_and_posture(&sound)?;
-    ensure!(predicted.n_frames() >= n_frames, "{} frames of motion for {n_frames} of sound", predicted.n_frames());
+    ensure!(
+        predicted.n_frames() >= n_frames,
+        "{} frames of motion were generated for {n_frames} frames of audio",
+        predicted.n_frames()
+    );
     let motion = Motion::from_joints(predicted.fps, predicted.joints.slice(s![..n_frames, .., ..]).to_owned());
     Ok((motion, posture.map(|posture| posture.slice(0..n_frames))))
 }

@@ -114,13 +114,16 @@ impl EvaluatedCheckpoint {
         sound.samples.resize(sound.samples.len().max(n_needed), 0.0);
         let poses = network.poses(&sound, words)?;
         let motion = if network.is_captured() {
-            let captured = bvh::from_text(&network.bvh(&poses)?).context("its skeleton is no speaker's")?;
+            let captured = bvh::from_text(&network.bvh(&poses)?).context("cannot convert its skeleton to 49 joints")?;
             resample::at_rate(&without_fingers(captured.motion), fps)
         } else {
             network.motion(&poses)?
         };
         let n_generated = motion.n_frames();
-        ensure!(n_generated >= n_frames, "{n_generated} frames of motion for {n_frames} of sound");
+        ensure!(
+            n_generated >= n_frames,
+            "{n_generated} frames of motion were generated for {n_frames} frames of audio"
+        );
         Ok((Motion::from_joints(fps, motion.joints.slice_move(s![..n_frames, .., ..])), None))
     }
 }

@@ -1,7 +1,7 @@
 //! Beat alignment of AIST++ (Li et al. 2021, `tools/calculate_beat_scores.py` in their repository): how near the beats
 //! of the motion are to those of the sound. A motion with a single aligned beat scores 1.
 
-use super::consistency::{minima, beat_proximity};
+use super::consistency::{beat_proximity, minima};
 use crate::metrics::body_part::BodyPart;
 use crate::metrics::definition::{Better, Definition, MetricFamily};
 use crate::metrics::pair::PairedFrames;

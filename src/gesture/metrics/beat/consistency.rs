@@ -141,7 +141,8 @@ pub(crate) fn emage(fps: f64) -> MetricFamily {
             for onset in &inner {
                 let sums = blocks.at((onset * pair.fps) as usize);
                 let time = onset - from;
-                sums[0] += if is_non_finite { f64::NAN } else { weight * beat_proximity(time, &predicted, EMAGE_SIGMA) };
+                sums[0] +=
+                    if is_non_finite { f64::NAN } else { weight * beat_proximity(time, &predicted, EMAGE_SIGMA) };
                 sums[1] += weight * beat_proximity(time, &ground_truth, EMAGE_SIGMA);
                 sums[2] += weight;
             }
