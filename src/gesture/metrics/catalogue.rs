@@ -30,7 +30,7 @@ pub struct Catalogue {
 /// Sums of one interval, in total and in blocks.
 #[derive(Clone, Debug, Default)]
 pub struct IntervalSums {
-    pub whole: MetricSums,
+    pub total: MetricSums,
     pub blocks: Vec<MetricSums>,
 }
 
@@ -81,7 +81,7 @@ impl Catalogue {
     /// Sums of one interval. Frames beyond the shortest of its arrays are ignored. An interval whose frame rate differs
     /// from that of the settings makes every value NaN.
     pub fn measure(&self, interval: &MotionPair) -> MetricSums {
-        self.measure_blocks(interval, usize::MAX).whole
+        self.measure_blocks(interval, usize::MAX).total
     }
 
     /// Sums of one interval, in total and in blocks of about `n_frames` frames. Windows that start in a block are
@@ -112,7 +112,7 @@ impl Catalogue {
         for block in 0..n {
             let costly = CostlySums::Added(row(&mut costly, block));
             let sums = MetricSums { cheap: row(&mut cheap, block), costly };
-            measured.whole += &sums;
+            measured.total += &sums;
             measured.blocks.push(sums.into_block());
         }
         measured
@@ -240,7 +240,7 @@ mod tests {
             let measured = catalogue.measure_blocks(&interval, 20);
             let mut added = MetricSums::default();
             measured.blocks.iter().for_each(|block| added += block);
-            let values = catalogue.values(&measured.whole);
+            let values = catalogue.values(&measured.total);
             for (label, known) in known.as_object().into_iter().flatten().filter(|(_, v)| v.is_number()) {
                 let label_of = |d: &Definition| format!("{} {}", d.name, d.part);
                 let i = catalogue.definitions().iter().position(|d| label_of(d) == *label).expect(label);

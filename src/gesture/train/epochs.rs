@@ -149,7 +149,7 @@ pub fn run<T: ValidatedTraining>(
             let previous_best = *training.best();
             let comparison = match previous_best {
                 Some((best_step, best)) if best <= score => format!("best {best:.3} at step {best_step}"),
-                _ => "the best so far".to_owned(),
+                _ => "new best".to_owned(),
             };
             progress.say(&format!("step {step}: {}, score {score:.3} ({comparison})", T::summary(&validation)));
             if let (Some(alarm), true) = (alarm, step > epoch_steps) {
@@ -226,7 +226,7 @@ pub struct StoppedTraining {
 
 impl StoppedTraining {
     fn checkpoint(&self) -> String {
-        let Some(newest) = &self.newest else { return ", with no checkpoint yet".to_owned() };
-        format!("; the checkpoint {} goes on from there", newest.display())
+        let Some(newest) = &self.newest else { return ", before the first checkpoint".to_owned() };
+        format!("; the same command resumes from {}", newest.display())
     }
 }

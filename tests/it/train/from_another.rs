@@ -41,7 +41,7 @@ fn it_takes_the_weights_and_keeps_its_own_body() {
     let of_ben = dir.join("ben-gan");
     train_with_callback(&[&ben], &settings(), Some(&of_anna), &of_ben, &Shared(stop.clone()), ignore).unwrap();
     let said = stop.said.lock().unwrap().join("\n");
-    assert!(said.contains("beginning with what") && said.contains("learnt of anna"), "{said}");
+    assert!(said.contains("initialising from ") && said.contains("(trained on anna)"), "{said}");
 
     let model = GestureGenerator::open(&of_ben).unwrap().metadata;
     assert_eq!(model.name, "ben");

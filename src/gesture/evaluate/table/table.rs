@@ -102,8 +102,8 @@ pub fn measure(
     rows.extend(halves(&catalogue, clips));
     let truth = Predictor::truth(clips);
     // The ground truth is measured without blocks, since it needs no bootstrap draws.
-    let whole = blocks::measure(&catalogue, clips, &truth, usize::MAX).whole;
-    rows.push(row(&catalogue, PredictorKind::Truth, &truth.description, &IntervalSums { whole, blocks: Vec::new() }));
+    let total = blocks::measure(&catalogue, clips, &truth, usize::MAX).total;
+    rows.push(row(&catalogue, PredictorKind::Truth, &truth.description, &IntervalSums { total, blocks: Vec::new() }));
     task.advance(1);
     let definitions = catalogue.definitions().to_vec();
     let truth_of = (0..definitions.len()).map(|index| catalogue.truth_of(index)).collect();
@@ -167,7 +167,7 @@ fn is_of_sets(definition: &Definition) -> bool {
 }
 
 fn row(catalogue: &Catalogue, kind: PredictorKind, description: &str, measured: &IntervalSums) -> PredictorRow {
-    let values = catalogue.values(&measured.whole);
+    let values = catalogue.values(&measured.total);
     let n_blocks = measured.blocks.len();
     let drawn = if n_blocks == 0 {
         Array2::from_elem((0, values.len()), f64::NAN)
@@ -188,7 +188,7 @@ fn row(catalogue: &Catalogue, kind: PredictorKind, description: &str, measured: 
         Estimate::new(value, interval.low.max(0.0 * interval.low), interval.high)
     };
     let reason = |(index, value): (usize, &f64)| {
-        if value.is_finite() { String::new() } else { catalogue.reason(&measured.whole, index) }
+        if value.is_finite() { String::new() } else { catalogue.reason(&measured.total, index) }
     };
     PredictorRow {
         kind,
