@@ -141,7 +141,7 @@ impl Catalogue {
         match sums.cheap.get(..N_DIAGNOSTICS) {
             None => "no values were measured".to_owned(),
             Some([_, n_other]) if *n_other > 0.0 => {
-                format!("{n_other} frames do not have the frame rate {}", self.fps.per_sec())
+                format!("{n_other} frames do not have the frame rate {}", self.fps)
             }
             Some([n_non_finite, _]) if *n_non_finite > 0.0 => {
                 format!("{n_non_finite} predicted joints are not finite where the true joints are visible")

@@ -71,10 +71,10 @@ pub fn newest<T>(
 /// Fails, listing all losses, if a loss is not finite or exceeds `LOSS_LIMIT`, or if the gradient norm is not finite.
 pub fn ensure_not_diverged(step: usize, losses: &[(&str, f64)], gradient_norm: f64) -> Result<()> {
     let is_bounded = losses.iter().all(|(_, loss)| loss.is_finite() && loss.abs() < LOSS_LIMIT);
-    let listed: Vec<String> = losses.iter().map(|(name, loss)| format!("{name} {loss:.3}")).collect();
+    let listed: Vec<String> = losses.iter().map(|(name, loss)| format!("{name} {loss:.3e}")).collect();
     ensure!(
         is_bounded && gradient_norm.is_finite(),
-        "the training diverged at step {step}: {}, gradient norm {gradient_norm:.3}",
+        "the training diverged at step {step}: {}, gradient norm {gradient_norm:.3e}",
         listed.join(", ")
     );
     Ok(())

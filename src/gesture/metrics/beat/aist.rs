@@ -23,7 +23,7 @@ pub(crate) fn metric(fps: f64) -> MetricFamily {
                   Beats: strict local minima of the summed way of joints 1-6 from frame to frame (0 in the first), \
                   among `order` frames on either side (10 at 60 frames a second); sigma 3 frames at 60 a second. \
                   Theirs: beats of music instead of onsets, 24 joints of SMPL",
-        undefined: "no interval has sound with an onset",
+        undefined: "no interval has audio with an onset",
         parameters: json!({"sigma_secs": SIGMA_FRAMES / FPS, "order_frames": order, "joints": BodyPart::Body.joints()}),
         ..Definition::new("beat_alignment", BodyPart::Body.name(), "1", Better::NearerTruth)
     };

@@ -34,7 +34,7 @@ pub(crate) fn metric(fps: f64) -> MetricFamily {
                   is left out). Angles in half turns between neck-shoulder, upper arm and forearm; |change from frame \
                   to frame| / average change / 4, 0 in the first frame; beats: minima among 3 frames at least `drop` \
                   below one neighbour",
-        undefined: "there is no sound, no onset in it, or no angle has a beat",
+        undefined: "there is no audio, no onset in it, or no angle has a beat",
         parameters: json!({"sigma_secs": SIGMA, "drop": DROP, "average_change": angles.map(|(_, mean)| mean)}),
         ..Definition::new("beat_consistency", "arms", "1", Better::NearerTruth)
     };

@@ -61,7 +61,7 @@ pub(crate) fn metric(fps: f64) -> MetricFamily {
                   beat of the joint: a strict local minimum, among `order` frames on either side, of its speed by \
                   central differences; 0 where a joint has no beat in the interval; onsets where the joint is not \
                   seen left out. Onsets: spectral flux, `audio::onset`",
-        undefined: "there is no sound, no onset in it, or no elbow or wrist is seen at one",
+        undefined: "there is no audio, no onset in it, or no elbow or wrist is visible at one",
         parameters: json!({"joints": JOINTS, "sigma_secs": SIGMA, "order_frames": order}),
         ..Definition::new("beat_consistency", "arms", "1", Better::NearerTruth)
     };
@@ -105,7 +105,7 @@ pub(crate) fn emage(fps: f64) -> MetricFamily {
                   among `order` frames on either side, with speed / mean above the threshold, looked up `cut` frames \
                   early; positions first replaced by |x - mean| by coordinate; first and last 2 s of motion and \
                   onsets left out (theirs finds onsets in the sound thus cut)",
-        undefined: "no interval has an onset and a seen joint further than 2 s from both its ends",
+        undefined: "no interval has an onset and a visible joint further than 2 s from both its ends",
         parameters: json!({
             "joints": BodyPart::Body.joints(), "sigma_secs": EMAGE_SIGMA, "order_frames": order,
             "threshold": EMAGE_THRESHOLD, "cut_frames": cut,

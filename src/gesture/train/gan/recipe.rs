@@ -62,10 +62,10 @@ const fn row(key: &'static str, paper: f64, new_layer: f64, auto: [f64; 4]) -> R
 /// Minutes of training speech for the columns of `auto`.
 const MINUTES: [f64; 4] = [2.0, 10.0, 30.0, 120.0];
 
-/// `paper` has the published values (Rebol et al. 2021); `auto` was chosen on synthetic speakers (`orator guide results`).
-/// Its learning rate is ten times the paper's, because it runs far fewer than 90,000 steps. Weight averaging,
-/// augmentation and decoupled weight decay (Loshchilov & Hutter 2019) prevent overfitting. The errors may rise before
-/// the words are learned, hence the patience.
+/// `paper` has the published values (Rebol et al. 2021). `auto` was chosen on synthetic speakers (see
+/// `orator guide results`): its learning rate is ten times the paper's, because it runs far fewer than 90,000 steps;
+/// weight averaging, augmentation and decoupled weight decay (Loshchilov & Hutter 2019) prevent overfitting. The errors
+/// may rise before the words are learned, hence the patience.
 #[rustfmt::skip]
 const RECIPES: [RecipeRow; 23] = [
     //   key                  paper     new layer  auto: 2, 10, 30, 120 minutes

@@ -255,9 +255,7 @@ impl InplaceOp2 for AdamUpdate<'_> {
 
     fn cpu_fwd(&self, values: &mut CpuStorage, layout: &Layout, grad: &CpuStorage, grad_layout: &Layout) -> Result<()> {
         let CpuStorage::F32(values) = values else { candle_core::bail!("Adam needs f32 tensors") };
-        let Some((start, end)) = layout.contiguous_offsets() else {
-            candle_core::bail!("Adam needs contiguous tensors")
-        };
+        let Some((start, end)) = layout.contiguous_offsets() else { candle_core::bail!("Adam: not contiguous") };
         let grad = orator_nn::cpu::tensor::slice::<f32>(grad, grad_layout)?;
         let moments = &mut *self.moments.borrow_mut();
         let AdamScalars { beta1, beta2, eps, scale, rate, correction, keep } = self.scalars;
