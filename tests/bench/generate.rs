@@ -63,7 +63,7 @@ pub(crate) fn run(args: &Args, progress: &dyn Progress) -> Result<Report> {
             let whole = std::iter::once(Ok(sound.samples.clone()));
             let chunk = args.chunk.unwrap_or(CHUNK);
             let (motion, _) =
-                pool.install(|| speaker.motion_of_pieces(whole, sound.samples.len(), chunk, &mut |_| ()))?;
+                pool.install(|| speaker.motion_from_stream(whole, sound.samples.len(), chunk, &mut |_| ()))?;
             secs.push(start.elapsed().as_secs_f64());
             ensure!(motion.joints.iter().all(|v| v.is_finite()), "the motion made is not finite");
             task.advance(1);

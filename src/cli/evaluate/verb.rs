@@ -13,9 +13,9 @@ use orator_dataset::{Dataset, Split};
 use orator_gesture::evaluate::Evaluation;
 use orator_gesture::evaluate::clips::checkpoint::EvaluatedCheckpoint;
 use orator_gesture::evaluate::clips::motion_store::{MEMORY_BYTES, MotionStore};
+use orator_gesture::evaluate::conclusion::text;
 use orator_gesture::evaluate::table::result::StoredResult;
 use orator_gesture::evaluate::table::{compare, result};
-use orator_gesture::evaluate::verdict::text;
 use orator_gesture::generate::model::model_lock;
 use orator_gesture::metrics::settings::Convention;
 use orator_gesture::metrics::settings::MetricSettings;
@@ -194,8 +194,8 @@ struct CompareArgs {
 
 fn compare_results(args: &CompareArgs, ui: &Ui) -> Result<Outcome> {
     let compared = compare::compare(&StoredResult::read(&args.a)?, &StoredResult::read(&args.b)?);
-    let has_rejected = !compared.refused.is_empty();
-    if compared.beside.is_empty() && !has_rejected {
+    let has_rejected = !compared.rejected.is_empty();
+    if compared.pairs.is_empty() && !has_rejected {
         bail!("{} and {} have no metric in common", args.a.display(), args.b.display());
     }
     let text = format!("A: {}\nB: {}\n\n{}", args.a.display(), args.b.display(), compare::text(&compared));

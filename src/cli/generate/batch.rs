@@ -27,8 +27,8 @@ fn text(report: &BatchReport) -> String {
     for sound in &report.sounds {
         let facts = |key: &str| sound.facts.get(key).cloned().unwrap_or_default();
         let word = match (sound.ended, &sound.error) {
-            (BatchState::Made, _) => "generated",
-            (BatchState::Fresh, _) => "up to date",
+            (BatchState::Created, _) => "generated",
+            (BatchState::UpToDate, _) => "up to date",
             (BatchState::Failed, error) => {
                 text += &format!("{:width$}  failed  {}\n", sound.out, error.as_deref().unwrap_or_default());
                 continue;
@@ -49,7 +49,7 @@ fn text(report: &BatchReport) -> String {
     if n_listed > MAX_LISTED {
         text += &format!("and {} more\n", n_listed - MAX_LISTED);
     }
-    let BatchReport { made, fresh, failed, out_folder, sounds } = report;
+    let BatchReport { created, up_to_date, failed, out_folder, sounds } = report;
     let sounds = counted(sounds.len(), "audio file");
-    text + &format!("{sounds}: {made} generated, {fresh} up to date, {failed} failed; in {}", out_folder.display())
+    text + &format!("{sounds}: {created} generated, {up_to_date} up to date, {failed} failed; in {}", out_folder.display())
 }

@@ -39,9 +39,9 @@ pub struct SpeechBatch {
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct BatchReport {
     /// Number of sounds whose motion was generated.
-    pub made: usize,
+    pub created: usize,
     /// Number of sounds whose motion was up to date.
-    pub fresh: usize,
+    pub up_to_date: usize,
     /// Number of sounds that failed.
     pub failed: usize,
     /// Output folder.
@@ -57,7 +57,7 @@ pub struct BatchOutcome {
     pub audio: PathBuf,
     /// Path of the motion below the output folder, without an extension.
     pub out: String,
-    /// Made, fresh or failed.
+    /// State after the run.
     pub ended: BatchState,
     /// Error message of a failure.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -70,12 +70,12 @@ pub struct BatchOutcome {
 
 /// State of a sound after the run of a batch.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "lowercase")]
+#[serde(rename_all = "snake_case")]
 pub enum BatchState {
     /// The motion was generated.
-    Made,
+    Created,
     /// The motion was already up to date.
-    Fresh,
+    UpToDate,
     /// The sound failed, which does not stop the others.
     Failed,
 }
@@ -98,8 +98,8 @@ impl SpeechBatch {
         let mut report = BatchReport { out_folder: self.folder.clone(), ..BatchReport::default() };
         for (sound, ended) in self.sounds.iter().zip(ended) {
             let (count, ended, error, facts) = match ended {
-                StageOutcome::Done(done) => (&mut report.made, BatchState::Made, None, done.facts),
-                StageOutcome::Skipped(done) => (&mut report.fresh, BatchState::Fresh, None, done.facts),
+                StageOutcome::Done(done) => (&mut report.created, BatchState::Created, None, done.facts),
+                StageOutcome::Skipped(done) => (&mut report.up_to_date, BatchState::UpToDate, None, done.facts),
                 StageOutcome::Failed(error) => {
                     (&mut report.failed, BatchState::Failed, Some(format!("{error:#}")), Map::new())
                 }

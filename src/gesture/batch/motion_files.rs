@@ -30,17 +30,18 @@ pub fn write_motion(
     let audio = speech.audio;
     let started = Instant::now();
     let task = progress.begin("speech to motion", 0);
-    task.detail("listening");
+    task.detail("reading the audio");
     let (n_samples, note) = measure(audio)?;
     let secs = n_samples as f64 / f64::from(SAMPLE_RATE);
-    let no_motion = || format!("no motion for {}", audio.display());
+    let no_motion = || format!("cannot generate motion for {}", audio.display());
     let n_frames = speaker.n_frames(n_samples).with_context(no_motion)?;
     drop(task);
     let task = progress.begin("speech to motion", n_frames as u64);
-    task.detail(&format!("{secs:.1} s of sound"));
+    task.detail(&format!("{secs:.1} s of audio"));
     let pieces = SoundStream::open(audio, SAMPLE_RATE);
-    let (motion, posture) =
-        speaker.motion_of_pieces(pieces, n_samples, CHUNK, &mut |n| task.advance(n as u64)).with_context(no_motion)?;
+    let (motion, posture) = speaker
+        .motion_from_stream(pieces, n_samples, CHUNK, &mut |n| task.advance(n as u64))
+        .with_context(no_motion)?;
     drop(task);
     let motion_secs = started.elapsed().as_secs_f64();
     write_outputs((motion, posture), speech, outputs, progress)?;
@@ -85,18 +86,17 @@ pub(super) fn write_outputs(
 /// # Errors
 /// A path that is not a file, or a file without sound.
 pub(super) fn measure(path: &Path) -> Result<(usize, Option<String>)> {
-    ensure!(path.exists(), "{} is not there", path.display());
-    ensure!(path.is_file(), "{} is no file", path.display());
+    ensure!(path.exists(), "{} does not exist", path.display());
+    ensure!(path.is_file(), "{} is not a file", path.display());
     let info = probe::probe(path)?;
     let name = path.display();
     let Some(track) = info.audio else {
-        return Err(UnreadableMedia(format!("{name} has no sound track; give a file with speech")).into());
+        return Err(UnreadableMedia(format!("{name} has no audio track; give a file with speech")).into());
     };
     match sound_stream::n_samples(path, SAMPLE_RATE)? {
         Some(n) if n > 0 => Ok((n, narrow_band_note(track.rate))),
         _ => {
-            let problem =
-                format!("{name}: its sound track ({}) holds no samples; give a file with speech", track.codec);
+            let problem = format!("{name}: the audio track ({}) has no samples; give a file with speech", track.codec);
             Err(UnreadableMedia(problem).into())
         }
     }
@@ -110,8 +110,8 @@ fn narrow_band_note(rate: u32) -> Option<String> {
     }
     let n_empty = (0..mel::N_MELS).filter(|band| mel::lowest_hz(*band) >= highest_hz).count();
     Some(format!(
-        "the sound has {rate} samples a second, so nothing above {highest_hz:.0} Hz: {n_empty} of the {} mel bands a speaker \
-         listens to are empty, and it gestures as to muffled speech",
+        "the audio has a sample rate of {rate} Hz: {n_empty} of the {} mel bands are empty (above {highest_hz:.0} Hz), and \
+         the motion is generated as for muffled speech",
         mel::N_MELS
     ))
 }
@@ -127,10 +127,10 @@ pub fn write(
     match speaker {
         TrainedSpeaker::Gan(speaker) => {
             let name = speaker.name();
-            ensure!(speech.transcript.is_none(), "the speaker {name} reads no words: leave out --transcript");
+            ensure!(speech.transcript.is_none(), "the model of {name} does not use words: leave out --transcript");
             ensure!(
                 speech.seams == StateAtSeams::Renewed,
-                "the speaker {name} makes no segments, and has no state: leave out --carry-state"
+                "the model of {name} does not generate in segments: leave out --carry-state"
             );
             write_motion(speaker, speech, outputs, progress)
         }

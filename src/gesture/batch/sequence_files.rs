@@ -8,6 +8,7 @@ use anyhow::{Context as _, Result, bail, ensure};
 use orator_avatar::animate::export::file::{ExportFormat, FigureOptions};
 use orator_base::stage::progress::Progress;
 use orator_base::stage::workdir;
+use orator_base::text::counted;
 use orator_formats::transcript::{Transcript, after_end};
 use orator_media::ffmpeg::audio;
 use orator_nn::seq2seq::predict::StateAtSeams;
@@ -29,23 +30,20 @@ pub fn write_sequence(
     let started = Instant::now();
     let is_captured = speaker.is_captured();
     if let Some((path, _)) = outputs.iter().find(|(_, format)| is_captured && *format != ExportFormat::Bvh) {
-        bail!(
-            "{}: this network moves the skeleton of the BVH files it was trained on, which is written as .bvh alone",
-            path.display()
-        );
+        bail!("{}: this network animates the BVH skeleton it was trained on: expected a .bvh file", path.display());
     }
     ensure!(
         !is_captured || figure == FigureOptions::default(),
-        "this network moves the skeleton of the BVH files it was trained on, whose names and rate are kept: leave out \
+        "this network animates the BVH skeleton it was trained on, with its bone names and frame rate: leave out \
          --names and --fps"
     );
     let parsed = transcript.map(Transcript::read).transpose()?;
     let task = progress.begin("speech to motion", 0);
     measure(audio)?;
     let sound = audio::read_mono(audio, speaker.metadata.rate)?;
-    let sound = sound.with_context(|| format!("{} has no sound", audio.display()))?;
+    let sound = sound.with_context(|| format!("{} has no audio", audio.display()))?;
     let words = parsed.as_ref().map_or(&[][..], |parsed| &parsed.words);
-    let no_motion = || format!("no motion for {}", audio.display());
+    let no_motion = || format!("cannot generate motion for {}", audio.display());
     let input = speaker.prepare(&sound, words).with_context(no_motion)?;
     let poses = speaker.generate(&input, seams).with_context(no_motion)?;
     let motion_secs = started.elapsed().as_secs_f64();
@@ -80,13 +78,13 @@ pub fn write_sequence(
 /// Notes about problems of a transcript.
 fn notes(speaker: &SequenceGenerator, path: &Path, parsed: &Transcript, sound_secs: f64) -> Vec<String> {
     if !speaker.reads_words() {
-        return vec![format!("the network reads no words: {} was not used", path.display())];
+        return vec![format!("the network does not use words: {} was ignored", path.display())];
     }
     let is_unknown = !parsed.words.is_empty() && speaker.metadata.vocabulary.n_known(&parsed.words) == 0;
     let unknown = is_unknown.then(|| {
         format!(
-            "none of the {} words was trained with: is the transcript in the language of the training?",
-            parsed.words.len()
+            "no word of the transcript ({}) is in the network's vocabulary: is it in the language of the training?",
+            counted(parsed.words.len(), "word")
         )
     });
     parsed.notes.iter().cloned().chain(after_end(&parsed.words, sound_secs)).chain(unknown).collect()

@@ -4,6 +4,7 @@
 use anyhow::{Context, Result, bail, ensure};
 use orator_avatar::animate::export::file::ExportFormat;
 use orator_base::input;
+use orator_base::text::counted;
 use orator_dataset::config::patterns::{SOUND_EXTENSIONS, VIDEO_EXTENSIONS, has_extension};
 use orator_formats::search;
 use std::collections::BTreeMap;
@@ -28,11 +29,11 @@ pub struct BatchSound {
 /// # Errors
 /// A path that is not a folder, a folder without sounds, or `out` equal to `folder`.
 pub fn of_folder(folder: &Path, out: &Path) -> Result<Vec<BatchSound>> {
-    ensure!(folder.is_dir(), "{} is no folder", folder.display());
+    ensure!(folder.is_dir(), "{} is not a folder", folder.display());
     let out = out.canonicalize().ok();
     ensure!(
         out != folder.canonicalize().ok(),
-        "motions would lie among the sounds in {}; choose another --out-folder, say {}",
+        "the motions would be written to the folder of the audio files, {}; choose another --out-folder, such as {}",
         folder.display(),
         folder.join("motions").display()
     );
@@ -42,7 +43,7 @@ pub fn of_folder(folder: &Path, out: &Path) -> Result<Vec<BatchSound>> {
     let relative = |path: PathBuf| (path.strip_prefix(folder).unwrap_or(&path).to_string_lossy().into_owned(), path);
     let files: Vec<(String, PathBuf)> =
         search::files(folder, &mut enter)?.into_iter().filter(sounds).map(relative).collect();
-    ensure!(!files.is_empty(), "{} holds no file that sounds ({})", folder.display(), endings.join(", "));
+    ensure!(!files.is_empty(), "no audio or video files in {}: expected {}", folder.display(), endings.join(", "));
     let stem = |file: &str| file.rsplit_once('.').map_or(file, |(stem, _)| stem).to_owned();
     let mut name_counts = BTreeMap::<String, usize>::new();
     files.iter().for_each(|(file, _)| *name_counts.entry(stem(file).to_lowercase()).or_default() += 1);
@@ -62,9 +63,9 @@ pub fn of_folder(folder: &Path, out: &Path) -> Result<Vec<BatchSound>> {
 /// `transcript`. Paths are relative to the folder of the table. Errors name the line.
 pub fn of_table(path: &Path) -> Result<Vec<BatchSound>> {
     let bytes = input::read(path, input::MOST_TEXT).with_context(|| format!("cannot read {}", path.display()))?;
-    let text = std::str::from_utf8(&bytes).with_context(|| format!("{} is no text in UTF-8", path.display()))?;
+    let text = std::str::from_utf8(&bytes).with_context(|| format!("{} is not UTF-8 text", path.display()))?;
     let folder = path.parent().unwrap_or(Path::new(""));
-    parse(text, folder).and_then(distinct).with_context(|| format!("the table {}", path.display()))
+    parse(text, folder).and_then(distinct).with_context(|| format!("invalid table {}", path.display()))
 }
 
 fn parse(text: &str, folder: &Path) -> Result<Vec<BatchSound>> {
@@ -73,22 +74,23 @@ fn parse(text: &str, folder: &Path) -> Result<Vec<BatchSound>> {
     let delimiter =
         [',', ';', '\t'].into_iter().max_by_key(|c| heads.matches(*c).count()).filter(|c| heads.contains(*c));
     let mut lines = fields(text, delimiter.unwrap_or(','))?.into_iter();
-    let (_, heads) =
-        lines.next().context("it is empty; its first line names the columns: audio,out,checkpoint,transcript")?;
+    let (_, heads) = lines
+        .next()
+        .context("it is empty; expected column names in the first line: audio,out,checkpoint,transcript")?;
     let heads: Vec<String> = heads.iter().map(|head| head.trim().to_lowercase()).collect();
     for head in &heads {
         let known = ["audio", "out", "checkpoint", "speaker", "transcript"].contains(&head.as_str());
-        ensure!(known, "line 1: column `{head}` is unknown; expected audio, out, checkpoint, transcript");
+        ensure!(known, "line 1: unknown column `{head}`: expected audio, out, checkpoint, transcript");
     }
     let column = |names: &[&str]| heads.iter().position(|head| names.contains(&head.as_str()));
-    let audio = column(&["audio"]).context("line 1: there is no column `audio`")?;
+    let audio = column(&["audio"]).context("line 1: no column `audio`")?;
     let (out, checkpoint, transcript) = (column(&["out"]), column(&["checkpoint", "speaker"]), column(&["transcript"]));
     let mut rows = Vec::new();
     for (line, fields) in lines {
         let field = |at: Option<usize>| at.and_then(|at| fields.get(at)).map(|f| f.trim()).filter(|f| !f.is_empty());
         let n = (fields.len(), heads.len());
-        ensure!(n.0 <= n.1, "line {line}: {} fields under {} columns", n.0, n.1);
-        let Some(file) = field(Some(audio)) else { bail!("line {line}: no audio is named") };
+        ensure!(n.0 <= n.1, "line {line}: {} for {}", counted(n.0, "field"), counted(n.1, "column"));
+        let Some(file) = field(Some(audio)) else { bail!("line {line}: no audio file") };
         let name = match field(out) {
             Some(out) => motion_name(out).with_context(|| format!("line {line}"))?,
             None => motion_name(&Path::new(file).file_stem().unwrap_or_default().to_string_lossy())
@@ -101,7 +103,7 @@ fn parse(text: &str, folder: &Path) -> Result<Vec<BatchSound>> {
             transcript: field(transcript).map(|path| folder.join(path)),
         });
     }
-    ensure!(!rows.is_empty(), "it names no sound");
+    ensure!(!rows.is_empty(), "no audio files below the column names");
     Ok(rows)
 }
 
@@ -115,7 +117,7 @@ fn motion_name(out: &str) -> Result<String> {
         .map(|part| if let Component::Normal(part) = part { part.to_str().map(str::to_owned) } else { None })
         .collect();
     let parts = parts.filter(|parts| !parts.is_empty() && !parts.iter().any(|part| part.starts_with('.')));
-    let parts = parts.with_context(|| format!("out `{out}` is no name below the folder of outputs"))?;
+    let parts = parts.with_context(|| format!("invalid out `{out}`: expected a path below the output folder"))?;
     Ok(parts.join("/"))
 }
 
@@ -148,7 +150,7 @@ fn fields(text: &str, delimiter: char) -> Result<Vec<(usize, Vec<String>)>> {
         last = (line, body);
     }
     // An open quotation mark reaches to the end of the table.
-    ensure!(last.1.matches('"').count() % 2 == 0, "line {}: a quotation mark is not closed", last.0);
+    ensure!(last.1.matches('"').count() % 2 == 0, "line {}: unclosed quotation mark", last.0);
     rows.retain(|(_, fields)| fields.iter().any(|field| !field.trim().is_empty()));
     Ok(rows)
 }
@@ -178,13 +180,13 @@ mod tests {
         for (text, words) in [
             ("", "empty"),
             ("out\na", "no column `audio`"),
-            ("audio,loud\na.wav,1", "`loud` is unknown"),
-            ("audio\n", "names no sound"),
+            ("audio,loud\na.wav,1", "unknown column `loud`"),
+            ("audio\n", "no audio files"),
             ("audio,out\na.wav,../b", "line 2"),
             ("audio,out\na.wav,/b", "line 2"),
             ("audio,out\n\n,b", "line 3: no audio"),
-            ("audio\na.wav,b", "line 2: 2 fields under 1"),
-            ("audio\n\"a.wav", "line 2: a quotation mark"),
+            ("audio\na.wav,b", "line 2: 2 fields for 1 column"),
+            ("audio\n\"a.wav", "line 2: unclosed quotation mark"),
             ("audio,out\na.wav,Same\nb.wav,same.bvh", "a.wav and t/b.wav would both be written to `same`"),
         ] {
             let error = parse(text, Path::new("t")).and_then(distinct).unwrap_err();

@@ -41,7 +41,7 @@ impl<'a> BatchStage<'a> {
         if checkpoint.is_none()
             && let Some(sound) = batch.sounds.iter().find(|sound| sound.checkpoint.is_none())
         {
-            bail!("the table names no checkpoint for {}; give --checkpoint", sound.audio.display());
+            bail!("no checkpoint for {}: add one to the table, or give --checkpoint", sound.audio.display());
         }
         let sounds = batch.sounds.iter().map(|sound| (sound.name.as_str(), sound)).collect();
         let formats = formats(&batch.formats)?;
@@ -57,7 +57,10 @@ impl<'a> BatchStage<'a> {
     }
 
     fn sound(&self, unit: &Unit) -> Result<&BatchSound> {
-        self.sounds.get(unit.video.as_str()).copied().with_context(|| format!("{unit} is no sound of this batch"))
+        self.sounds
+            .get(unit.video.as_str())
+            .copied()
+            .with_context(|| format!("{unit} is not an audio file of this batch"))
     }
 
     /// Transcript of a sound, if its checkpoint is a sequence-to-sequence network; others do not read it.
@@ -69,7 +72,7 @@ impl<'a> BatchStage<'a> {
     fn checkpoint_of(&self, unit: &Unit) -> Result<PathBuf> {
         let sound = self.sound(unit)?;
         let own = sound.checkpoint.as_deref().map(checkpoint_file).transpose()?;
-        own.or_else(|| self.checkpoint.clone()).context("no checkpoint is named")
+        own.or_else(|| self.checkpoint.clone()).context("no checkpoint: give --checkpoint")
     }
 
     fn speaker(&self, checkpoint: &Path) -> Result<Arc<TrainedSpeaker>> {
@@ -122,7 +125,11 @@ impl Stage for BatchStage<'_> {
         for (ending, _) in &self.formats {
             let path = self.batch.folder.join(file(ending));
             let is_sound = path.canonicalize().is_ok_and(|p| unit.source.canonicalize().is_ok_and(|s| s == p));
-            ensure!(!is_sound, "{} is the speech itself; choose another --out-folder", path.display());
+            ensure!(
+                !is_sound,
+                "the motion would overwrite its audio file {}; choose another --out-folder",
+                path.display()
+            );
         }
         let outputs: Vec<(PathBuf, ExportFormat)> =
             self.formats.iter().map(|(ending, format)| (out.join(file(ending)), *format)).collect();
@@ -145,7 +152,7 @@ fn formats(endings: &[String]) -> Result<Vec<(String, ExportFormat)>> {
     for ending in endings {
         let ending = ending.trim().trim_start_matches('.').to_lowercase();
         let format = ExportFormat::from_path(Path::new(&format!("motion.{ending}"))).context("--format")?;
-        ensure!(formats.iter().all(|(known, _)| *known != ending), "--format names {ending} twice");
+        ensure!(formats.iter().all(|(known, _)| *known != ending), "--format lists {ending} twice");
         formats.push((ending, format));
     }
     Ok(formats)

@@ -12,7 +12,11 @@ use std::path::{Path, PathBuf};
 /// A `folder` that is not a folder, or that has no transcript for any of the sounds.
 pub fn find(sounds: &mut [BatchSound], folder: Option<&Path>) -> Result<()> {
     if let Some(folder) = folder {
-        ensure!(folder.is_dir(), "{} is no folder; for many sounds --transcript is one", folder.display());
+        ensure!(
+            folder.is_dir(),
+            "{} is not a folder: expected a folder of transcripts for a batch (--transcript)",
+            folder.display()
+        );
     }
     for sound in sounds.iter_mut().filter(|sound| sound.transcript.is_none()) {
         sound.transcript = match folder {
@@ -27,7 +31,7 @@ pub fn find(sounds: &mut [BatchSound], folder: Option<&Path>) -> Result<()> {
     if let Some(folder) = folder {
         ensure!(
             sounds.iter().any(|sound| sound.transcript.is_some()),
-            "{} holds no transcript with the name of a sound ({})",
+            "no transcript in {} is named like an audio file: expected {}",
             folder.display(),
             ENDINGS.join(", ")
         );
@@ -68,8 +72,8 @@ mod tests {
         assert_eq!(found(None, None).unwrap(), [Some(at("a.1.srt")), Some(at("b.tsv")), None]);
         let own = found(Some("said"), Some(sound("b.mp3", "d", Some("own.ctm")))).unwrap();
         assert_eq!(own, [None, Some(at("said/b.vtt")), Some(at("said/sub/c.txt")), Some(at("own.ctm"))]);
-        assert!(found(Some("b.tsv"), None).unwrap_err().to_string().contains("no folder"));
+        assert!(found(Some("b.tsv"), None).unwrap_err().to_string().contains("not a folder"));
         std::fs::create_dir(at("empty")).unwrap();
-        assert!(found(Some("empty"), None).unwrap_err().to_string().contains("holds no transcript"));
+        assert!(found(Some("empty"), None).unwrap_err().to_string().contains("no transcript in"));
     }
 }

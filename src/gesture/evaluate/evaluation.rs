@@ -41,10 +41,10 @@ impl Evaluation {
         let found = pairs::find(truth, prediction, audio)?;
         let mut clips = clips::read(&found.pairs, fps, store)?;
         if let Some(audio) = audio {
-            ensure!(clips.have_sound() || audio.is_dir(), "{} holds no sound", audio.display());
+            ensure!(clips.have_sound() || audio.is_dir(), "{} has no audio", audio.display());
         }
         clips.notes.splice(0..0, found.notes);
-        let mut predictors = vec![Predictor::prediction(&clips, "the motion under test")];
+        let mut predictors = vec![Predictor::prediction(&clips, "the evaluated motion")];
         let (others, left_out) = baselines::from_files(&clips, store)?;
         predictors.extend(others);
         clips.notes.extend(left_out);

@@ -54,9 +54,13 @@ impl GestureGenerator {
 
     /// Like `motion`, with the angles of head and trunk if the network was trained on them.
     pub fn motion_and_posture(&self, sound: &Sound) -> Result<(Motion, Option<Posture>)> {
-        ensure!(sound.rate == SAMPLE_RATE, "the sound has {} Hz, expected {SAMPLE_RATE}", sound.rate);
+        ensure!(
+            sound.rate == SAMPLE_RATE,
+            "the audio has a sample rate of {} Hz, expected {SAMPLE_RATE} Hz",
+            sound.rate
+        );
         let pieces = sound.samples.chunks(SAMPLE_RATE as usize).map(|piece| Ok(piece.to_vec()));
-        self.motion_of_pieces(pieces, sound.samples.len(), CHUNK, &mut |_| ())
+        self.motion_from_stream(pieces, sound.samples.len(), CHUNK, &mut |_| ())
     }
 
     /// Motion and posture for a stream of sound pieces (16 kHz, `n_samples` in total), generated in chunks of `chunk`
@@ -65,7 +69,7 @@ impl GestureGenerator {
     ///
     /// # Errors
     /// Errors of `motion`; fewer samples than `n_samples`; a `chunk` that is not a multiple of 32.
-    pub fn motion_of_pieces(
+    pub fn motion_from_stream(
         &self,
         pieces: impl Iterator<Item = Result<Vec<f32>>>,
         n_samples: usize,
@@ -94,7 +98,7 @@ impl GestureGenerator {
     }
 
     /// Raw network output [features, T] in chunks of at most `chunk` frames, which [`SpeakerMetadata::motion`] converts
-    /// to motion, for sound pieces as in [`Self::motion_of_pieces`]. The sound is extended by its mirror image to a
+    /// to motion, for sound pieces as in [`Self::motion_from_stream`]. The sound is extended by its mirror image to a
     /// multiple of 32 frames.
     pub fn features(
         &self,
@@ -114,7 +118,7 @@ impl GestureGenerator {
             let poses: Vec<f32> = poses?.narrow(2, 0, n)?.flatten_all()?.to_vec1()?;
             ensure!(
                 poses.iter().all(|number| number.is_finite()),
-                "the network makes numbers that are not finite from frame {first} on: its checkpoint was damaged, or its training failed"
+                "the network output is not finite from frame {first} on: the checkpoint is damaged, or its training failed"
             );
             Ok(Array2::from_shape_vec((self.metadata.network.n_out, n), poses)?)
         }))
@@ -124,7 +128,7 @@ impl GestureGenerator {
     pub fn n_frames(&self, n_samples: usize) -> Result<usize> {
         let secs = n_samples as f64 / f64::from(SAMPLE_RATE);
         let n_frames = (secs * self.fps().per_sec() + 1e-6) as usize;
-        ensure!(n_frames > 0, "the sound is {secs:.3} s long: too short for one frame of motion");
+        ensure!(n_frames > 0, "the audio is too short for one frame of motion: {secs:.3} s");
         Ok(n_frames)
     }
 }

@@ -51,7 +51,7 @@ impl<I: Iterator<Item = Result<Vec<f32>>>> MelStream<I> {
             let n_read = self.first + self.samples.len();
             let Some(piece) = self.pieces.next() else {
                 anyhow::bail!(
-                    "the sound ended after {n_read} of {} samples: it changed while it was read",
+                    "the audio ended after {n_read} of {} samples: the file changed while it was read",
                     self.n_samples
                 )
             };
@@ -61,7 +61,7 @@ impl<I: Iterator<Item = Result<Vec<f32>>>> MelStream<I> {
         let at = |i: usize| if i < self.n_samples { i } else { period - i };
         let samples: Option<Vec<f32>> =
             range.map(|i| self.samples.get(at(i % period).checked_sub(self.first)?).copied()).collect();
-        samples.ok_or_else(|| anyhow::anyhow!("the sound was asked for out of order"))
+        samples.ok_or_else(|| anyhow::anyhow!("spectrogram frames were requested out of order"))
     }
 }
 

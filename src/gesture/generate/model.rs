@@ -134,11 +134,11 @@ pub struct GenerationChoice {
 /// Loads a checkpoint of `orator train gan` as a network of one speaker. Errors name the file and the cause.
 pub fn load(path: &Path, choice: &GenerationChoice) -> Result<(SpeakerMetadata, Generator)> {
     let mut contents = Contents::read(path)?;
-    let context = || format!("{} is no checkpoint of `orator train gan`", path.display());
+    let context = || format!("{} is not a checkpoint of `orator train gan`", path.display());
     check(&contents.facts["speaker"]).with_context(context)?;
     select_speaker(&mut contents, choice.speaker.as_deref()).with_context(|| path.display().to_string())?;
     if let Some(seed) = choice.seed {
-        variant::vary(&mut contents, GENERATOR, seed).with_context(|| format!("{} has no takes", path.display()))?;
+        variant::vary(&mut contents, GENERATOR, seed).with_context(|| format!("{} has no variants", path.display()))?;
     }
     build(&contents).with_context(context)
 }
@@ -149,9 +149,9 @@ pub fn speakers(facts: &serde_json::Value) -> Result<Vec<SpeakerMetadata>> {
     let first = [facts["speaker"].clone()];
     let others = facts["other_speakers"].as_array().cloned().unwrap_or_default();
     let all = first.into_iter().chain(others).map(serde_json::from_value);
-    let all: Vec<SpeakerMetadata> = all.collect::<serde_json::Result<_>>().context("its facts are incomplete")?;
+    let all: Vec<SpeakerMetadata> = all.collect::<serde_json::Result<_>>().context("incomplete metadata")?;
     let n_speakers = all[0].network.n_speakers.max(1);
-    ensure!(n_speakers == all.len(), "it names {} speakers of {n_speakers}", all.len());
+    ensure!(n_speakers == all.len(), "it has the metadata of {} of {n_speakers} speakers", all.len());
     Ok(all)
 }
 
@@ -161,10 +161,11 @@ fn select_speaker(contents: &mut Contents, name: Option<&str>) -> Result<()> {
     let names = || all.iter().map(|speaker| speaker.name.as_str()).collect::<Vec<_>>().join(", ");
     let number = match name {
         None if all.len() == 1 => return Ok(()),
-        None => bail!("it knows several speakers; say with --speaker which of them is to speak: {}", names()),
+        None => bail!("the model has several speakers; choose one with --speaker: {}", names()),
         Some(name) => all.iter().position(|speaker| speaker.name == name),
     };
-    let number = number.with_context(|| format!("it does not know {:?} but {}", name.unwrap_or_default(), names()))?;
+    let number =
+        number.with_context(|| format!("unknown speaker {:?}: expected {}", name.unwrap_or_default(), names()))?;
     if all.len() > 1 {
         let mut chosen = all[number].clone();
         chosen.network.n_speakers = 1;
@@ -180,29 +181,29 @@ fn select_speaker(contents: &mut Contents, name: Option<&str>) -> Result<()> {
 /// Fails unless the metadata of a speaker is of a checkpoint kind that this program reads.
 fn check(facts: &serde_json::Value) -> Result<()> {
     let kind = &facts["kind"];
-    ensure!(!is_sequence_kind(kind), "it is one of `orator train seq2seq`, with which `orator generate` speaks");
-    ensure!(kind == KIND, "its kind is {kind}, this program reads {KIND:?}");
+    ensure!(!is_sequence_kind(kind), "it is a checkpoint of `orator train seq2seq`; use it with `orator generate`");
+    ensure!(kind == KIND, "unsupported kind {kind}: expected {KIND:?}");
     Ok(())
 }
 
 fn build(contents: &Contents) -> Result<(SpeakerMetadata, Generator)> {
     check(&contents.facts["speaker"])?;
     let metadata: SpeakerMetadata =
-        serde_json::from_value(contents.facts["speaker"].clone()).context("its facts are incomplete")?;
-    ensure!(metadata.skeleton == SKELETON, "its skeleton is {:?}, expected {SKELETON:?}", metadata.skeleton);
-    ensure!(
-        metadata.audio == SpectrogramSettings::current(),
-        "its audio settings are others than this program's: {:?}",
-        metadata.audio
-    );
+        serde_json::from_value(contents.facts["speaker"].clone()).context("incomplete metadata")?;
+    ensure!(metadata.skeleton == SKELETON, "unsupported skeleton {:?}: expected {SKELETON:?}", metadata.skeleton);
+    ensure!(metadata.audio == SpectrogramSettings::current(), "unsupported spectrogram settings: {:?}", metadata.audio);
     let (n_out, n_features) = (metadata.network.n_out, metadata.normalisation.n_features());
-    ensure!(n_out == n_features, "it makes {n_out} numbers a pose, not {n_features}");
+    ensure!(n_out == n_features, "the network has {n_out} outputs per pose, expected {n_features}");
     let (network, fps) = (&metadata.network, metadata.fps);
-    ensure!(network.n_mels == mel::N_MELS, "it reads {} mel bands, not {}", network.n_mels, mel::N_MELS);
-    ensure!((4..=MAX_WIDTH).contains(&network.width), "its width is {}, expected 4 to {MAX_WIDTH}", network.width);
-    ensure!(network.n_speakers <= 1, "it knows {} speakers", network.n_speakers);
+    ensure!(network.n_mels == mel::N_MELS, "the network has {} mel bands, expected {}", network.n_mels, mel::N_MELS);
+    ensure!(
+        (4..=MAX_WIDTH).contains(&network.width),
+        "the network width is {}, expected 4 to {MAX_WIDTH}",
+        network.width
+    );
+    ensure!(network.n_speakers <= 1, "the network has {} speakers, expected 1", network.n_speakers);
     contents.expect_numbers(network.width * network.width)?;
-    ensure!(fps.is_plausible(), "it moves at {fps}, expected 1 to 1000 frames a second");
+    ensure!(fps.is_plausible(), "the frame rate is {fps}, expected 1 to 1000 fps");
     metadata.normalisation.check()?;
     metadata.representation.check()?;
     let mut params = Params::frozen();
@@ -221,7 +222,7 @@ pub const BEST: &str = "best.safetensors";
 pub fn checkpoint_file(path: &Path) -> Result<PathBuf> {
     ensure!(
         path.exists(),
-        "{} is not there; `orator train gan` and `orator train seq2seq` write checkpoints",
+        "{} does not exist; create a checkpoint with `orator train gan` or `orator train seq2seq`",
         path.display()
     );
     let best = if path.is_dir() { path.join(BEST) } else { path.to_owned() };
@@ -229,7 +230,9 @@ pub fn checkpoint_file(path: &Path) -> Result<PathBuf> {
         return Ok(best);
     }
     let newest = checkpoint::list(path)?.pop().map(|(_, file)| file);
-    newest.with_context(|| format!("{} holds no checkpoint (best.safetensors or step-*.safetensors)", path.display()))
+    newest.with_context(|| {
+        format!("no checkpoint in {} (expected best.safetensors or step-*.safetensors)", path.display())
+    })
 }
 
 /// Shared lock on the model of a checkpoint (a file, or the folder of a training), so that `forget` cannot remove it

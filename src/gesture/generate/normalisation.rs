@@ -58,18 +58,21 @@ impl Normalisation {
     /// Fails unless the tables have the expected lengths and plausible values, and the channels are sorted and unique.
     pub fn check(&self) -> anyhow::Result<()> {
         let lengths = [self.mean.len(), self.std.len(), self.bone_lengths.len()];
-        ensure!(lengths == [N_FEATURES, N_FEATURES, N_BONES], "its normalisation has {lengths:?} numbers");
+        ensure!(
+            lengths == [N_FEATURES, N_FEATURES, N_BONES],
+            "invalid normalisation: mean, std and bone lengths have {lengths:?} values"
+        );
         let mut metres = self.mean.iter().chain(&self.std).chain(&self.bone_lengths);
-        ensure!(metres.all(|v| v.abs() <= 100.0), "its normalisation has numbers beyond 100 m");
+        ensure!(metres.all(|v| v.abs() <= 100.0), "invalid normalisation: values beyond 100 m");
         let mut radians = self.channels.iter().flat_map(|channel| channel.mean.into_iter().chain(channel.std));
-        ensure!(radians.all(|v| v.abs() <= 100.0), "its normalisation has angles beyond 100 radians");
+        ensure!(radians.all(|v| v.abs() <= 100.0), "invalid normalisation: angles beyond 100 rad");
         let positive = |std: &[f32], least: f32| std.iter().all(|v| *v >= least);
-        ensure!(positive(&self.std, f32::MIN_POSITIVE), "its `normalisation.std` has a deviation that is not above 0");
-        ensure!(positive(&self.bone_lengths, 0.0), "its `normalisation.bone_lengths` has a negative length");
+        ensure!(positive(&self.std, f32::MIN_POSITIVE), "invalid `normalisation.std`: expected values > 0");
+        ensure!(positive(&self.bone_lengths, 0.0), "invalid `normalisation.bone_lengths`: expected values >= 0");
         let of_channels = self.channels.iter().all(|channel| positive(&channel.std, 0.0));
-        ensure!(of_channels, "its `normalisation.channels` has a negative deviation");
+        ensure!(of_channels, "invalid `normalisation.channels`: expected standard deviations >= 0");
         let is_once = self.channels.is_sorted_by(|a, b| a.channel < b.channel);
-        ensure!(is_once, "its channels stand twice or in another order than head, trunk");
+        ensure!(is_once, "invalid `normalisation.channels`: expected head, trunk, each at most once");
         Ok(())
     }
 

@@ -82,11 +82,14 @@ impl Representation {
     pub fn check(&self) -> anyhow::Result<()> {
         if let Self::Bones { mean, std } = self {
             let lengths = [mean.len(), std.len()];
-            ensure!(lengths == [N_FEATURES; 2], "its table of directions has {lengths:?} numbers");
+            ensure!(
+                lengths == [N_FEATURES; 2],
+                "invalid bone directions: mean and std have {lengths:?} values, expected {N_FEATURES}"
+            );
             if mean.iter().chain(std).any(|v| !v.is_finite()) {
-                bail!("its table of directions holds a number that is not finite");
+                bail!("invalid bone directions: a value is not finite");
             }
-            ensure!(std.iter().all(|v| *v >= 0.0), "its table of directions has a negative deviation");
+            ensure!(std.iter().all(|v| *v >= 0.0), "invalid bone directions: expected standard deviations >= 0");
         }
         Ok(())
     }

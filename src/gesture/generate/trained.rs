@@ -33,7 +33,7 @@ impl TrainedSpeaker {
         let kind = &checkpoint::facts(&file)?["speaker"]["kind"];
         ensure!(
             kind.is_string(),
-            "{} is a checkpoint of neither `orator train gan` nor `orator train seq2seq`",
+            "{} is not a checkpoint of `orator train gan` or `orator train seq2seq`",
             file.display()
         );
         if !is_sequence_kind(kind) {
@@ -42,11 +42,11 @@ impl TrainedSpeaker {
         let speaker = SequenceGenerator::open(&file)?;
         ensure!(
             choice.seed.is_none(),
-            "{} is of `orator train seq2seq`, which has one take of a speech: leave out --seed and --variants",
+            "{} is a checkpoint of `orator train seq2seq`, which has no variants: leave out --seed and --variants",
             path.display()
         );
         if let Some(name) = choice.speaker.as_ref().filter(|name| **name != speaker.metadata.name) {
-            bail!("{} is of {}, not of {name:?}: leave out --speaker", path.display(), speaker.metadata.name);
+            bail!("{} is a model of {}, not of {name:?}: leave out --speaker", path.display(), speaker.metadata.name);
         }
         Ok(Self::Sequence(Box::new(speaker)))
     }

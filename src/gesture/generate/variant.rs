@@ -27,8 +27,8 @@ pub fn vary(contents: &mut Contents, prefix: &str, seed: u64) -> Result<()> {
     let dropout = contents.facts["settings"]["dropout"].as_f64().unwrap_or(0.0);
     ensure!(
         dropout > 0.0 && dropout < 1.0,
-        "it was trained without dropout, so that it has one take of a speech only: leave out --seed and --variants, or train \
-         with gan.recipe = \"auto\", or with a gan.dropout"
+        "it was trained without dropout: leave out --seed and --variants, or train with gan.recipe = \"auto\" or a \
+         gan.dropout above 0"
     );
     let name = format!("{prefix}{FIRST_LAYER}");
     let Some(weight) = contents.tensors.get_mut(&name) else { anyhow::bail!("tensor {name} is missing") };

@@ -30,7 +30,7 @@ pub struct Catalogue {
 /// Sums of one interval, in total and in blocks.
 #[derive(Clone, Debug, Default)]
 pub struct IntervalSums {
-    pub whole: MetricSums,
+    pub total: MetricSums,
     pub blocks: Vec<MetricSums>,
 }
 
@@ -48,7 +48,7 @@ impl Catalogue {
         for alpha in &settings.alphas {
             ensure!(
                 alpha.is_finite() && *alpha > 0.0,
-                "alpha of PCK is {alpha}, expected a number above 0, such as 0.2"
+                "invalid alpha {alpha} of PCK: expected a number > 0, such as 0.2"
             );
         }
         let metrics = convention::metrics(settings);
@@ -81,7 +81,7 @@ impl Catalogue {
     /// Sums of one interval. Frames beyond the shortest of its arrays are ignored. An interval whose frame rate differs
     /// from that of the settings makes every value NaN.
     pub fn measure(&self, interval: &MotionPair) -> MetricSums {
-        self.measure_blocks(interval, usize::MAX).whole
+        self.measure_blocks(interval, usize::MAX).total
     }
 
     /// Sums of one interval, in total and in blocks of about `n_frames` frames. Windows that start in a block are
@@ -112,7 +112,7 @@ impl Catalogue {
         for block in 0..n {
             let costly = CostlySums::Added(row(&mut costly, block));
             let sums = MetricSums { cheap: row(&mut cheap, block), costly };
-            measured.whole += &sums;
+            measured.total += &sums;
             measured.blocks.push(sums.into_block());
         }
         measured
@@ -139,12 +139,12 @@ impl Catalogue {
     /// Reason why value `index` of these sums is NaN.
     pub fn reason(&self, sums: &MetricSums, index: usize) -> String {
         match sums.cheap.get(..N_DIAGNOSTICS) {
-            None => "nothing was measured".to_owned(),
+            None => "no values were measured".to_owned(),
             Some([_, n_other]) if *n_other > 0.0 => {
-                format!("{n_other} frames are of another frame rate than {}", self.fps.per_sec())
+                format!("{n_other} frames do not have the frame rate {}", self.fps)
             }
             Some([n_non_finite, _]) if *n_non_finite > 0.0 => {
-                format!("{n_non_finite} joints of the made motion are not finite where the real ones are seen")
+                format!("{n_non_finite} predicted joints are not finite where the true joints are visible")
             }
             Some(_) => self.definitions.get(index).map_or("", |definition| definition.undefined).to_owned(),
         }
@@ -240,7 +240,7 @@ mod tests {
             let measured = catalogue.measure_blocks(&interval, 20);
             let mut added = MetricSums::default();
             measured.blocks.iter().for_each(|block| added += block);
-            let values = catalogue.values(&measured.whole);
+            let values = catalogue.values(&measured.total);
             for (label, known) in known.as_object().into_iter().flatten().filter(|(_, v)| v.is_number()) {
                 let label_of = |d: &Definition| format!("{} {}", d.name, d.part);
                 let i = catalogue.definitions().iter().position(|d| label_of(d) == *label).expect(label);
@@ -304,7 +304,7 @@ mod tests {
         assert!(values[of("pck_3d", "all")].is_finite());
         assert!(values[of("mpjpe", "body")].is_finite());
         assert!(values[of("mpjpe", "hands")].is_nan());
-        assert!(catalogue.reason(&sums, of("mpjpe", "hands")).contains("1 joints of the made motion"));
+        assert!(catalogue.reason(&sums, of("mpjpe", "hands")).contains("1 predicted joints"));
         let nothing = catalogue.measure(&MotionPair { mask: mask.slice(s![..0, ..]), ..interval });
         assert!(catalogue.values(&nothing).iter().all(|value| value.is_nan()));
         assert!(catalogue.reason(&nothing, 0).contains("no joint"));

@@ -3,7 +3,7 @@
 
 use super::log::MetricsLog;
 use super::progress_log::ProgressLog;
-use super::resume::kept_checkpoint;
+use super::resume::last_checkpoint;
 use crate::generate::model::BEST;
 use anyhow::{Context, Result, bail};
 use orator_base::stage::progress::Progress;
@@ -128,7 +128,7 @@ pub fn run<T: ValidatedTraining>(
             }
             return Err(stopped(training, folder)?.into());
         }
-        let report = training.step().with_context(|| kept_checkpoint(folder, section))?;
+        let report = training.step().with_context(|| last_checkpoint(folder, section))?;
         let step = training.n_done();
         task.advance(1);
         if step.is_multiple_of(LOG_EVERY) {
@@ -149,7 +149,7 @@ pub fn run<T: ValidatedTraining>(
             let previous_best = *training.best();
             let comparison = match previous_best {
                 Some((best_step, best)) if best <= score => format!("best {best:.3} at step {best_step}"),
-                _ => "the best so far".to_owned(),
+                _ => "new best".to_owned(),
             };
             progress.say(&format!("step {step}: {}, score {score:.3} ({comparison})", T::summary(&validation)));
             if let (Some(alarm), true) = (alarm, step > epoch_steps) {
@@ -226,7 +226,7 @@ pub struct StoppedTraining {
 
 impl StoppedTraining {
     fn checkpoint(&self) -> String {
-        let Some(newest) = &self.newest else { return ", with no checkpoint yet".to_owned() };
-        format!("; the checkpoint {} goes on from there", newest.display())
+        let Some(newest) = &self.newest else { return ", before the first checkpoint".to_owned() };
+        format!("; the same command resumes from {}", newest.display())
     }
 }

@@ -1,7 +1,7 @@
 //! Explains why a split of a dataset has no window to train or validate on, and suggests a remedy.
 
 use anyhow::{Result, bail};
-use orator_base::text::counted;
+use orator_base::text::{counted, length};
 use orator_dataset::info::DatasetInfo;
 use orator_dataset::{Dataset, Split};
 
@@ -37,16 +37,14 @@ pub fn cause(dataset: &Dataset, split: Split, needed: NeededFrames) -> Option<St
     let NeededFrames { name, n_frames, key } = needed;
     let shorter = key.map(|(key, multiple)| (key, longest / multiple * multiple)).filter(|(_, frames)| *frames > 0);
     let remedy = match shorter {
-        Some((key, frames)) => format!("`--set {key}={frames}` asks for shorter ones"),
-        None => {
-            "footage with longer stretches of speech mends it, and `orator report` shows what ended these".to_owned()
-        }
+        Some((key, frames)) => format!("use `--set {key}={frames}` for shorter ones"),
+        None => "add footage with longer speech; `orator report` shows why intervals ended".to_owned(),
     };
     let found = match samples.len() {
         1 => format!("the only interval of the {} split has {}", split.name(), long(longest)),
         n => format!("the longest of the {n} intervals of the {} split has {}", split.name(), long(longest)),
     };
-    Some(format!("{found}, {name} needs {}; {remedy}", long(n_frames)))
+    Some(format!("{found}, but {name} needs {}; {remedy}", long(n_frames)))
 }
 
 /// Message that a split is empty, with the contents of the other splits and the setting that fills it.
@@ -55,22 +53,22 @@ fn empty(info: &DatasetInfo, split: Split) -> String {
     for other in Split::ALL.into_iter().filter(|other| *other != split) {
         let (n, secs) = info.splits.get(other.name()).map_or((0, 0.0), |split| (split.samples, split.secs));
         is_all_empty &= n == 0;
-        others.push(format!("{} {} of {secs:.1} s", other.name(), counted(n, "interval")));
+        others.push(format!("{} has {}, {}", other.name(), counted(n, "interval"), length(secs)));
     }
     let name = split.name();
     // `models` lists the models of `orator run`, which processes videos; it is empty for imports and captures.
     let remedy = if is_all_empty {
-        "add footage, and `orator report` shows what was refused".to_owned()
+        "add footage; `orator report` shows what was rejected".to_owned()
     } else if info.models.is_empty() {
-        "import it again with other shares (`--validation`, `--test`), or more of it".to_owned()
+        "import it again with other shares (`--validation`, `--test`) or more data".to_owned()
     } else {
         let longest = info.videos.iter().filter(|video| video.samples > 0).max_by(|a, b| a.secs.total_cmp(&b.secs));
         let named = longest.map_or(String::new(), |video| format!("{name} = [{:?}]", video.file));
         match split {
             Split::Train => format!(
-                "write  {named}  under [[speaker]], or  split_by = \"time\"  under [dataset], then `orator run` again"
+                "set {named} under [[speaker]] or split_by = \"time\" under [dataset], then run `orator run` again"
             ),
-            _ => "write  split_by = \"time\"  under [dataset] and `orator run` again, or add videos".to_owned(),
+            _ => "set split_by = \"time\" under [dataset] or add videos, then run `orator run` again".to_owned(),
         }
     };
     format!("the {name} split is empty ({}); {remedy}", others.join(", "))

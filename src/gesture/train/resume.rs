@@ -47,7 +47,7 @@ pub fn settings<T: Serialize + DeserializeOwned>(
             merged[key].clone_from(value);
         } else if merged[key] != *value {
             differences
-                .push(format!("{section}.{key} is {value} now, {} in the checkpoint, which counts", merged[key]));
+                .push(format!("{section}.{key} is {value}, but {} in the checkpoint, which is used", merged[key]));
         }
     }
     Ok((serde_json::from_value(merged)?, differences))
@@ -62,8 +62,8 @@ pub fn newest<T>(
 ) -> Result<Option<(T, Contents)>> {
     let Some((step, newest)) = checkpoint::list(folder)?.pop() else { return Ok(None) };
     let contents = Contents::read(&newest)?;
-    let (stored, differences) = read(&contents).with_context(|| format!("cannot go on from {}", newest.display()))?;
-    progress.say(&format!("going on from {} (step {step})", newest.display()));
+    let (stored, differences) = read(&contents).with_context(|| format!("cannot resume from {}", newest.display()))?;
+    progress.say(&format!("resuming from {} (step {step})", newest.display()));
     differences.iter().for_each(|line| progress.say(line));
     Ok(Some((stored, contents)))
 }
@@ -71,20 +71,22 @@ pub fn newest<T>(
 /// Fails, listing all losses, if a loss is not finite or exceeds `LOSS_LIMIT`, or if the gradient norm is not finite.
 pub fn ensure_not_diverged(step: usize, losses: &[(&str, f64)], gradient_norm: f64) -> Result<()> {
     let is_bounded = losses.iter().all(|(_, loss)| loss.is_finite() && loss.abs() < LOSS_LIMIT);
-    let listed: Vec<String> = losses.iter().map(|(name, loss)| format!("{name} {loss}")).collect();
+    let listed: Vec<String> = losses.iter().map(|(name, loss)| format!("{name} {loss:.3e}")).collect();
     ensure!(
         is_bounded && gradient_norm.is_finite(),
-        "the training broke at step {step}: {}, norm of the gradient {gradient_norm}",
+        "the training diverged at step {step}: {}, gradient norm {gradient_norm:.3e}",
         listed.join(", ")
     );
     Ok(())
 }
 
 /// Error context of a diverged training: the newest checkpoint and advice.
-pub fn kept_checkpoint(folder: &Path, section: &str) -> String {
-    let advice = format!("a smaller {section}.learning_rate may help");
+pub fn last_checkpoint(folder: &Path, section: &str) -> String {
+    let advice = format!("try a smaller {section}.learning_rate");
     match checkpoint::list(folder).ok().and_then(|mut all| all.pop()) {
-        Some((step, path)) => format!("the checkpoint of step {step} is kept: {}; {advice}", path.display()),
-        None => format!("there is no checkpoint yet; {advice}"),
+        Some((step, path)) => {
+            format!("training stopped; the last checkpoint is {} (step {step}); {advice}", path.display())
+        }
+        None => format!("training stopped before the first checkpoint; {advice}"),
     }
 }

@@ -10,9 +10,11 @@ use anyhow::Result;
 use orator_base::text::counted;
 use orator_base::text::length;
 use orator_gesture::evaluate::clips::clips::EvalClips;
+use orator_gesture::evaluate::conclusion::conclusion::{
+    Answer, Conclusion, better_than_constant_pose, depends_on_audio,
+};
+use orator_gesture::evaluate::conclusion::text;
 use orator_gesture::evaluate::table::table::{PredictorRow, Table};
-use orator_gesture::evaluate::verdict::text;
-use orator_gesture::evaluate::verdict::verdict::{Answer, Verdict, better_than_nothing, depends_on_audio};
 use serde_json::json;
 
 /// HTML of the page.
@@ -64,8 +66,8 @@ fn with_checkpoint_note(table: &Table, body: Vec<Node>) -> Vec<Node> {
 
 /// Conclusions with the votes that support them, the compared predictors, and notes.
 fn conclusions(table: &Table) -> Vec<Node> {
-    let card = |(own, verdict): (&PredictorRow, Verdict)| {
-        let class = format!("card conclusion {}", verdict.word.replace(' ', "-"));
+    let card = |(own, conclusion): (&PredictorRow, Conclusion)| {
+        let class = format!("card conclusion {}", conclusion.word.replace(' ', "-"));
         let votes = verdict.votes.iter().map(|vote| {
             let (class, outcome) = match vote.answer {
                 Answer::Yes => ("better", "better than"),
@@ -79,8 +81,8 @@ fn conclusions(table: &Table) -> Vec<Node> {
         let card = node("div").class(class).child(node("p").text(format!("{of}{}", verdict.sentence)));
         card.child(node("ul").class("votes").children(votes))
     };
-    let verdicts = |own| [(own, better_than_nothing(table, own)), (own, depends_on_audio(table, own))];
-    let mut body = vec![node("div").class("conclusions").children(table.predictions().flat_map(verdicts).map(card))];
+    let both = |own| [(own, better_than_constant_pose(table, own)), (own, depends_on_audio(table, own))];
+    let mut body = vec![node("div").class("conclusions").children(table.predictions().flat_map(both).map(card))];
     let rows = table.rows.iter().map(|row| {
         let name = node("th").attr("scope", "row").text(row.name());
         node("tr").child(name).child(node("td").text(&row.description))

@@ -3,9 +3,9 @@
 use crate::html;
 use crate::html::{Node, node};
 use orator_gesture::evaluate::baseline::baselines::PredictorKind;
+use orator_gesture::evaluate::conclusion::conclusion::{Answer, against_constant_pose};
+use orator_gesture::evaluate::conclusion::labels;
 use orator_gesture::evaluate::table::table::{N_COSTLY_DRAWS, N_DRAWS, Table};
-use orator_gesture::evaluate::verdict::labels;
-use orator_gesture::evaluate::verdict::verdict::{Answer, against_constant_pose};
 use orator_gesture::metrics::catalogue::Definition;
 
 /// Groups of metrics by prefixes of their names; the last group contains the rest.

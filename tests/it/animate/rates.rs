@@ -117,13 +117,13 @@ fn what_is_of_another_rate_is_measured_beside_it_by_time() {
     let args = "evaluate --truth truth.npz --prediction made.npy --convention speech2gesture";
     // 16 s beside 8: the rate is what is wrong.
     let (code, _, said) = orator(dir, args);
-    assert!(code == 1 && said.contains("a rate is wrong (--fps)"), "{said}");
+    assert!(code == 1 && said.contains("and the frame rates (--fps)"), "{said}");
     std::fs::write(path_of(&dir.join("made.npy")), "{\"fps\": 30}").unwrap();
     let same = done(dir, args);
     assert!(!same["notes"].to_string().contains("does not say its rate"), "{}", same["notes"]);
     let noted = done(dir, &format!("{args} --fps 25"));
     assert!(
-        noted["notes"].to_string().contains("made.npy says 30 fps: 25 fps (--fps) is not for it"),
+        noted["notes"].to_string().contains("made.npy has 30 fps: 25 fps (--fps) is ignored for this file"),
         "{}",
         noted["notes"]
     );

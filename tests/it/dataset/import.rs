@@ -305,5 +305,5 @@ fn silent_captures_become_a_dataset_that_no_speech_is_learnt_from() {
     let settings = orator_dataset::config::Settings::default().gan;
     let refused =
         orator_gesture::train::gan::train::train(&dataset, &settings, &dir.path().join("gan"), &Silent).err().unwrap();
-    assert!(refused.to_string().contains("imported without sound"), "{refused:#}");
+    assert!(refused.to_string().contains("imported without audio"), "{refused:#}");
 }

@@ -90,14 +90,14 @@ fn networks_of_both_trainings_stand_in_one_table() {
     let error = |who: &str| value(&answer, "mpjpe", "all", who).unwrap();
     assert!(error("prediction_2") > 0.0 && error("prediction_2") != error("mismatched_prediction_2"));
     assert!(value(&answer, "mpjpe", "hands", "prediction_3").is_some());
-    let verdicts = answer.json["verdicts"].as_array().unwrap();
-    let of: Vec<&str> = verdicts.iter().map(|verdict| verdict["predictor"].as_str().unwrap()).collect();
+    let conclusions = answer.json["conclusions"].as_array().unwrap();
+    let of: Vec<&str> = conclusions.iter().map(|conclusion| conclusion["predictor"].as_str().unwrap()).collect();
     assert_eq!(of, ["prediction", "prediction_2", "prediction_3"]);
-    assert_eq!(verdicts[0]["hears"], answer.json["hears"]);
+    assert_eq!(conclusions[0]["depends_on_audio"], answer.json["depends_on_audio"]);
     // the GAN's figures are those of the GAN alone
     let alone = project.answer(&["evaluate", "--dataset", "data", "--checkpoint", "gan"]);
     assert_eq!(alone.json["truth"], answer.json["truth"]);
-    assert!(alone.json["verdicts"].is_null() && alone.json["predictors"][0]["checkpoint"].is_null());
+    assert!(alone.json["conclusions"].is_null() && alone.json["predictors"][0]["checkpoint"].is_null());
     let metrics = |answer: &ProgramAnswer| answer.json["metrics"].as_array().unwrap().clone();
     for (one, several) in metrics(&alone).iter().zip(metrics(&answer)) {
         for who in ["prediction", "mismatched_prediction", "nearest_neighbour"] {
@@ -128,10 +128,10 @@ fn networks_of_both_trainings_stand_in_one_table() {
         answer.errors
     };
     assert!(fails(&["gan", "gan/best.safetensors"]).contains("given twice"));
-    assert!(fails(&["gan", "nowhere"]).contains("nowhere is not there"));
-    assert!(fails(&["data"]).contains("holds no checkpoint"));
+    assert!(fails(&["gan", "nowhere"]).contains("nowhere does not exist"));
+    assert!(fails(&["data"]).contains("no checkpoint in data"));
     let lifter = concat!(env!("CARGO_MANIFEST_DIR"), "/models/body_lifter.safetensors");
-    assert!(fails(&["gan", lifter]).contains("body_lifter.safetensors is a checkpoint of neither"));
+    assert!(fails(&["gan", lifter]).contains("body_lifter.safetensors is not a checkpoint of `orator train gan` or"));
     std::fs::write(project.dir().join("other.safetensors"), "x").unwrap();
     assert!(fails(&["gan", "other.safetensors"]).contains("other.safetensors"));
 }
@@ -181,9 +181,9 @@ fn captured_skeletons_are_measured_beside_the_gan_on_the_joints_of_both() {
         said.contains("8 joints of 48; left out: 40 finger joints") && said.contains("100.0 % of the frames"),
         "{said}"
     );
-    assert!(said.contains("seq2seq words learnt the captures captures"), "{said}");
-    assert!(said.contains("seq2seq words moves at 20") && said.contains("resampled to 15"), "{said}");
-    assert!(said.contains("seq2seq contextual learnt from sound at 48000 Hz"), "{said}");
+    assert!(said.contains("seq2seq words was trained on the captures captures"), "{said}");
+    assert!(said.contains("the motion of seq2seq words was resampled from 20 fps to 15 fps"), "{said}");
+    assert!(said.contains("seq2seq contextual was trained on audio at 48000 Hz"), "{said}");
     assert!(!said.contains("has none"), "{said}");
     let body = |name: &str, who: &str| value(&answer, name, "body", who);
     for who in
@@ -211,7 +211,7 @@ fn captured_skeletons_are_measured_beside_the_gan_on_the_joints_of_both() {
         samples.into_iter().map(|(split, sample)| (split, Sample { words: None, ..sample })).collect();
     write_dataset(&project.dir().join("silent"), "host", FPS, &silent).unwrap();
     let answer = project.answer(&["evaluate", "--dataset", "silent", "--checkpoint", "spoken"]);
-    assert!(notes(&answer).contains("seq2seq reads words, and this split has none"), "{}", notes(&answer));
+    assert!(notes(&answer).contains("seq2seq uses words, and this split has none"), "{}", notes(&answer));
 }
 
 #[test]

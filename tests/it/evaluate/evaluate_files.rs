@@ -52,9 +52,9 @@ fn folders_are_measured_with_all_that_defends_the_figures() {
         assert!(metric["parameters"].is_object() && !metric["definition"].as_str().unwrap().is_empty(), "{metric}");
     }
     let sentence = |of: &str| result[of]["sentence"].as_str().unwrap().to_owned();
-    assert!(sentence("better_than_nothing").starts_with("Is it better than doing nothing? "));
-    assert_eq!(result["hears"]["word"], "yes", "{}", sentence("hears"));
-    for vote in result["hears"]["votes"].as_array().unwrap() {
+    assert!(sentence("better_than_constant_pose").starts_with("Is the prediction better than a constant pose? "));
+    assert_eq!(result["depends_on_audio"]["word"], "yes", "{}", sentence("depends_on_audio"));
+    for vote in result["depends_on_audio"]["votes"].as_array().unwrap() {
         let is_called = vote["answer"] != "undecided";
         assert_eq!(vote["p"].as_f64().unwrap() <= 0.025, is_called, "{vote}");
         let [low, high] = ["low", "high"].map(|key| vote["gain"][key].as_f64().unwrap());
@@ -87,16 +87,16 @@ fn only_values_of_one_hash_are_compared() {
     let same = project.answer(&["evaluate", "compare", "a.json", "b.json"]);
     assert_eq!(same.code, 0, "{}", same.errors);
     let of = |answer: &ProgramAnswer, what: &str| answer.json["compared"][what].as_array().unwrap().clone();
-    assert!(!of(&same, "beside").is_empty() && of(&same, "refused").is_empty());
+    assert!(!of(&same, "pairs").is_empty() && of(&same, "rejected").is_empty());
     assert!(of(&same, "only_in_a").iter().all(|name| name.as_str().unwrap().contains("at 0.1")));
     let other = project.answer(&["evaluate", "compare", "a.json", "c.json"]);
     assert_eq!(other.code, 1, "{}", other.errors);
-    let refused = of(&other, "refused");
+    let refused = of(&other, "rejected");
     let said = refused.iter().find(|said| said.as_str().unwrap().starts_with("pck_2d (all)")).unwrap();
     assert!(said.as_str().unwrap().contains("fps is 15.0 in A and 30.0 in B"), "{said}");
     fs::write(project.dir().join("d.json"), "{}").unwrap();
     let wrong = project.answer(&["evaluate", "compare", "a.json", "d.json"]);
-    assert!(wrong.code == 1 && wrong.errors.contains("is no result of an evaluation"), "{}", wrong.errors);
+    assert!(wrong.code == 1 && wrong.errors.contains("is not an evaluation result"), "{}", wrong.errors);
 }
 
 #[test]
@@ -114,8 +114,8 @@ fn what_stands_still_or_is_out_of_step_is_not_praised() {
     for made in ["still", "late"] {
         let answer = project.answer(&[&["evaluate", "--truth", "truth", "--prediction", made], &SMALL[..]].concat());
         assert_eq!(answer.code, 0, "{}", answer.errors);
-        assert_ne!(answer.json["better_than_nothing"]["word"], "yes", "{made}");
-        assert_ne!(answer.json["hears"]["word"], "yes", "{made}: {}", answer.json["hears"]);
+        assert_ne!(answer.json["better_than_constant_pose"]["word"], "yes", "{made}");
+        assert_ne!(answer.json["depends_on_audio"]["word"], "yes", "{made}: {}", answer.json["depends_on_audio"]);
         assert!(value(&answer, "pck_2d", "all", "late_prediction") > 0.0);
     }
     let args = ["evaluate", "--truth", "truth", "--prediction", "late", "--report", "truth/0.npy"];
@@ -200,8 +200,8 @@ fn silent_hours(path: &Path) {
 fn bad_input_is_refused_in_clear_words() {
     let project = bad_files();
     let cases: [(&[&str], &str); 17] = [
-        (&["t.npy", "gone.npy"], "gone.npy is not there"),
-        (&["t.npy", "t.npy"], "a motion beside itself says nothing"),
+        (&["t.npy", "gone.npy"], "gone.npy does not exist"),
+        (&["t.npy", "t.npy"], "give two different motions"),
         (&["t.npy", "empty.npy"], "empty.npy is empty"),
         (&["t.npy", "wrong.npy"], "[120, 43, 3], expected [frames, 49, 3]"),
         (&["t.npy", "missing.npy"], "all joints of all 120 frames are missing"),
@@ -210,11 +210,11 @@ fn bad_input_is_refused_in_clear_words() {
         (&["t.npy", "long.npy"], "8.00 s (120 frames at 15 fps) and the prediction 12.00 s"),
         (&["t.npy", "mm.npy"], "seems to be in millimetres; multiply every coordinate by 0.001"),
         (&["t.npy", "one"], "two files or two folders"),
-        (&["one", "other"], "has a partner of its name"),
-        (&["nobody", "one"], "has a partner of its name"),
+        (&["one", "other"], "has the name of one in"),
+        (&["nobody", "one"], "has the name of one in"),
         (&["t.npy", "away.npy", "--audio", "none.mp3"], "none.mp3"),
         (&["t.npy", "away.npy", "--audio", "t.npy"], "t.npy"),
-        (&["t.npy", "away.npy", "--audio", "short.wav"], "is it the sound of another clip?"),
+        (&["t.npy", "away.npy", "--audio", "short.wav"], "is it the audio of another clip?"),
         (&["t.npy", "away.npy", "--alpha", "0"], "alpha of PCK"),
         (&["t.npy", "away.npy", "--fps", "0"], "frames a second"),
     ];
@@ -240,9 +240,9 @@ fn what_can_be_mended_is_measured_with_a_note() {
         assert!(notes.contains(note), "{prediction}: {notes}");
         answer
     };
-    noted("t.npy", "few-nan.npy", &[], "no number (NaN) for 100 of");
-    noted("t.npy", "longer.npy", &[], "120 frames of truth, 114 of prediction: cut to 114");
-    noted("t.npy", "away.npy", &[], "neck stands 0.87 m from the origin");
+    noted("t.npy", "few-nan.npy", &[], "is NaN for 100 of");
+    noted("t.npy", "longer.npy", &[], "the truth has 120 frames, the prediction 114: both were cut to 114");
+    noted("t.npy", "away.npy", &[], "is up to 0.87 m from the origin");
     noted("t.npy", "30.npz", &[], "at 30 fps was resampled to 15 fps");
     let exact = noted("t.txt", "t.npy", &[], "does not say its rate");
     assert_eq!(value(&exact, "pck_2d", "all", "prediction"), 1.0);
@@ -269,8 +269,8 @@ fn the_released_clips_have_the_published_baselines() {
             let found = value(&answer, "pck_2d", "all", who);
             assert!((found - expected).abs() < within, "{clip} {who}: {found}, expected {expected}");
         }
-        let sentence = answer.json["better_than_nothing"]["sentence"].as_str().unwrap();
-        assert!(sentence.contains("too few to say"), "{sentence}");
+        let sentence = answer.json["better_than_constant_pose"]["sentence"].as_str().unwrap();
+        assert!(sentence.contains("too few for a conclusion"), "{sentence}");
     }
     // the three of one speaker: the mean of the other two
     let folder = project.dir().join("gruber");

@@ -61,11 +61,11 @@ fn a_training_ends_with_its_page_and_its_speaker_is_measured() {
         assert!((0.0..=1.0).contains(&value("pck_3d", who)) && value("mpjpe", who) >= 0.0, "{who}");
     }
     assert_eq!((value("pck_3d", "truth"), value("mpjpe", "truth")), (1.0, 0.0));
-    let sentence = result["better_than_nothing"]["sentence"].as_str().unwrap();
+    let sentence = result["better_than_constant_pose"]["sentence"].as_str().unwrap();
     assert!(sentence.contains(&format!("{n_blocks} block")), "{sentence}");
-    assert!(sentence.contains("too few to say (at least 7)"), "{sentence}");
+    assert!(sentence.contains("too few for a conclusion (at least 7 are needed)"), "{sentence}");
     let wrong = project.answer(&["evaluate", "--dataset", &data, "--checkpoint", &out, "--split", "test"]);
-    assert!(wrong.code == 1 && wrong.errors.contains("it has train, validation"), "{}", wrong.errors);
+    assert!(wrong.code == 1 && wrong.errors.contains("splits with intervals: train, validation"), "{}", wrong.errors);
 }
 
 /// What a browser sees of the page.

@@ -20,11 +20,11 @@ fn folder() -> tempfile::TempDir {
     folder
 }
 
-/// Made, fresh, failed, and the whole answer.
+/// Counts of created, up-to-date and failed motions, and the complete answer.
 fn run(dir: &Path, args: &str) -> ([u64; 3], Value) {
     let output = generate(dir, &format!("--json {args}"));
     let facts: Value = serde_json::from_slice(&output.stdout).unwrap();
-    let counts = ["made", "fresh", "failed"].map(|key| facts[key].as_u64().unwrap_or(99));
+    let counts = ["created", "up_to_date", "failed"].map(|key| facts[key].as_u64().unwrap_or(99));
     assert_eq!(output.status.code(), Some(if counts[2] > 0 { 2 } else { 0 }), "{facts}");
     (counts, facts)
 }
@@ -66,7 +66,10 @@ fn a_table_names_its_motions_and_speakers() {
     let args = "--batch talks/list.csv --out-folder made --format npy";
     let output = generate(dir, args);
     let said = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert!(output.status.code() == Some(1) && said.contains("b.wav; give --checkpoint"), "{said}");
+    assert!(
+        output.status.code() == Some(1) && said.contains("b.wav: add one to the table, or give --checkpoint"),
+        "{said}"
+    );
     let (counts, facts) = run(dir, &format!("{args} --checkpoint host.safetensors"));
     assert_eq!(counts, [2, 0, 1], "{facts}");
     assert!(facts["sounds"][1]["error"].as_str().unwrap().contains("gone.safetensors"));
@@ -75,7 +78,7 @@ fn a_table_names_its_motions_and_speakers() {
     for (table, words) in [
         ("audio,out\na.wav,x\nsub/b.wav,X\n", "would both be written to `X`"),
         ("audio,out\na.wav,../x\n", "line 2"),
-        ("sound\na.wav\n", "`sound` is unknown"),
+        ("sound\na.wav\n", "unknown column `sound`"),
     ] {
         std::fs::write(dir.join("talks/list.csv"), table).unwrap();
         let output = generate(dir, &format!("{args} --checkpoint host.safetensors"));
@@ -86,7 +89,7 @@ fn a_table_names_its_motions_and_speakers() {
         ("--audio-folder talks --out-folder made", "--checkpoint"),
         ("--checkpoint host.safetensors --audio-folder talks", "--out-folder"),
         ("--checkpoint host.safetensors --audio-folder talks --out-folder made --format mov", ".npy (joints)"),
-        ("--checkpoint host.safetensors --audio-folder none --out-folder made", "none is no folder"),
+        ("--checkpoint host.safetensors --audio-folder none --out-folder made", "none is not a folder"),
         ("--checkpoint host.safetensors", "--audio"),
     ] {
         let output = generate(dir, args);

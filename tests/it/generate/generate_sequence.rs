@@ -142,7 +142,7 @@ fn what_is_doubtful_about_a_transcript_is_said() {
             [40, 40],
             "36 of 40 words are said after the end of the sound (3.30 s), the first `hello` at 4.10 s",
         ),
-        ("foreign.tsv", [3, 0], "none of the 3 words was trained with"),
+        ("foreign.tsv", [3, 0], "no word of the transcript (3 words)"),
         ("empty.srt", [0, 0], "the transcript holds no word"),
         ("plain.txt", [0, 0], "the transcript has no times"),
         ("many.tsv", [100_000, 100_000], "99991 of 100000 words are said after the end"),
@@ -156,7 +156,7 @@ fn what_is_doubtful_about_a_transcript_is_said() {
     let printed = String::from_utf8_lossy(&generate(dir, &args("good.tsv")).stdout).into_owned() + &said;
     assert!(printed.contains("2 of 3 words of the transcript were trained with"), "{printed}");
     let answer = run(dir, &args("good.tsv").replace("words.saf", "adversarial.saf"));
-    assert!(answer["note"].as_str().unwrap().contains("reads no words: good.tsv was not used"), "{answer}");
+    assert!(answer["note"].as_str().unwrap().contains("does not use words: good.tsv was ignored"), "{answer}");
 
     write("broken.json", "{\"segments\": [");
     write("times.tsv", "0\t1\thello\n2\t1\tworld\n");
@@ -205,7 +205,7 @@ fn many_sounds_find_their_transcripts_and_are_made_once() {
     let batch = |args: &str| {
         let output = generate(dir, &format!("--json --checkpoint words.safetensors {args} --out-folder made"));
         let facts: Value = serde_json::from_slice(&output.stdout).unwrap();
-        let counts = ["made", "fresh", "failed"].map(|key| facts[key].as_u64().unwrap_or(99));
+        let counts = ["created", "up_to_date", "failed"].map(|key| facts[key].as_u64().unwrap_or(99));
         assert_eq!(output.status.code(), Some(if counts[2] > 0 { 2 } else { 0 }), "{facts}");
         (counts, facts)
     };
@@ -251,12 +251,12 @@ fn many_sounds_find_their_transcripts_and_are_made_once() {
     assert!(run(dir, args)["sounds"][0]["segments"].is_null());
     assert!(refusal(dir, &format!("{args} --transcript said")).contains("remove --transcript"));
     let args = "--checkpoint words.safetensors --audio-folder talks/sub --out-folder others";
-    assert!(refusal(dir, &format!("{args} --transcript talks/sub/b.srt")).contains("b.srt is no folder"));
+    assert!(refusal(dir, &format!("{args} --transcript talks/sub/b.srt")).contains("b.srt is not a folder"));
     let (code, said) = {
         let output = generate(dir, &format!("{args} --format npy"));
         (output.status.code(), String::from_utf8_lossy(&output.stdout).into_owned())
     };
-    assert!(code == Some(2) && said.contains("written as .bvh alone"), "{said}");
+    assert!(code == Some(2) && said.contains("expected a .bvh file"), "{said}");
 }
 
 #[test]
@@ -270,7 +270,7 @@ fn sounds_of_other_rates_are_heard_and_joints_written_in_every_format() {
     let made = run(dir, "--checkpoint joints.safetensors --audio stereo.wav --carry-state --out a.npy a.bvh a.glb");
     assert_eq!((made["speaker"].as_str(), made["outputs"].as_array().map(Vec::len)), (Some("talker"), Some(3)));
     assert!(made["next"].as_str().unwrap().contains(" --carry-state --out a.mp4"), "{made}");
-    for (file, words) in [("gone.wav", "gone.wav is not there"), ("words.safetensors", "words.safetensors")] {
+    for (file, words) in [("gone.wav", "gone.wav does not exist"), ("words.safetensors", "words.safetensors")] {
         let said = refusal(dir, &format!("--checkpoint words.safetensors --audio {file} --out x.bvh"));
         assert!(said.contains(words), "{said}");
     }

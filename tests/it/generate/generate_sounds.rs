@@ -31,7 +31,7 @@ fn a_streamed_sound_gives_the_motion_of_the_whole_one() {
         assert_eq!(n, whole.samples.len());
         let mut n_made = 0;
         let streamed =
-            speaker.motion_of_pieces(SoundStream::open(&path, 16_000), n, CHUNK, &mut |n| n_made += n).unwrap().0;
+            speaker.motion_from_stream(SoundStream::open(&path, 16_000), n, CHUNK, &mut |n| n_made += n).unwrap().0;
         assert_eq!(streamed, speaker.motion(&whole).unwrap());
         assert_eq!(n_made, streamed.n_frames());
         assert!(generate(dir, "--checkpoint host.safetensors --audio speech.wav --out a.npy").status.success());

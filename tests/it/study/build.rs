@@ -190,7 +190,7 @@ fn what_is_missing_is_said() {
             say(&|file| fs::rename(dir.join("models"), dir.join("moved")).map(|()| file.seed = 9).unwrap()),
         ),
         (
-            "has no interval in the validation split",
+            "has no intervals in the validation split",
             say(&|file| {
                 fs::rename(dir.join("moved"), dir.join("models")).unwrap();
                 file.speaker[0].split = orator_base::types::split::Split::Validation;

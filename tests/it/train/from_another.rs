@@ -41,7 +41,7 @@ fn it_takes_the_weights_and_keeps_its_own_body() {
     let of_ben = dir.join("ben-gan");
     train_with_callback(&[&ben], &settings(), Some(&of_anna), &of_ben, &Shared(stop.clone()), ignore).unwrap();
     let said = stop.said.lock().unwrap().join("\n");
-    assert!(said.contains("beginning with what") && said.contains("learnt of anna"), "{said}");
+    assert!(said.contains("initialising from ") && said.contains("(trained on anna)"), "{said}");
 
     let model = GestureGenerator::open(&of_ben).unwrap().metadata;
     assert_eq!(model.name, "ben");
@@ -86,7 +86,7 @@ fn what_cannot_be_begun_with_is_named() {
     };
     assert!(fails(&dir.join("nowhere"), &settings()).contains("nowhere"));
     std::fs::create_dir(dir.join("empty")).unwrap();
-    assert!(fails(&dir.join("empty"), &settings()).contains("holds no checkpoint"));
+    assert!(fails(&dir.join("empty"), &settings()).contains("no checkpoint in"));
     let of_anna = dir.join("anna-gan");
     train(&anna, &GanConfig { steps: 2.into(), ..settings() }, &of_anna, &Silent).unwrap();
     let paper = GanConfig { preset: NetworkPreset::Paper, ..settings() };

@@ -103,7 +103,7 @@ fn the_checkpoints_settings_win_and_differences_are_told() {
     let stop = Stop::at(u64::MAX);
     let longer = GanConfig { steps: 7.into(), ..settings() };
     train(&Dataset::open(&second).unwrap(), &longer, &out, &Shared(stop.clone())).unwrap();
-    assert!(stop.said.lock().unwrap().join("\n").contains("the dataset is another now"));
+    assert!(stop.said.lock().unwrap().join("\n").contains("the dataset has changed"));
     let third = folder.path().join("third");
     write_dataset(&third, "guest", FPS, &grown).unwrap();
     let error = train(&Dataset::open(&third).unwrap(), &longer, &out, &Silent).unwrap_err();
@@ -185,7 +185,7 @@ fn a_training_that_explodes_keeps_its_last_good_checkpoint() {
     let out = folder.path().join("out");
     let wild = GanConfig { learning_rate: 1e30.into(), checkpoint_every: 1, steps: 50.into(), ..settings() };
     let error = format!("{:#}", train(&dataset, &wild, &out, &Silent).unwrap_err());
-    assert!(error.contains("the training broke") && error.contains("learning_rate"), "{error}");
+    assert!(error.contains("the training diverged") && error.contains("learning_rate"), "{error}");
     let none = GanConfig { window_frames: 128, ..settings() };
     assert!(format!("{:#}", train(&dataset, &none, &out, &Silent).unwrap_err()).contains("window"));
     assert!(train(&dataset, &GanConfig { window_frames: 50, ..settings() }, &out, &Silent).is_err());

@@ -170,7 +170,7 @@ fn what_is_wrong_with_captures_names_the_file() {
     let text = says("no-motion", &[], &|dir| std::fs::remove_file(dir.join("b.bvh")).unwrap());
     assert!(text.contains("b.wav has no motion"), "{text}");
     let text = says("no-sound", &[], &|dir| std::fs::remove_file(dir.join("b.wav")).unwrap());
-    assert!(text.contains("b.bvh has no sound"), "{text}");
+    assert!(text.contains("b.bvh has no audio"), "{text}");
     let text = says("damaged-sound", &[], &|dir| std::fs::write(dir.join("b.wav"), "no sound").unwrap());
     assert!(text.contains("b.wav"), "{text}");
     let other = |dir: &Path| {
@@ -183,10 +183,10 @@ fn what_is_wrong_with_captures_names_the_file() {
     let text = says("transcript", &[], &|dir| std::fs::write(dir.join("b.json"), "{").unwrap());
     assert!(text.contains("b.json is no transcript"), "{text}");
     let text = says("short", &[], &|dir| ["a", "b"].iter().for_each(|name| write_capture(dir, name, 1.0, 0.0, false)));
-    assert!(text.contains("no motion to train on is as long as a segment of 30 frames"), "{text}");
+    assert!(text.contains("no training motion is as long as a segment (30 frames)"), "{text}");
     let text = says("unknown", &["z"], &|_| ());
     assert!(text.contains("no z.bvh"), "{text}");
-    assert!(says("all", &["a", "b"], &|_| ()).contains("none is left"));
+    assert!(says("all", &["a", "b"], &|_| ()).contains("none remains"));
 }
 
 /// What a training says.
@@ -217,13 +217,13 @@ fn doubtful_transcripts_and_vectors_are_said_and_changed_captures_noticed() {
     let english = table("hello 1 2 3\nso 4 5 6\n").unwrap();
     let said = told(&open(), Some(&english), &out("a")).unwrap();
     let late = "b.tsv: 6 of 9 words are said after the end of the sound (3.00 s), the first `hello` at 3.20 s";
-    assert!(said.contains(late) && said.contains("1 of 2 words begin with their vectors"), "{said}");
+    assert!(said.contains(late) && said.contains("1 of 2 words have pretrained vectors"), "{said}");
     assert_eq!(open().rate, 16_000);
     assert!(SequenceGenerator::open(&out("a")).unwrap().metadata.vocabulary.words() == ["hello", "world"]);
     let german = table("hallo 1 2\n").unwrap();
-    assert!(told(&open(), Some(&german), &out("b")).unwrap().contains("0 of 2 words begin with their vectors"));
+    assert!(told(&open(), Some(&german), &out("b")).unwrap().contains("0 of 2 words have pretrained vectors"));
     let error = format!("{:#}", told(&open(), Some(&german), &out("a")).unwrap_err());
-    assert!(error.contains("have 2 numbers") && error.contains("the words of the checkpoint"), "{error}");
+    assert!(error.contains("have 2 dimensions") && error.contains("those of the checkpoint"), "{error}");
     std::fs::write(folder.path().join("vectors.safetensors"), "cut").unwrap();
     assert!(WordVectors::open(&folder.path().join("vectors.safetensors")).is_err());
 
@@ -239,9 +239,9 @@ fn doubtful_transcripts_and_vectors_are_said_and_changed_captures_noticed() {
     // Of the same length, other content.
     std::fs::write(dir.join("b.tsv"), words(3, "hello")).unwrap();
     told(&open(), None, &out("c")).unwrap();
-    assert!(!told(&open(), None, &out("c")).unwrap().contains("others now"));
+    assert!(!told(&open(), None, &out("c")).unwrap().contains("have changed"));
     std::fs::write(dir.join("b.tsv"), words(3, "hullo")).unwrap();
-    assert!(told(&open(), None, &out("c")).unwrap().contains("the data are others now"));
+    assert!(told(&open(), None, &out("c")).unwrap().contains("the data have changed"));
     let file = dir.join("b.bvh");
     std::fs::write(&file, std::fs::read_to_string(&file).unwrap().replace("LeftHand", "LeftPaw")).unwrap();
     let error = format!("{:#}", told(&open(), None, &out("c")).unwrap_err());

@@ -124,7 +124,7 @@ fn each_speaks_with_a_body_of_its_own() {
 
     let error =
         train_with_callback(&[&anna, &anna], &settings(), None, &dir.join("twice"), &Silent, ignore).unwrap_err();
-    assert!(format!("{error:#}").contains("both of anna"), "{error:#}");
+    assert!(format!("{error:#}").contains("both of speaker anna"), "{error:#}");
 }
 
 /// What all speakers share stays as it was where it has no rate.

@@ -61,12 +61,14 @@ fn stopped_twice(network: &str) {
     let folder = tempfile::tempdir().unwrap();
     let dir = folder.path();
     anna(dir, &enough());
-    // A dataset alone: what is learnt goes to the folder of its speaker.
+    // A dataset alone: the checkpoints go to the folder of its speaker.
     let out_of_calm = format!("work/{network}/anna");
     let calm = train(dir, network, "").output().unwrap();
     let said = String::from_utf8(calm.stderr).unwrap();
     assert!(calm.status.success(), "{said}");
-    assert!(said.lines().any(|line| line.contains(" of data/anna; what is learnt") && line.ends_with(&out_of_calm)));
+    assert!(
+        said.lines().any(|line| line.contains(" of data/anna; writing checkpoints") && line.ends_with(&out_of_calm))
+    );
     // Twenty lines of a training, however short, and none on standard output.
     let lines = said.lines().filter(|line| line.starts_with("step ") && line.ends_with(" left"));
     assert_eq!(lines.count(), 20, "{said}");
@@ -83,13 +85,13 @@ fn stopped_twice(network: &str) {
     let next = format!("orator train {network} --dataset data/anna --json --steps {n_steps} ");
     assert!(answer["next"].as_str().unwrap().starts_with(&next), "{answer}");
     assert!(
-        first.contains("stopping after the current step") && first.contains("what is learnt goes to stopped"),
+        first.contains("stopping after the current step") && first.contains("writing checkpoints to stopped"),
         "{first}"
     );
 
     let (code, answer, second) = signalled(train(dir, network, "stopped"), &line(12), Signal::TERM);
     assert_eq!(code, Some(143), "{second}");
-    assert!(answer["step"].as_u64().unwrap() > step && second.contains("going on from"), "{answer} {second}");
+    assert!(answer["step"].as_u64().unwrap() > step && second.contains("resuming from"), "{answer} {second}");
     // An epoch is over: its validation was said, and the page is there before the training ends.
     let said = first + &second;
     let validation = format!("step {}: validation L1 ", n_steps * 6 / 20);
@@ -127,7 +129,10 @@ fn a_dataset_without_windows_is_told_why_and_what_mends_it() {
     anna(dir, &[held_out(64)]);
     for network in ["gan", "seq2seq"] {
         let text = refused(network);
-        assert!(text.contains("the train split is empty (validation 1 interval of 4.3 s, test 0 intervals"), "{text}");
+        assert!(
+            text.contains("the train split is empty (validation has 1 interval, 4.3 s, test has 0 intervals"),
+            "{text}"
+        );
         assert!(text.contains("import it again with other shares"), "{text}");
     }
     std::fs::remove_dir_all(dir.join("data")).unwrap();
@@ -135,14 +140,14 @@ fn a_dataset_without_windows_is_told_why_and_what_mends_it() {
     for (network, name, frames) in [("gan", "window", 32), ("seq2seq", "segment", 23)] {
         let text = refused(network);
         let expected =
-            format!("the only interval of the train split has 20 frames (1.3 s), a {name} needs {frames} frames");
-        assert!(text.contains(&expected) && text.contains("longer stretches of speech"), "{text}");
+            format!("the only interval of the train split has 20 frames (1.3 s), but a {name} needs {frames} frames");
+        assert!(text.contains(&expected) && text.contains("add footage with longer speech"), "{text}");
     }
     std::fs::remove_dir_all(dir.join("data")).unwrap();
     anna(dir, &[(Split::Train, sample("a-00000000-000000", 50, 0.0)), held_out(64)]);
     let output = train(dir, "gan", "out").args(["--set", "gan.window_frames=64"]).output().unwrap();
     let text = String::from_utf8(output.stderr).unwrap();
-    assert!(text.contains("`--set gan.window_frames=32` asks for shorter ones"), "{text}");
+    assert!(text.contains("use `--set gan.window_frames=32` for shorter ones"), "{text}");
 }
 
 #[test]
@@ -152,7 +157,10 @@ fn a_sequence_network_without_a_held_out_split_says_why() {
     let dataset = Dataset::open(folder.path().join("data/anna")).unwrap();
     let needed = orator_gesture::train::no_window::NeededFrames { name: "window", n_frames: 64, key: None };
     let cause = orator_gesture::train::no_window::cause(&dataset, Split::Validation, needed).unwrap();
-    assert!(cause.starts_with("the validation split is empty (train 1 interval of 6.6 s, test 0 intervals"), "{cause}");
+    assert!(
+        cause.starts_with("the validation split is empty (train has 1 interval, 6.6 s, test has 0 intervals"),
+        "{cause}"
+    );
     let settings = orator_dataset::config::Seq2seqConfig { steps: 0, batch: 3, hidden: 8, ..Default::default() };
     let out = folder.path().join("out");
     let ended =

@@ -145,8 +145,7 @@ impl Predictor {
     }
 
     pub fn truth(clips: &EvalClips) -> Self {
-        let description =
-            "the real motion beside itself: what its own figures are, and where the others end".to_owned();
+        let description = "the ground truth compared with itself, which bounds the values of the others".to_owned();
         Self::new(PredictorKind::Truth, description, vec![ClipMotion::GroundTruth; clips.clips.len()])
     }
 }
@@ -160,9 +159,9 @@ pub fn from_files(clips: &EvalClips, store: &MotionStore) -> Result<(Vec<Predict
             "{}: left out, since {}",
             PredictorKind::NearestNeighbour.name(),
             match (clips.have_sound(), clips.clips.len()) {
-                (false, _) => "it listens, and no sound is given (--audio)",
+                (false, _) => "it needs audio (--audio)",
                 (true, 1) => "there is no other clip to copy from",
-                (true, _) if clips.clips.iter().any(|clip| clip.features.is_none()) => "not every clip has a sound",
+                (true, _) if clips.clips.iter().any(|clip| clip.features.is_none()) => "not every clip has audio",
                 (true, _) => "no other clip is long enough to copy from",
             }
         )),
@@ -187,7 +186,7 @@ fn late_prediction(clips: &EvalClips, fallback: &Predictor, store: &MotionStore)
         let later = (0..n_frames).map(|t| (t + n_frames / 2) % n_frames);
         Ok(ClipMotion::Motion(store.keep(select_frames(&clip.predicted, later))?))
     };
-    let description = "the clip's own prediction half of the clip later, and from the beginning again".to_owned();
+    let description = "the clip's own prediction, shifted by half of the clip with wrap-around".to_owned();
     let motions = clips.clips.iter().map(of).collect::<Result<_>>()?;
     Predictor::new(PredictorKind::LatePrediction, description, motions).filled(fallback, store)
 }
@@ -219,9 +218,9 @@ fn constant_poses(clips: &EvalClips) -> Vec<Predictor> {
     }
     let description = |what: &str| {
         if is_single {
-            format!("the {what} of this very truth in every frame (oracle: no predictor knows it), which never moves")
+            format!("the {what} of this clip's truth in every frame (an oracle: predictors do not have the truth)")
         } else {
-            format!("the {what} of the other clips' truths in every frame, which never moves")
+            format!("the {what} of the other clips' truths in every frame")
         }
     };
     vec![
@@ -253,7 +252,7 @@ fn neighbours(clips: &EvalClips, fallback: &Predictor, store: &MotionStore) -> R
         joints: &|entry, frames| Ok(clips.clips[entry].ground_truth.view().slice_move(s![frames, .., ..]).to_owned()),
     };
     let Some(predicted) = neighbour::motions(&query, &library, clips.fps, store)? else { return Ok(None) };
-    let description = "for each 4 s of sound the motion of the part of another clip that sounds most alike".to_owned();
+    let description = "for each 4 s of audio the motion of the most similar audio in another clip".to_owned();
     let motions = predicted.into_iter().map(ClipMotion::Motion).collect();
     Ok(Some(Predictor::new(PredictorKind::NearestNeighbour, description, motions).filled(fallback, store)?))
 }
@@ -285,7 +284,7 @@ pub fn mismatched(
         });
         (
             motions.collect::<Result<_>>()?,
-            "the same of another clip, played back and forth where that is shorter".to_owned(),
+            "the motion of another clip, played back and forth where it is shorter".to_owned(),
         )
     } else {
         let n_frames = lengths.sum::<usize>();
@@ -293,7 +292,7 @@ pub fn mismatched(
         if clips.fps.secs(shift) < MIN_SHIFT_SECS {
             return Ok(None);
         }
-        let description = format!("the same {:.1} s later, and from the beginning again", clips.fps.secs(shift));
+        let description = format!("the same motion, shifted by {:.1} s with wrap-around", clips.fps.secs(shift));
         let motion = store.keep(select_frames(of(0), (0..n_frames).map(|t| (t + shift) % n_frames)))?;
         (vec![ClipMotion::Motion(motion)], description)
     };

@@ -88,13 +88,13 @@ pub fn motions(
 /// Windows of a query, the last one shorter.
 fn query_windows<'a>(query: usize, sound: &Query<'a>, fps: FrameRate) -> Vec<QueryWindow<'a>> {
     let window = (((WINDOW_SECS * fps.per_sec()) as usize) / POOLED * POOLED).max(POOLED);
-    let stretch = |first: usize| {
+    let window_at = |first: usize| {
         let frames = first..(first + window).min(sound.n_frames);
         let from = first / POOLED * mel::N_MELS;
         let to = (from + frames.len().div_ceil(POOLED) * mel::N_MELS).min(sound.rows.len());
         QueryWindow { query, frames, rows: sound.rows.get(from..to).unwrap_or_default() }
     };
-    (0..sound.n_frames).step_by(window).map(stretch).collect()
+    (0..sound.n_frames).step_by(window).map(window_at).collect()
 }
 
 /// Best match of a window within one entry.

@@ -15,7 +15,11 @@ pub fn motion(speaker: &GestureGenerator, sound: &Sound, n_frames: usize) -> Res
     let mut sound = sound.clone();
     sound.samples.resize(sound.samples.len().max(n_needed), 0.0);
     let (predicted, posture) = speaker.motion_and_posture(&sound)?;
-    ensure!(predicted.n_frames() >= n_frames, "{} frames of motion for {n_frames} of sound", predicted.n_frames());
+    ensure!(
+        predicted.n_frames() >= n_frames,
+        "{} frames of motion were generated for {n_frames} frames of audio",
+        predicted.n_frames()
+    );
     let motion = Motion::from_joints(predicted.fps, predicted.joints.slice(s![..n_frames, .., ..]).to_owned());
     Ok((motion, posture.map(|posture| posture.slice(0..n_frames))))
 }
@@ -58,21 +62,21 @@ pub fn mismatched_words(lengths: &[usize], rate: u32, words: &[Vec<Word>], which
 /// Sounds and sample ranges that make up the mismatched sound for sound `which`.
 fn mismatched_parts(lengths: &[usize], which: usize) -> Vec<(usize, Range<usize>)> {
     let (all, before) = (lengths.iter().sum::<usize>(), lengths[..which].iter().sum::<usize>());
-    let mut wanted = lengths[which];
+    let mut n_missing = lengths[which];
     let mut skipped = (before + all / 2) % all.max(1);
     let mut parts = Vec::new();
-    if wanted == 0 {
+    if n_missing == 0 {
         return parts;
     }
     for (at, &n) in lengths.iter().enumerate().cycle() {
         let start = skipped.min(n);
-        let end = n.min(start + wanted);
+        let end = n.min(start + n_missing);
         skipped -= start;
-        wanted -= end - start;
+        n_missing -= end - start;
         if end > start {
             parts.push((at, start..end));
         }
-        if wanted == 0 {
+        if n_missing == 0 {
             break;
         }
     }

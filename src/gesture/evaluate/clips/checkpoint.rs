@@ -20,7 +20,7 @@ use orator_media::ffmpeg::audio;
 use std::path::{Path, PathBuf};
 
 /// Frames of silence appended to the sound for a captured skeleton, so that the resampled motion covers the interval.
-const SPARE_FRAMES: usize = 2;
+const EXTRA_FRAMES: usize = 2;
 
 /// Checkpoint under evaluation.
 pub struct EvaluatedCheckpoint {
@@ -108,19 +108,22 @@ impl EvaluatedCheckpoint {
             TrainedSpeaker::Sequence(network) => network,
         };
         let rate = network.metadata.rate;
-        let spare = if network.is_captured() { SPARE_FRAMES } else { 0 };
-        let n_needed = sample_at(fps, rate, n_frames) + sample_at(network.fps(), rate, spare) + 1;
+        let extra = if network.is_captured() { EXTRA_FRAMES } else { 0 };
+        let n_needed = sample_at(fps, rate, n_frames) + sample_at(network.fps(), rate, extra) + 1;
         let mut sound = audio::at_rate(sound, rate)?;
         sound.samples.resize(sound.samples.len().max(n_needed), 0.0);
         let poses = network.poses(&sound, words)?;
         let motion = if network.is_captured() {
-            let captured = bvh::from_text(&network.bvh(&poses)?).context("its skeleton is no speaker's")?;
+            let captured = bvh::from_text(&network.bvh(&poses)?).context("cannot convert its skeleton to 49 joints")?;
             resample::at_rate(&without_fingers(captured.motion), fps)
         } else {
             network.motion(&poses)?
         };
         let n_generated = motion.n_frames();
-        ensure!(n_generated >= n_frames, "{n_generated} frames of motion for {n_frames} of sound");
+        ensure!(
+            n_generated >= n_frames,
+            "{n_generated} frames of motion were generated for {n_frames} frames of audio"
+        );
         Ok((Motion::from_joints(fps, motion.joints.slice_move(s![..n_frames, .., ..])), None))
     }
 }

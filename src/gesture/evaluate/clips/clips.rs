@@ -169,7 +169,7 @@ impl EvalClips {
 /// A file without motion; a prediction much longer or shorter than its ground truth, or with many missing joints. The
 /// message names the clip and a remedy.
 pub fn read(pairs: &[FilePair], fps: Option<FrameRate>, store: &MotionStore) -> Result<EvalClips> {
-    let first = pairs.first().context("there is no pair to measure")?;
+    let first = pairs.first().context("no pair of truth and prediction")?;
     let rate = motion_file::read(&first.truth, fps)?.motion.fps;
     let clip = |pair: &FilePair| clip(pair, fps, rate, store).with_context(|| format!("clip {}", pair.name));
     let read: Vec<(EvalClip, Vec<String>)> = pairs.par_iter().map(clip).collect::<Result<_>>()?;
@@ -196,7 +196,7 @@ fn clip(
         notes.extend(read.notes);
         if let Some(given) = given.filter(|given| read.has_rate && *given != read.motion.fps) {
             let name = path.file_name().unwrap_or_default().to_string_lossy();
-            notes.push(format!("{name} says {}: {given} (--fps) is not for it", read.motion.fps));
+            notes.push(format!("{name} has {}: {given} (--fps) is ignored for this file", read.motion.fps));
         }
         let mut motion = read.motion;
         if motion.fps != fps {
@@ -204,7 +204,10 @@ fn clip(
             motion = resample::at_rate(&motion, fps);
         }
         if let Some(distance) = neck_to_origin(&mut motion) {
-            notes.push(format!("{}: the {what}'s neck stands {distance:.2} m from the origin: moved there", pair.name));
+            notes.push(format!(
+                "{}: the neck of the {what} is up to {distance:.2} m from the origin: moved there",
+                pair.name
+            ));
         }
         Ok(motion)
     };
@@ -215,12 +218,12 @@ fn clip(
     ensure!(
         difference <= MAX_LENGTH_DIFFERENCE_SECS.max(MAX_LENGTH_DIFFERENCE * truth_secs.max(predicted_secs)),
         "the truth lasts {truth_secs:.2} s ({n_ground_truth} frames at {fps}) and the prediction {predicted_secs:.2} s ({n_predicted} frames): \
-         more than a second and 5 % apart, so they are not of the same sound, or a rate is wrong (--fps)"
+         expected lengths that differ by at most 1 s or 5 %; check that both are of the same audio, and the frame rates (--fps)"
     );
     let n_frames = n_ground_truth.min(n_predicted);
     if n_ground_truth != n_predicted {
         notes.push(format!(
-            "{}: {n_ground_truth} frames of truth, {n_predicted} of prediction: cut to {n_frames}",
+            "{}: the truth has {n_ground_truth} frames, the prediction {n_predicted}: both were cut to {n_frames}",
             pair.name
         ));
     }
@@ -233,15 +236,15 @@ fn clip(
     let share = n_missing as f64 / n_seen as f64;
     ensure!(
         share <= MAX_MISSING,
-        "the prediction {} has no number (NaN) for {:.1} % of the joints that the truth has: at most {:.0} % can be \
-         held over, or a prediction could leave out what it cannot do",
+        "the prediction {} is NaN for {:.1} % of the joints that are visible in the truth: at most {:.0} % may be \
+         missing",
         pair.prediction.display(),
         100.0 * share,
         100.0 * MAX_MISSING
     );
     if n_missing > 0 {
         notes.push(format!(
-            "{}: the prediction has no number (NaN) for {n_missing} of {n_seen} joints: each counts as where it was last",
+            "{}: the prediction is NaN for {n_missing} of {n_seen} joints: their last positions are used",
             pair.name
         ));
     }
@@ -252,11 +255,11 @@ fn clip(
         match &features {
             None => {
                 let name = path.file_name().unwrap_or_default().to_string_lossy();
-                notes.push(format!("{name} holds no sound: {} is not part of what needs sound", pair.name));
+                notes.push(format!("{name} has no audio: {} is left out of metrics that need audio", pair.name));
             }
             Some(features) => ensure!(
                 features.secs >= secs - MAX_LENGTH_DIFFERENCE_SECS.max(MAX_LENGTH_DIFFERENCE * secs),
-                "{} lasts {:.2} s, the motion {secs:.2} s: is it the sound of another clip?",
+                "{} lasts {:.2} s, the motion {secs:.2} s: is it the audio of another clip?",
                 path.display(),
                 features.secs
             ),
@@ -313,6 +316,7 @@ fn neck_to_origin(motion: &mut Motion) -> Option<f32> {
 fn other_unit(ground_truth: &Motion, predicted: &Motion) -> Option<String> {
     let size = |motion: &Motion| bones::measure(motion).iter().take(6).map(|v| f64::from(*v)).sum::<f64>();
     let ratio = size(predicted) / size(ground_truth);
-    (ratio.is_finite() && ratio > 0.0 && !(1.0 / OTHER_UNIT..OTHER_UNIT).contains(&ratio))
-        .then(|| format!("the prediction's arms are {ratio:.2} times as long as the truth's: are both in metres?"))
+    (ratio.is_finite() && ratio > 0.0 && !(1.0 / OTHER_UNIT..OTHER_UNIT).contains(&ratio)).then(|| {
+        format!("the arms of the prediction are {ratio:.2} times as long as those of the truth: are both in metres?")
+    })
 }

@@ -42,13 +42,13 @@ pub fn prepare(
         let of_network = speaker.fps();
         ensure!(
             speaker.normalisation().is_none() || fps == of_network,
-            "{} moves at {fps}, the checkpoint's speaker at {of_network}: it was trained on another dataset",
+            "{} has {fps}, the checkpoint {of_network}: it was trained on another dataset",
             dataset.dir().display()
         );
     }
     let trained_normal = checkpoints.iter().find_map(|of| of.speaker.normalisation());
     let own_normal = if trained_normal.is_none() { Some(normalisation(dataset)?) } else { None };
-    let normal = trained_normal.or(own_normal.as_ref()).context("there is no checkpoint to measure")?;
+    let normal = trained_normal.or(own_normal.as_ref()).context("no checkpoint to evaluate")?;
     task.detail("reading the intervals");
     let samples = held_out::samples(dataset, split)?;
     let channels = channels(dataset, &samples, checkpoints)?;
@@ -58,10 +58,10 @@ pub fn prepare(
         .iter()
         .map(|of| held_out.generate(of, store).with_context(|| of.name.clone()))
         .collect::<Result<Vec<GeneratedIntervals>>>()?;
-    task.detail("listening");
+    task.detail("computing audio features");
     let has_words = held_out.words.iter().any(|words| !words.is_empty());
     let notes = notes::of_checkpoints(dataset, checkpoints, has_words, split);
-    let first = std::mem::take(&mut generated.first_mut().context("there is no checkpoint to measure")?.matched);
+    let first = std::mem::take(&mut generated.first_mut().context("no checkpoint to evaluate")?.matched);
     let clips = first
         .into_iter()
         .enumerate()
@@ -75,16 +75,16 @@ pub fn prepare(
         restrict(&mut clips, &common, store)?;
         clips.notes.push(notes::of_joints(&clips, &common));
     }
-    task.detail("what the training split knows");
+    task.detail("computing baselines");
     let numbered = |at: usize| {
         let name = checkpoints[at].name.clone();
         (checkpoints.len() > 1).then_some(NumberedCheckpoint { number: at + 1, name })
     };
     let mut all = Vec::new();
     for (at, (of, intervals)) in checkpoints.iter().zip(&mut generated).enumerate() {
-        let heard = if of.speaker.n_words() > 0 { "sound and the words" } else { "sound" };
+        let input = if of.speaker.n_words() > 0 { "audio and the words" } else { "audio" };
         let description =
-            format!("the speaker {} of the checkpoint, hearing the {heard} of each interval", of.speaker.name());
+            format!("the model of {} in the checkpoint, with the {input} of each interval", of.speaker.name());
         let mut predictor = Predictor::prediction(&clips, &description);
         if at > 0 {
             predictor.motions = std::mem::take(&mut intervals.matched).into_iter().map(ClipMotion::Motion).collect();
@@ -96,8 +96,7 @@ pub fn prepare(
     all.extend(constant_poses(dataset, normal, (clips.clips.len(), mean_posture.filter(|_| !channels.is_empty())))?);
     match nearest_neighbours(dataset, normal, &clips, split, store)? {
         Some(motions) => {
-            let description =
-                "for each 4 s of sound the motion of the part of the training split that sounds most alike";
+            let description = "for each 4 s of audio the motion of the most similar audio in the training split";
             let nearest_neighbours = Predictor::new(PredictorKind::NearestNeighbour, description.to_owned(), motions);
             let nearest_neighbours = nearest_neighbours.filled(&all[mean_pose_index], store)?;
             all.push(nearest_neighbours);
@@ -108,9 +107,8 @@ pub fn prepare(
         )),
     }
     for (at, (of, intervals)) in checkpoints.iter().zip(generated).enumerate() {
-        let with_words = if of.speaker.n_words() > 0 { " with its words" } else { "" };
-        let description =
-            format!("the same speaker hearing another sound{with_words}: what is said half of the split later");
+        let with_words = if of.speaker.n_words() > 0 { " and its words" } else { "" };
+        let description = format!("the same model with other audio{with_words}, taken from half of the split later");
         let motions = intervals.mismatched.into_iter().map(ClipMotion::Motion).collect();
         let predictor = Predictor::new(PredictorKind::MismatchedPrediction, description, motions);
         all.push(Predictor { checkpoint: numbered(at), ..predictor });
@@ -190,7 +188,7 @@ impl<'d> HeldOutSplit<'d> {
         let (sample, own) = (&self.samples[at], checkpoint.speaker.normalisation());
         let generated_motion = checkpoint.motion(sound, words, sample.n_frames, self.dataset.info().fps);
         let (mut generated_motion, posture) =
-            generated_motion.with_context(|| format!("no motion for {}", sample.key))?;
+            generated_motion.with_context(|| format!("cannot generate motion for {}", sample.key))?;
         if own.is_none_or(|own| own.bone_lengths != self.normal.bone_lengths) {
             bones::with_lengths(&mut generated_motion, &self.normal.lengths());
         }
@@ -280,7 +278,7 @@ fn constant_poses(
             let frame = held_out::with_posture(&pose.insert_axis(Axis(0)), mean_posture.as_ref());
             pose = frame.index_axis_move(Axis(0), 0);
         }
-        let description = format!("the {} of the training split in every frame, which never moves", kind.name());
+        let description = format!("the {} of the training split in every frame", kind.name());
         Predictor::new(kind, description, vec![ClipMotion::Constant(pose); n_clips])
     };
     Ok(vec![predictor(PredictorKind::MeanPose, mean), predictor(PredictorKind::MedianPose, median)])

@@ -34,7 +34,7 @@ pub fn samples(dataset: &Dataset, split: Split) -> Result<Vec<SampleRef>> {
         let others = Split::ALL.into_iter().filter(|other| !dataset.samples(*other).is_empty());
         let others: Vec<&str> = others.map(Split::name).collect();
         bail!(
-            "{} has no interval in the {} split; it has {}",
+            "{} has no intervals in the {} split; splits with intervals: {}",
             dataset.dir().display(),
             split.name(),
             others.join(", ")

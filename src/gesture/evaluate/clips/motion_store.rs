@@ -69,7 +69,7 @@ impl StoredMotion {
             // `keep` wrote exactly the values of this shape.
             Self::InFile(shape, bytes) => ArrayView1::from(bytemuck::cast_slice(bytes.as_slice()))
                 .into_shape_with_order(*shape)
-                .unwrap_or_else(|error| panic!("a motion of another length was kept: {error}")),
+                .unwrap_or_else(|error| panic!("the stored motion has another length: {error}")),
         }
     }
 

@@ -17,7 +17,8 @@ pub fn of_checkpoints(
 ) -> Vec<String> {
     let mut notes = Vec::new();
     if split == Split::Train {
-        notes.push("THE CHECKPOINT WAS TRAINED ON THIS SPLIT: its figures say what it learnt by heart".to_owned());
+        notes
+            .push("warning: the checkpoint was trained on this split, and its metrics measure memorisation".to_owned());
     }
     let (host, fps) = (&dataset.info().speaker, dataset.info().fps);
     let first_of_dataset = checkpoints.iter().position(|of| of.speaker.normalisation().is_some());
@@ -25,31 +26,33 @@ pub fn of_checkpoints(
         let (model_speaker, is_first) = (speaker.name(), first_of_dataset == Some(at));
         if speaker.normalisation().is_none() {
             notes.push(format!(
-                "{name} learnt the captures {model_speaker}, not this dataset: hold out there the takes of this split, else it knows \
-                 them; its motion was read as the captures' import reads them, its bones put on the lengths of the others"
+                "{name} was trained on the captures {model_speaker}, not on this dataset: the takes of this split must be held out \
+                 there. Its motion was imported like captures and has the bone lengths of the other predictors"
             ));
             if speaker.fps() != fps {
-                notes.push(format!("{name} moves at {}: resampled to {fps}", speaker.fps()));
+                notes.push(format!("the motion of {name} was resampled from {} to {fps}", speaker.fps()));
             }
         } else if host != model_speaker && is_first {
             notes.push(format!(
-                "the dataset is of {host}, the checkpoint of {model_speaker}: its bones were put on the checkpoint's lengths"
+                "the dataset is of {host}, the checkpoint of {model_speaker}: the truth has the checkpoint's bone lengths"
             ));
         } else if host != model_speaker {
             notes.push(format!(
-                "{name} is of {model_speaker}, not of {host}: its bones were put on the lengths of the others"
+                "{name} is a model of {model_speaker}, not of {host}: it has the bone lengths of the other predictors"
             ));
         }
         if speaker.rate() != SAMPLE_RATE {
             notes.push(format!(
-                "{name} learnt from sound at {} Hz and hears the dataset's at {SAMPLE_RATE} Hz, which has nothing above {} Hz: \
-                 it hears worse here than it could",
+                "{name} was trained on audio at {} Hz; the dataset has audio at {SAMPLE_RATE} Hz, without frequencies above {} Hz, \
+                 which may degrade its motion",
                 speaker.rate(),
                 SAMPLE_RATE / 2
             ));
         }
         if speaker.n_words() > 0 && !has_words {
-            notes.push(format!("{name} reads words, and this split has none: it hears the sound alone"));
+            notes.push(format!(
+                "{name} uses words, and this split has none: its motion is generated from the audio only"
+            ));
         }
     }
     notes
@@ -60,7 +63,7 @@ pub fn of_joints(clips: &EvalClips, common: &[usize]) -> String {
     let missing = || (NECK + 1..N_JOINTS).filter(|joint| !common.contains(joint));
     let is_finger = |joint: &usize| *joint > L_HAND && !is_duplicate(*joint);
     let n_fingers = missing().filter(is_finger).count();
-    let fingers = (n_fingers > 0).then(|| format!("{n_fingers} finger joints"));
+    let fingers = (n_fingers > 0).then(|| counted(n_fingers, "finger joint"));
     let others = missing().filter(|joint| !is_finger(joint)).map(skeleton::name);
     let left_out: Vec<String> = fingers.into_iter().chain(others).collect();
     let is_whole =
@@ -69,8 +72,8 @@ pub fn of_joints(clips: &EvalClips, common: &[usize]) -> String {
         clips.clips.iter().map(|clip| clip.mask.outer_iter().filter(|seen| is_whole(*seen)).count()).sum();
     let share = 100.0 * n_whole as f64 / clips.n_frames().max(1) as f64;
     format!(
-        "every row, the truth's too, is measured on the joints that all have, {} of {}; left out: {}. All of them are seen \
-         in {share:.1} % of the frames",
+        "all rows, including the truth, are measured on the joints that all predictors have, {} of {}; left out: {}. These \
+         joints are all visible in {share:.1} % of the frames",
         counted(common.iter().filter(|joint| **joint != NECK).count(), "joint"),
         N_JOINTS - 1,
         left_out.join(", ")

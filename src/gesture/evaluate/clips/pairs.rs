@@ -35,13 +35,13 @@ pub struct FilePairs {
 /// A path that does not exist; a file given with a folder; two files for one clip; no pair.
 pub fn find(truth: &Path, prediction: &Path, audio: Option<&Path>) -> Result<FilePairs> {
     for path in [Some(truth), Some(prediction), audio].into_iter().flatten() {
-        ensure!(path.exists(), "{} is not there", path.display());
+        ensure!(path.exists(), "{} does not exist", path.display());
     }
     let mut found = match (truth.is_dir(), prediction.is_dir()) {
         (false, false) => {
             ensure!(
                 !is_same_file(truth, prediction),
-                "{} is given as truth and as prediction: a motion beside itself says nothing",
+                "{} is given as truth and as prediction: give two different motions",
                 truth.display()
             );
             let pair =
@@ -51,7 +51,7 @@ pub fn find(truth: &Path, prediction: &Path, audio: Option<&Path>) -> Result<Fil
         (true, true) => folders(truth, prediction)?,
         (is_folder, _) => {
             let (folder, file) = if is_folder { (truth, prediction) } else { (prediction, truth) };
-            bail!("{} is a folder and {} a file: give two files or two folders", folder.display(), file.display())
+            bail!("{} is a folder and {} is a file: give two files or two folders", folder.display(), file.display())
         }
     };
     match audio {
@@ -60,7 +60,7 @@ pub fn find(truth: &Path, prediction: &Path, audio: Option<&Path>) -> Result<Fil
         Some(audio) => {
             ensure!(
                 found.pairs.len() == 1,
-                "{} is one sound for {} clips: give a folder with a sound of each name",
+                "{} is one audio file for {} clips: give a folder with an audio file for each clip",
                 audio.display(),
                 found.pairs.len()
             );
@@ -87,20 +87,20 @@ fn folders(truth: &Path, prediction: &Path) -> Result<FilePairs> {
     for (name, truth) in truths {
         match predictions.remove(&name) {
             Some(prediction) => found.pairs.push(FilePair { name, truth, prediction, sound: None }),
-            None => found.notes.push(format!("{} has no prediction of its name: left out", file_name_of(&truth))),
+            None => found.notes.push(format!("{} has no prediction of the same name: left out", file_name_of(&truth))),
         }
     }
-    found
-        .notes
-        .extend(predictions.values().map(|path| format!("{} has no truth of its name: left out", file_name_of(path))));
+    found.notes.extend(
+        predictions.values().map(|path| format!("{} has no truth of the same name: left out", file_name_of(path))),
+    );
     ensure!(
         !found.pairs.is_empty(),
-        "no motion file of {} has a partner of its name in {}{}: expected for instance {}",
+        "no motion file in {} has the name of one in {}{}: expected for example {}",
         truth.display(),
         prediction.display(),
         match found.notes.len() {
-            0 => " (there is none at all)".to_owned(),
-            n => format!(" ({n} without, like {})", found.notes[0]),
+            0 => " (there are no motion files)".to_owned(),
+            n => format!(" ({n} without a partner: {}, ...)", found.notes[0]),
         },
         if is_same_folder { "gt_interval_7.txt and prediction_interval_7.txt" } else { "a.npy in both" }
     );
@@ -112,12 +112,14 @@ fn by_name(found: &mut FilePairs, audio: &Path) -> Result<()> {
     for pair in &mut found.pairs {
         pair.sound = sounds.remove(&pair.name);
         if pair.sound.is_none() {
-            found.notes.push(format!("{} has no sound of its name: not part of what needs sound", pair.name));
+            found
+                .notes
+                .push(format!("{} has no audio of the same name: left out of metrics that need audio", pair.name));
         }
     }
     ensure!(
         found.pairs.iter().any(|pair| pair.sound.is_some()),
-        "no file of {} is the sound of a clip: expected a name like {}.wav",
+        "no audio file in {} has the name of a clip: expected for example {}.wav",
         audio.display(),
         found.pairs.first().map_or("", |pair| pair.name.as_str())
     );
@@ -126,7 +128,7 @@ fn by_name(found: &mut FilePairs, audio: &Path) -> Result<()> {
 
 /// Files of a folder with one of these extensions, sorted by name, without hidden files.
 fn files(folder: &Path, endings: &[&str]) -> Result<Vec<PathBuf>> {
-    let paths = patterns::list(folder).with_context(|| format!("cannot look into {}", folder.display()))?;
+    let paths = patterns::list(folder).with_context(|| format!("cannot list {}", folder.display()))?;
     let is_one =
         |path: &PathBuf| path.is_file() && !stem(path).starts_with('.') && patterns::has_extension(path, endings);
     Ok(paths.into_iter().filter(is_one).collect())
@@ -136,7 +138,7 @@ fn by_key(files: impl IntoIterator<Item = PathBuf>) -> Result<BTreeMap<String, P
     let mut named = BTreeMap::new();
     for file in files {
         if let Some(other) = named.insert(key(&file), file.clone()) {
-            bail!("{} and {} both are clip {}: keep one of them", other.display(), file.display(), key(&file));
+            bail!("{} and {} are both clip {}: remove one of them", other.display(), file.display(), key(&file));
         }
     }
     Ok(named)
@@ -180,7 +182,7 @@ mod tests {
         assert_eq!((&found.pairs[0].sound, &found.pairs[1].sound), (&Some(at("s/a.wav")), &None));
         let notes = found.notes.join("|");
         assert!(notes.contains("c.bvh has no prediction") && notes.contains("d.npy has no truth"), "{notes}");
-        assert!(notes.contains("b has no sound"), "{notes}");
+        assert!(notes.contains("b has no audio"), "{notes}");
         let alone = find(&at("t/a.npy"), &at("p/d.npy"), Some(&at("s/a.wav"))).unwrap();
         assert_eq!(alone.pairs[0].sound, Some(at("s/a.wav")));
     }
@@ -191,7 +193,7 @@ mod tests {
         let found = find(dir.path(), dir.path(), Some(dir.path())).unwrap();
         assert_eq!((found.pairs.len(), found.pairs[0].name.as_str()), (1, "7"));
         assert_eq!(found.pairs[0].sound, Some(dir.path().join("7.wav")));
-        assert_eq!(found.notes, ["gt_interval_8.txt has no prediction of its name: left out"]);
+        assert_eq!(found.notes, ["gt_interval_8.txt has no prediction of the same name: left out"]);
     }
 
     #[test]
@@ -201,13 +203,13 @@ mod tests {
             let at = |name: &str| dir.path().join(name);
             format!("{:#}", find(&at(truth), &at(prediction), audio.map(at).as_deref()).unwrap_err())
         };
-        assert!(error("t", "p", None).contains("without, like a.npy has no prediction"));
-        assert!(error("t", "q", None).contains("keep one of them"));
-        assert!(error("e", "e", None).contains("none at all"));
+        assert!(error("t", "p", None).contains("without a partner: a.npy has no prediction"));
+        assert!(error("t", "q", None).contains("remove one of them"));
+        assert!(error("e", "e", None).contains("no motion files"));
         assert!(error("t", "p/c.npy", None).contains("two files or two folders"));
-        assert!(error("t/a.npy", "t/a.npy", None).contains("beside itself"));
-        assert!(error("gone", "p", None).contains("not there"));
-        assert!(error("t", "r", Some("s")).contains("expected a name like a.wav"));
-        assert!(error("t", "r", Some("s/z.wav")).contains("one sound for 2 clips"));
+        assert!(error("t/a.npy", "t/a.npy", None).contains("two different motions"));
+        assert!(error("gone", "p", None).contains("does not exist"));
+        assert!(error("t", "r", Some("s")).contains("expected for example a.wav"));
+        assert!(error("t", "r", Some("s/z.wav")).contains("one audio file for 2 clips"));
     }
 }

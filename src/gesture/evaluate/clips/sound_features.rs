@@ -118,7 +118,7 @@ pub fn extract(path: &Path, fps: FrameRate, n_frames: usize) -> Result<Option<So
     let decode = |sink: &mut dyn FnMut(&[f32])| -> Result<usize> {
         let mut n = 0;
         for piece in SoundStream::open(path, SAMPLE_RATE) {
-            let piece = piece.with_context(|| format!("the sound {}", path.display()))?;
+            let piece = piece.with_context(|| format!("cannot read the audio of {}", path.display()))?;
             n += piece.len();
             sink(&piece);
             if n >= n_wanted {

@@ -105,9 +105,9 @@ pub fn halves(catalogue: &Catalogue, clips: &EvalClips) -> IntervalSums {
     };
     let n_merged = (all.len() / 2).div_ceil(MAX_PAIRS).max(1);
     let merged = |neighbours: &[(usize, usize)]| {
-        let mut whole = MetricSums::default();
-        neighbours.chunks_exact(2).for_each(|pair| whole += &measure_pair(pair));
-        IntervalSums { blocks: vec![whole.clone().into_block()], whole }
+        let mut total = MetricSums::default();
+        neighbours.chunks_exact(2).for_each(|pair| total += &measure_pair(pair));
+        IntervalSums { blocks: vec![total.clone().into_block()], total }
     };
     total(all[..all.len() / 2 * 2].par_chunks(2 * n_merged).map(merged).collect())
 }
@@ -116,7 +116,7 @@ pub fn halves(catalogue: &Catalogue, clips: &EvalClips) -> IntervalSums {
 fn total(all: Vec<IntervalSums>) -> IntervalSums {
     let mut sum = IntervalSums::default();
     for one in all {
-        sum.whole += &one.whole;
+        sum.total += &one.total;
         sum.blocks.extend(one.blocks);
     }
     sum

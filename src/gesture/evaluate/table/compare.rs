@@ -4,6 +4,7 @@
 use super::result::{StoredMetric, StoredResult};
 use crate::evaluate::baseline::baselines::PredictorKind;
 use orator_base::math::estimate::Estimate;
+use orator_base::text::counted;
 use serde::Serialize;
 use serde_json::Value;
 use std::collections::BTreeSet;
@@ -24,9 +25,9 @@ pub struct MetricPair {
 pub struct Comparison {
     /// Warning if the results have different ground truth.
     pub warning: Option<String>,
-    pub beside: Vec<MetricPair>,
+    pub pairs: Vec<MetricPair>,
     /// Messages for metrics with equal names but different definitions.
-    pub refused: Vec<String>,
+    pub rejected: Vec<String>,
     /// Metrics that are only present in A, or only in B.
     pub only_in_a: Vec<String>,
     pub only_in_b: Vec<String>,
@@ -35,8 +36,9 @@ pub struct Comparison {
 /// Compares the predictions of two results.
 pub fn compare(a: &StoredResult, b: &StoredResult) -> Comparison {
     let warning = format!(
-        "A is of {} clips and B of {}, and their real motion is not the same: a better figure may be an easier clip",
-        a.n_clips, b.n_clips
+        "A has {} and B {}, and their ground truth differs: better values may come from easier clips",
+        counted(a.n_clips, "clip"),
+        b.n_clips
     );
     let mut compared = Comparison { warning: (a.truth != b.truth).then_some(warning), ..Comparison::default() };
     let mut rest: Vec<&StoredMetric> = b.metrics.iter().collect();
@@ -45,7 +47,7 @@ pub fn compare(a: &StoredResult, b: &StoredResult) -> Comparison {
         match rest.iter().position(|other| other.hash == metric.hash) {
             Some(at) => {
                 let other = rest.remove(at);
-                compared.beside.push(MetricPair {
+                compared.pairs.push(MetricPair {
                     name: metric.plain_name.clone(),
                     unit: metric.unit.clone(),
                     hash: metric.hash.clone(),
@@ -58,7 +60,7 @@ pub fn compare(a: &StoredResult, b: &StoredResult) -> Comparison {
     }
     for metric in unmatched {
         match rest.iter().position(|other| (&other.name, &other.part) == (&metric.name, &metric.part)) {
-            Some(at) => compared.refused.push(refusal(metric, rest.remove(at))),
+            Some(at) => compared.rejected.push(mismatch(metric, rest.remove(at))),
             None => compared.only_in_a.push(metric.plain_name.clone()),
         }
     }
@@ -67,17 +69,17 @@ pub fn compare(a: &StoredResult, b: &StoredResult) -> Comparison {
 }
 
 /// Message such as `mpjpe (all), joint error, is not comparable: fps is 15.0 in A and 30.0 in B (hash ... and ...)`.
-fn refusal(a: &StoredMetric, b: &StoredMetric) -> String {
+fn mismatch(a: &StoredMetric, b: &StoredMetric) -> String {
     let mut differ = Vec::new();
     differences("", &a.parameters, &b.parameters, &mut differ);
     if a.definition != b.definition {
-        differ.push("the definition itself is another".to_owned());
+        differ.push("the definitions differ".to_owned());
     }
     if a.unit != b.unit {
         differ.push(format!("the unit is {} in A and {} in B", a.unit, b.unit));
     }
     if differ.is_empty() {
-        differ.push("the hash is not that of the definition: the file was changed".to_owned());
+        differ.push("the hash does not match the definition: the file was changed".to_owned());
     }
     let differ = differ.join("; ");
     format!("{} ({}), {}, is not comparable: {differ} (hash {} and {})", a.name, a.part, a.plain_name, a.hash, b.hash)
@@ -114,16 +116,16 @@ pub fn text(compared: &Comparison) -> String {
     if let Some(warning) = &compared.warning {
         let _ = writeln!(text, "WARNING: {warning}\n");
     }
-    let width = compared.beside.iter().map(|row| row.name.chars().count() + row.unit.len() + 3).max().unwrap_or(0);
-    if !compared.beside.is_empty() {
+    let width = compared.pairs.iter().map(|row| row.name.chars().count() + row.unit.len() + 3).max().unwrap_or(0);
+    if !compared.pairs.is_empty() {
         let _ = writeln!(text, "{:width$}{:>34}{:>34}", "", "A", "B");
     }
-    for row in &compared.beside {
+    for row in &compared.pairs {
         let name = if row.unit == "1" { row.name.clone() } else { format!("{} ({})", row.name, row.unit) };
         let _ = writeln!(text, "{name:width$}{:>34}{:>34}", cell(&row.a), cell(&row.b));
     }
-    for refusal in &compared.refused {
-        let _ = writeln!(text, "refused: {refusal}");
+    for mismatch in &compared.rejected {
+        let _ = writeln!(text, "rejected: {mismatch}");
     }
     for (names, which) in [(&compared.only_in_a, "A"), (&compared.only_in_b, "B")] {
         if !names.is_empty() {

@@ -3,8 +3,8 @@
 
 use super::table::{PredictorRow, Table};
 use crate::evaluate::baseline::baselines::PredictorKind;
-use crate::evaluate::verdict::labels;
-use crate::evaluate::verdict::verdict::{better_than_nothing, depends_on_audio};
+use crate::evaluate::conclusion::conclusion::{better_than_constant_pose, depends_on_audio};
+use crate::evaluate::conclusion::labels;
 use anyhow::{Context, Result, ensure};
 use orator_base::input;
 use orator_base::math::estimate::Estimate;
@@ -20,20 +20,20 @@ pub const VERSION: u64 = 1;
 pub fn json(table: &Table) -> Value {
     let metrics = (0..table.definitions.len()).map(|index| metric(table, index));
     let predictors = table.rows.iter().map(|row| {
-        let mut predictor = json!({ "name": row.key(), "says": row.description });
+        let mut predictor = json!({ "name": row.key(), "description": row.description });
         if let Some(of) = &row.checkpoint {
             predictor["checkpoint"] = json!(of.name);
         }
         predictor
     });
-    let verdicts = |own: &PredictorRow| {
+    let conclusions = |own: &PredictorRow| {
         json!({
             "predictor": own.key(),
-            "better_than_nothing": better_than_nothing(table, own),
-            "hears": depends_on_audio(table, own),
+            "better_than_constant_pose": better_than_constant_pose(table, own),
+            "depends_on_audio": depends_on_audio(table, own),
         })
     };
-    let own = table.predictions().next().map(verdicts).unwrap_or_default();
+    let own = table.predictions().next().map(conclusions).unwrap_or_default();
     let mut result = json!({
         "evaluation": VERSION,
         "convention": table.settings.convention,
@@ -46,15 +46,15 @@ pub fn json(table: &Table) -> Value {
         "secs": table.secs,
         "with_sound": table.with_sound,
         "truth": table.truth,
-        "learnt_from_these_clips": table.trained_on,
+        "trained_on_these_clips": table.trained_on,
         "notes": table.notes,
         "predictors": predictors.collect::<Vec<_>>(),
         "metrics": metrics.collect::<Vec<_>>(),
-        "better_than_nothing": own["better_than_nothing"],
-        "hears": own["hears"],
+        "better_than_constant_pose": own["better_than_constant_pose"],
+        "depends_on_audio": own["depends_on_audio"],
     });
     if table.predictions().count() > 1 {
-        result["verdicts"] = table.predictions().map(verdicts).collect();
+        result["conclusions"] = table.predictions().map(conclusions).collect();
     }
     result
 }
@@ -116,11 +116,14 @@ impl StoredResult {
         let text =
             input::read_text(path, input::MOST_TEXT).with_context(|| format!("cannot read {}", path.display()))?;
         let stored: Self = serde_json::from_str(&text).with_context(|| {
-            format!("{} is no result of an evaluation: `orator evaluate --json ... > FILE` writes one", path.display())
+            format!(
+                "{} is not an evaluation result: create one with `orator evaluate --json ... > FILE`",
+                path.display()
+            )
         })?;
         ensure!(
             stored.evaluation == VERSION,
-            "{} has version {}, expected {VERSION}: evaluate again",
+            "{} has version {}, expected {VERSION}: run `orator evaluate` again",
             path.display(),
             stored.evaluation
         );

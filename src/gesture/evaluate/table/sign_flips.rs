@@ -7,7 +7,7 @@ use rand::{RngCore, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 /// Significance level of a test. It is half of 5 %, since the decorrelation time is an estimate and leaves some
-/// dependence; with it the simulated rates of false verdicts stay below 5 %.
+/// dependence; with it the simulated rates of false conclusions stay below 5 %.
 pub const LEVEL: f64 = 0.025;
 /// Smallest number of blocks with which a test can reject: the observed signs and their negative are 2 of 2^n flips.
 pub const MIN_BLOCKS: usize = 7;

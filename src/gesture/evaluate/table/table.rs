@@ -74,7 +74,7 @@ pub fn measure(
     let (has_fingers, channels) = (clips.have_fingers(), clips.channels.clone());
     let settings = MetricSettings { fps: clips.fps, has_fingers, channels, ..settings.clone() };
     let catalogue = Catalogue::new(&settings)?;
-    ensure!(clips.n_frames() > 0, "there is no frame to measure");
+    ensure!(clips.n_frames() > 0, "no frames to evaluate");
     let fps = clips.fps.per_sec();
     let block_length = BlockLength::new(clips.secs(), fps, &differences(clips, predictors));
     let frames = blocks::frames(clips, block_length.frames(fps));
@@ -102,8 +102,8 @@ pub fn measure(
     rows.extend(halves(&catalogue, clips));
     let truth = Predictor::truth(clips);
     // The ground truth is measured without blocks, since it needs no bootstrap draws.
-    let whole = blocks::measure(&catalogue, clips, &truth, usize::MAX).whole;
-    rows.push(row(&catalogue, PredictorKind::Truth, &truth.description, &IntervalSums { whole, blocks: Vec::new() }));
+    let total = blocks::measure(&catalogue, clips, &truth, usize::MAX).total;
+    rows.push(row(&catalogue, PredictorKind::Truth, &truth.description, &IntervalSums { total, blocks: Vec::new() }));
     task.advance(1);
     let definitions = catalogue.definitions().to_vec();
     let truth_of = (0..definitions.len()).map(|index| catalogue.truth_of(index)).collect();
@@ -126,7 +126,7 @@ pub fn measure(
 }
 
 /// Differences in metres, for every frame of every clip, between the errors of a prediction and those of each predictor
-/// that verdicts compare it with.
+/// that conclusions compare it with.
 fn differences(clips: &EvalClips, predictors: &[Predictor]) -> Vec<Vec<Vec<f64>>> {
     use PredictorKind::{LatePrediction, MeanPose, MedianPose, MismatchedPrediction, Prediction};
     let errors: Vec<_> = predictors.iter().map(|predictor| blocks::frame_errors(clips, predictor)).collect();
@@ -151,12 +151,12 @@ fn halves(catalogue: &Catalogue, clips: &EvalClips) -> Option<PredictorRow> {
     if measured.blocks.is_empty() {
         return None;
     }
-    let description = "every second block of the truth beside the others: how far apart two sets of real motion are that have half \
-                the frames; only for figures of whole sets";
+    let description = "every second block of the truth compared with the others: the distance between two halves of the real \
+                motion; only for metrics of sets of frames";
     let mut row = row(catalogue, PredictorKind::TruthHalves, description, &measured);
     for (index, definition) in catalogue.definitions().iter().enumerate().filter(|(_, d)| !is_of_sets(d)) {
         row.values[index] = Estimate::new(f64::NAN, f64::NAN, f64::NAN);
-        row.reasons[index] = format!("{} needs two motions of the same seconds", definition.name);
+        row.reasons[index] = format!("{} needs two motions of the same frames", definition.name);
     }
     Some(row)
 }
@@ -167,7 +167,7 @@ fn is_of_sets(definition: &Definition) -> bool {
 }
 
 fn row(catalogue: &Catalogue, kind: PredictorKind, description: &str, measured: &IntervalSums) -> PredictorRow {
-    let values = catalogue.values(&measured.whole);
+    let values = catalogue.values(&measured.total);
     let n_blocks = measured.blocks.len();
     let drawn = if n_blocks == 0 {
         Array2::from_elem((0, values.len()), f64::NAN)
@@ -188,7 +188,7 @@ fn row(catalogue: &Catalogue, kind: PredictorKind, description: &str, measured: 
         Estimate::new(value, interval.low.max(0.0 * interval.low), interval.high)
     };
     let reason = |(index, value): (usize, &f64)| {
-        if value.is_finite() { String::new() } else { catalogue.reason(&measured.whole, index) }
+        if value.is_finite() { String::new() } else { catalogue.reason(&measured.total, index) }
     };
     PredictorRow {
         kind,
@@ -252,7 +252,7 @@ impl Table {
         sign_flips::test(&others.iter().map(contributions).collect::<Vec<_>>(), inflation)
     }
 
-    /// Quality of a value in a metric, where more is better.
+    /// Quality of a value in a metric, where higher is better.
     fn quality(&self, index: usize, value: impl Fn(usize) -> f64) -> f64 {
         let truth = self.truth_of.get(index).copied().flatten().unwrap_or(index);
         match self.definitions.get(index).map(|definition| definition.better) {

@@ -69,7 +69,7 @@ impl SequenceGenerator {
     pub fn n_frames(&self, n_samples: usize) -> Result<usize> {
         let secs = n_samples as f64 / f64::from(self.metadata.rate);
         let n_frames = (secs * self.fps().per_sec() + 1e-6) as usize;
-        ensure!(n_frames > 0, "the sound is {secs:.3} s long: too short for one frame of motion");
+        ensure!(n_frames > 0, "the audio is too short for one frame of motion: {secs:.3} s");
         Ok(n_frames)
     }
 
@@ -80,7 +80,7 @@ impl SequenceGenerator {
     /// Sound of another rate, or shorter than a frame.
     pub fn prepare(&self, sound: &Sound, words: &[Word]) -> Result<SpeechInput> {
         let rate = self.metadata.rate;
-        ensure!(sound.rate == rate, "the sound has {} Hz, expected {rate}", sound.rate);
+        ensure!(sound.rate == rate, "the audio has a sample rate of {} Hz, expected {rate} Hz", sound.rate);
         let n_frames = self.n_frames(sound.samples.len())?;
         let Config { predicted, context, .. } = *self.network.config();
         let cepstra =
@@ -103,7 +103,7 @@ impl SequenceGenerator {
         let generated = generate(&*self.network, audio, &start, seams, words)?.flatten_all()?.to_vec1::<f32>()?;
         ensure!(
             generated.iter().all(|value| value.is_finite()),
-            "the network makes numbers that are not finite: its checkpoint was damaged, or its training failed"
+            "the network output is not finite: the checkpoint is damaged, or its training failed"
         );
         let generated = Array2::from_shape_vec((generated.len() / pose, pose), generated)?;
         let mut features = generated.slice(s![..*n_frames, ..]).to_owned();

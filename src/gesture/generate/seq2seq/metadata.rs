@@ -60,22 +60,22 @@ impl SequenceMetadata {
     /// Fails unless the metadata is consistent and supported by this program.
     fn check(&self) -> Result<()> {
         let (fps, network) = (self.fps, &self.network);
-        ensure!(fps.is_plausible(), "it moves at {fps}, expected 1 to 1000 frames a second");
-        ensure!(RATES.contains(&self.rate), "it hears sound at {} Hz, expected {RATES:?}", self.rate);
+        ensure!(fps.is_plausible(), "the frame rate is {fps}, expected 1 to 1000 fps");
+        ensure!(RATES.contains(&self.rate), "the sample rate is {} Hz, expected one of {RATES:?}", self.rate);
         ensure!(
             (1..=MAX_WIDTH).contains(&network.hidden) && (1..=MAX_WIDTH).contains(&network.word),
-            "its states have {} numbers and its words {}, expected 1 to {MAX_WIDTH}",
+            "the hidden size is {} and the size of word vectors {}, expected 1 to {MAX_WIDTH}",
             network.hidden,
             network.word
         );
         let around = self.words_around_secs;
-        ensure!((0.0..=60.0).contains(&around), "it reads words {around} s around a segment, expected 0 to 60");
+        ensure!((0.0..=60.0).contains(&around), "the word context is {around} s, expected 0 to 60 s");
         self.poses.check(fps)?;
-        ensure!(self.vocabulary.is_sorted(), "its vocabulary is not sorted");
+        ensure!(self.vocabulary.is_sorted(), "the vocabulary is not sorted");
         let (pose, words) = (self.poses.n_features(), self.vocabulary.n_indices());
         let sizes = network_config(fps, pose, words, [network.hidden, network.word]);
         let expected = Config { hears_context: network.hears_context, ..sizes };
-        ensure!(*network == expected, "its network has other sizes than this program's: {network:?}");
+        ensure!(*network == expected, "unsupported network sizes: {network:?}");
         Ok(())
     }
 }
@@ -98,14 +98,14 @@ pub fn is_sequence_kind(kind: &serde_json::Value) -> bool {
 /// Loads a checkpoint of `orator train seq2seq`. Errors name the file and the cause.
 pub fn load(path: &Path) -> Result<(SequenceMetadata, Box<dyn GesturePredictor>)> {
     let contents = Contents::read(path)?;
-    build(&contents).with_context(|| format!("{} is no checkpoint of `orator train seq2seq`", path.display()))
+    build(&contents).with_context(|| format!("{} is not a checkpoint of `orator train seq2seq`", path.display()))
 }
 
 fn build(contents: &Contents) -> Result<(SequenceMetadata, Box<dyn GesturePredictor>)> {
     let kind = &contents.facts["speaker"]["kind"];
-    ensure!(kind == KIND, "its kind is {kind}, this program reads {KIND:?}");
+    ensure!(kind == KIND, "unsupported kind {kind}: expected {KIND:?}");
     let metadata: SequenceMetadata =
-        serde_json::from_value(contents.facts["speaker"].clone()).context("its facts are incomplete")?;
+        serde_json::from_value(contents.facts["speaker"].clone()).context("incomplete metadata")?;
     metadata.check()?;
     contents.expect_numbers(metadata.network.hidden * metadata.network.hidden)?;
     let mut params = Params::frozen();

@@ -45,11 +45,11 @@ impl PoseFormat {
     pub fn check(&self, fps: FrameRate) -> Result<()> {
         match self {
             Self::Captured(maps) => {
-                ensure!(fps == FPS, "it moves a captured skeleton at {fps}, not at {FPS}");
+                ensure!(fps == FPS, "the frame rate of a captured skeleton is {fps}, expected {FPS}");
                 maps.check()
             }
             Self::Joints { normalisation, representation } => {
-                ensure!(representation.keeps_lengths(), "its poses are no directions of bones");
+                ensure!(representation.keeps_lengths(), "the poses are not bone directions");
                 representation.check()?;
                 normalisation.check()
             }
@@ -60,14 +60,14 @@ impl PoseFormat {
     pub fn bvh(&self, features: ArrayView2<f32>) -> Result<String> {
         match self {
             Self::Captured(maps) => Ok(maps.to_bvh(features)),
-            Self::Joints { .. } => bail!("its poses are those of the 49 joints, of no BVH skeleton"),
+            Self::Joints { .. } => bail!("the network generates poses of 49 joints, not of a BVH skeleton"),
         }
     }
 
     /// Motion of the 49 joints with the speaker's bone lengths for features [T, C]. Fails for a captured skeleton.
     pub fn motion(&self, features: ArrayView2<f32>, fps: FrameRate) -> Result<Motion> {
         let Self::Joints { normalisation, representation } = self else {
-            bail!("it moves the skeleton of the BVH files it was trained on, which is written as .bvh alone");
+            bail!("the network animates the BVH skeleton it was trained on: only .bvh files can be written");
         };
         let mut motion = Motion::from_joints(fps, representation.joints(features.t(), normalisation));
         bones::with_lengths(&mut motion, &normalisation.lengths());

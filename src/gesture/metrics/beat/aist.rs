@@ -1,7 +1,7 @@
 //! Beat alignment of AIST++ (Li et al. 2021, `tools/calculate_beat_scores.py` in their repository): how near the beats
 //! of the motion are to those of the sound. A motion with a single aligned beat scores 1.
 
-use super::consistency::{minima, nearness};
+use super::consistency::{beat_proximity, minima};
 use crate::metrics::body_part::BodyPart;
 use crate::metrics::definition::{Better, Definition, MetricFamily};
 use crate::metrics::pair::PairedFrames;
@@ -23,7 +23,7 @@ pub(crate) fn metric(fps: f64) -> MetricFamily {
                   Beats: strict local minima of the summed way of joints 1-6 from frame to frame (0 in the first), \
                   among `order` frames on either side (10 at 60 frames a second); sigma 3 frames at 60 a second. \
                   Theirs: beats of music instead of onsets, 24 joints of SMPL",
-        undefined: "no interval has sound with an onset",
+        undefined: "no interval has audio with an onset",
         parameters: json!({"sigma_secs": SIGMA_FRAMES / FPS, "order_frames": order, "joints": BodyPart::Body.joints()}),
         ..Definition::new("beat_alignment", BodyPart::Body.name(), "1", Better::NearerTruth)
     };
@@ -39,7 +39,7 @@ pub(crate) fn metric(fps: f64) -> MetricFamily {
         for (i, poses) in [&pair.predicted, &pair.ground_truth].into_iter().enumerate() {
             let beats = minima(&envelope(pair, poses), order);
             for &t in &beats {
-                blocks.at(t)[i] += nearness(t as f64, &onsets, sigma) / beats.len() as f64;
+                blocks.at(t)[i] += beat_proximity(t as f64, &onsets, sigma) / beats.len() as f64;
             }
         }
         if (0..n).any(|t| pair.n_non_finite(t) > 0) {

@@ -1,7 +1,7 @@
 //! Beat consistency of the trimodal convention (Liu et al. 2022 on the dataset of Yoon et al.; `get_BCscore` of Yi et
 //! al. 2023): beats are local minima of the change of the angle between neighbouring bones.
 
-use super::consistency::nearness;
+use super::consistency::beat_proximity;
 use crate::metrics::definition::{Better, Definition, MetricFamily};
 use crate::metrics::pair::PairedFrames;
 use crate::metrics::sums::BlockSums;
@@ -34,7 +34,7 @@ pub(crate) fn metric(fps: f64) -> MetricFamily {
                   is left out). Angles in half turns between neck-shoulder, upper arm and forearm; |change from frame \
                   to frame| / average change / 4, 0 in the first frame; beats: minima among 3 frames at least `drop` \
                   below one neighbour",
-        undefined: "there is no sound, no onset in it, or no angle has a beat",
+        undefined: "there is no audio, no onset in it, or no angle has a beat",
         parameters: json!({"sigma_secs": SIGMA, "drop": DROP, "average_change": angles.map(|(_, mean)| mean)}),
         ..Definition::new("beat_consistency", "arms", "1", Better::NearerTruth)
     };
@@ -49,7 +49,7 @@ pub(crate) fn metric(fps: f64) -> MetricFamily {
                         None => sums[0] = f64::NAN,
                         Some(beats) if beats.is_empty() => {}
                         Some(beats) => {
-                            sums[0] += nearness(onset, beats, SIGMA);
+                            sums[0] += beat_proximity(onset, beats, SIGMA);
                             sums[1] += 1.0;
                         }
                     }

@@ -19,7 +19,7 @@ pub fn minima(values: &[f64], order: usize) -> Vec<usize> {
 }
 
 /// `exp(-d^2 / 2 sigma^2)` with the distance d to the nearest of the sorted `times`; 0 if there are none.
-pub(crate) fn nearness(time: f64, times: &[f64], sigma: f64) -> f64 {
+pub(crate) fn beat_proximity(time: f64, times: &[f64], sigma: f64) -> f64 {
     let after = times.partition_point(|other| *other < time);
     let neighbours = times.iter().skip(after.saturating_sub(1)).take(2);
     let nearest = neighbours.map(|other| (other - time).abs()).fold(f64::INFINITY, f64::min);
@@ -61,7 +61,7 @@ pub(crate) fn metric(fps: f64) -> MetricFamily {
                   beat of the joint: a strict local minimum, among `order` frames on either side, of its speed by \
                   central differences; 0 where a joint has no beat in the interval; onsets where the joint is not \
                   seen left out. Onsets: spectral flux, `audio::onset`",
-        undefined: "there is no sound, no onset in it, or no elbow or wrist is seen at one",
+        undefined: "there is no audio, no onset in it, or no elbow or wrist is visible at one",
         parameters: json!({"joints": JOINTS, "sigma_secs": SIGMA, "order_frames": order}),
         ..Definition::new("beat_consistency", "arms", "1", Better::NearerTruth)
     };
@@ -77,8 +77,8 @@ pub(crate) fn metric(fps: f64) -> MetricFamily {
                 if pair.is_visible(t, 1, joint) {
                     let sums = blocks.at(t);
                     let is_non_finite = pair.predicted[t][joint].iter().any(|v| !v.is_finite());
-                    sums[0] += if is_non_finite { f64::NAN } else { nearness(onset, &predicted, SIGMA) };
-                    sums[1] += nearness(onset, &ground_truth, SIGMA);
+                    sums[0] += if is_non_finite { f64::NAN } else { beat_proximity(onset, &predicted, SIGMA) };
+                    sums[1] += beat_proximity(onset, &ground_truth, SIGMA);
                     sums[2] += 1.0;
                 }
             }
@@ -105,7 +105,7 @@ pub(crate) fn emage(fps: f64) -> MetricFamily {
                   among `order` frames on either side, with speed / mean above the threshold, looked up `cut` frames \
                   early; positions first replaced by |x - mean| by coordinate; first and last 2 s of motion and \
                   onsets left out (theirs finds onsets in the sound thus cut)",
-        undefined: "no interval has an onset and a seen joint further than 2 s from both its ends",
+        undefined: "no interval has an onset and a visible joint further than 2 s from both its ends",
         parameters: json!({
             "joints": BodyPart::Body.joints(), "sigma_secs": EMAGE_SIGMA, "order_frames": order,
             "threshold": EMAGE_THRESHOLD, "cut_frames": cut,
@@ -141,8 +141,9 @@ pub(crate) fn emage(fps: f64) -> MetricFamily {
             for onset in &inner {
                 let sums = blocks.at((onset * pair.fps) as usize);
                 let time = onset - from;
-                sums[0] += if is_non_finite { f64::NAN } else { weight * nearness(time, &predicted, EMAGE_SIGMA) };
-                sums[1] += weight * nearness(time, &ground_truth, EMAGE_SIGMA);
+                sums[0] +=
+                    if is_non_finite { f64::NAN } else { weight * beat_proximity(time, &predicted, EMAGE_SIGMA) };
+                sums[1] += weight * beat_proximity(time, &ground_truth, EMAGE_SIGMA);
                 sums[2] += weight;
             }
         }
@@ -176,8 +177,8 @@ mod tests {
 
     #[test]
     fn nearness_is_a_gaussian_of_the_distance() {
-        assert_eq!(nearness(1.0, &[1.0, 3.0], 0.1), 1.0);
-        assert!((nearness(1.0, &[1.1], 0.1) - (-0.5f64).exp()).abs() < 1e-9);
-        assert_eq!(nearness(1.0, &[], 0.1), 0.0);
+        assert_eq!(beat_proximity(1.0, &[1.0, 3.0], 0.1), 1.0);
+        assert!((beat_proximity(1.0, &[1.1], 0.1) - (-0.5f64).exp()).abs() < 1e-9);
+        assert_eq!(beat_proximity(1.0, &[], 0.1), 0.0);
     }
 }

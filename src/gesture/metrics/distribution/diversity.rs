@@ -16,7 +16,7 @@ pub(crate) fn l1div(part: BodyPart) -> MetricFamily {
         formula: "sum over j and the coordinates x, y, z of the mean over all frames of |x - mean of x over its interval|, \
                   frames of all intervals pooled; of each joint the frames in which it is seen, and no joint that \
                   never is",
-        undefined: "no joint of the part is seen",
+        undefined: "no joint of the part is visible",
         ..Definition::new("l1div", part.name(), "m", Better::NearerTruth)
     };
     let n_sums = 3 * joints.len();
@@ -55,7 +55,7 @@ pub(crate) fn pairwise(part: BodyPart) -> MetricFamily {
                   whole second from the interval's start (nearest frames), of the Euclidean distance of the two \
                   poses as one vector of all joints of the part; over the joints seen in both, times \
                   sqrt(joints / seen joints)",
-        undefined: "no interval is longer than a second, or no joint of the part is seen in both poses",
+        undefined: "no interval is longer than a second, or no joint of the part is visible in both poses",
         parameters: json!({"every_secs": 1, "most_secs": MAX_SECS}),
         ..Definition::new("average_pairwise_distance", part.name(), "m", Better::NearerTruth)
     };

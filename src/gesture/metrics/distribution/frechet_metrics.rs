@@ -36,7 +36,7 @@ pub(crate) fn poses(part: BodyPart) -> MetricFamily {
         formula: "|m_p - m_g|^2 + trace(C_p + C_g - 2 sqrt(C_p C_g)), m and C mean and unbiased covariance of the rows; a \
                   row is the pose of one frame, x, y, z of all joints of the part in centimetres from the neck; frames \
                   in which not all of them are seen are left out",
-        undefined: "fewer than 2 frames have all joints of the part",
+        undefined: "fewer than 2 frames have all joints of the part visible",
         parameters: json!({"n_numbers": d}),
         ..Definition::new("frechet_pose", part.name(), "cm^2", Better::Lower)
     };
@@ -98,7 +98,7 @@ fn in_space(space: FixedSpace) -> MetricFamily {
     let FixedSpace { name, formula, hash, windows, n_frames, stride, n_features } = space;
     let definition = Definition {
         formula,
-        undefined: "fewer than 2 windows are wholly seen",
+        undefined: "fewer than 2 windows have all joints visible in every frame",
         parameters: json!({"n_frames": n_frames, "stride": stride, "n_numbers": n_features, "space": hash}),
         ..Definition::new(name, "all", "1", Better::Lower)
     };

@@ -45,7 +45,7 @@ pub(crate) fn metrics(channel: PostureChannel) -> [MetricFamily; 4] {
         undefined,
         ..Definition::new(name, channel.name(), unit, better)
     };
-    let unseen = "its angles are not predicted, or not seen";
+    let unseen = "its angles are not predicted, or not visible";
     let error = definition(
         "angle_error",
         "degrees",
@@ -74,7 +74,7 @@ pub(crate) fn metrics(channel: PostureChannel) -> [MetricFamily; 4] {
         "1",
         Better::Higher,
         "mean of the correlations over t of p and g of those of yaw, pitch and roll that move in both",
-        "its angles are not predicted, not seen, or do not move",
+        "its angles are not predicted, not visible, or constant",
     );
     [
         MetricFamily::mean(error, move |pair, blocks| {

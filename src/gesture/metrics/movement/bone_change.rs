@@ -57,7 +57,7 @@ fn definitions(part: BodyPart) -> Vec<Definition> {
     let both = |(name, of_real, unit, formula)| {
         let definition = Definition {
             formula,
-            undefined: "no bone of the part is seen (for changes: in 2 frames in a row), or one has no length",
+            undefined: "no bone of the part is visible (for changes: in 2 frames in a row), or one has no length",
             parameters: json!({"bones": part.joints()}),
             ..Definition::new(name, part.name(), unit, Better::Lower)
         };

@@ -24,7 +24,7 @@ pub(crate) fn metric(part: BodyPart) -> MetricFamily {
                   intervals together: x, y, z of all joints of the part, frames in which all are seen; coordinates \
                   with a standard deviation of at most 1e-8 m are dropped, and those that the others determine up to \
                   1e-10 of their variance (which changes nothing)",
-        undefined: "fewer frames with all joints of the part than there are coordinates, or nothing in one motion moves",
+        undefined: "fewer frames with all joints of the part visible than there are coordinates, or one motion is constant",
         parameters: json!({"n_numbers": d, "n_components": 1}),
         ..Definition::new("cca", part.name(), "1", Better::Higher)
     };

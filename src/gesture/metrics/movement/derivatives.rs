@@ -69,7 +69,7 @@ fn family(
     let [name, of_real] = order.names();
     let definition = Definition {
         formula,
-        undefined: "no joint of the part is seen in enough frames in a row (2 for speed, 3 for acceleration, 4 for \
+        undefined: "no joint of the part is visible in enough frames in a row (2 for speed, 3 for acceleration, 4 for \
                     jerk)",
         ..Definition::new(name, part.name(), unit, Better::NearerTruth)
     };

@@ -49,7 +49,7 @@ fn family(
 ) -> MetricFamily {
     let definition = Definition {
         formula,
-        undefined: "no joint of the part is seen in 2 frames in a row, or all speeds are beyond the last bin",
+        undefined: "no joint of the part is visible in 2 frames in a row, or all speeds are beyond the last bin",
         parameters,
         ..Definition::new("hellinger_speed", part, "1", Better::Lower)
     };

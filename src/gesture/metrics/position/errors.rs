@@ -11,7 +11,7 @@ use serde_json::json;
 pub(crate) fn l1(part: BodyPart) -> MetricFamily {
     let definition = Definition {
         formula: "mean over t, j and the coordinates x, y, z of |p - g|",
-        undefined: "no joint of the part is seen",
+        undefined: "no joint of the part is visible",
         ..Definition::new("l1", part.name(), "m", Better::Lower)
     };
     per_frame::mean(definition, part, 1, 0, |window| mean_abs(window.difference(0)))
@@ -22,7 +22,7 @@ pub(crate) fn mpjpe(part: BodyPart) -> MetricFamily {
     let definition = Definition {
         formula: "1000 times the mean over t and j of the distance |p - g|, positions from the neck (part \
                   fingers_from_wrist: from the wrist of the same side)",
-        undefined: "no joint of the part is seen",
+        undefined: "no joint of the part is visible",
         ..Definition::new("mpjpe", part.name(), "mm", Better::Lower)
     };
     per_frame::mean(definition, part, 1, 0, |window| 1000.0 * vec3::norm(window.difference(0)))
@@ -33,7 +33,7 @@ pub(crate) fn acceleration(part: BodyPart) -> MetricFamily {
     let definition = Definition {
         formula: "mean over t and j of |a_p - a_g| with a(t) = (x(t) - 2 x(t+1) + x(t+2)) * fps^2, where the joint is seen \
                   in all three frames",
-        undefined: "no joint of the part is seen in 3 frames in a row",
+        undefined: "no joint of the part is visible in 3 frames in a row",
         ..Definition::new("acceleration_error", part.name(), "m/s^2", Better::Lower)
     };
     let of = |window: &PointWindow| vec3::norm(second_difference(window)) * window.fps() * window.fps();
@@ -45,7 +45,7 @@ pub(crate) fn acceleration_by_coordinate() -> MetricFamily {
     let definition = Definition {
         formula: "mean over t, j and the coordinates x, y, z of |d2 p - d2 g|, d2 the second difference from frame to frame, \
                   not multiplied with the frame rate (so another figure at another rate)",
-        undefined: "no joint is seen in 3 frames in a row",
+        undefined: "no joint is visible in 3 frames in a row",
         ..Definition::new("acceleration_error", BodyPart::All.name(), "m/frame^2", Better::Lower)
     };
     per_frame::mean(definition, BodyPart::All, 3, 0, |window| mean_abs(second_difference(window)))
@@ -61,7 +61,7 @@ pub(crate) fn maje(fps: f64) -> MetricFamily {
     let definition = Definition {
         formula: "mean over t, j and the coordinates x, y, z of |p - g| without the first frames of every interval, \
                   which their generator is given (4 at 15 frames a second)",
-        undefined: "no joint is seen after the seed",
+        undefined: "no joint is visible after the seed frames",
         parameters: json!({"n_seed_frames": n_seed}),
         ..Definition::new("maje", BodyPart::All.name(), "m", Better::Lower)
     };

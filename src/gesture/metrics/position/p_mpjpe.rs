@@ -19,7 +19,7 @@ pub(crate) fn metric(part: BodyPart) -> MetricFamily {
         formula: "1000 times the mean over t and j of |S_t p - g|, S_t the turn, uniform scale and shift without \
                   reflection that bring the seen joints of the part in frame t nearest to those of g (least \
                   squares); part hands: each hand for itself, all its 21 joints, the wrist among them",
-        undefined: "no frame has 3 seen joints of the part",
+        undefined: "no frame has 3 visible joints of the part",
         parameters: json!({"scale": true, "reflection": false}),
         ..Definition::new("p_mpjpe", part.name(), "mm", Better::Lower)
     };

@@ -103,7 +103,7 @@ fn family(variants: Vec<(PckAxes, BodyPart, f64)>, neck_in_box: bool, by_frame: 
                  in x and y alone; a made joint that is not finite is wrong",
             ),
         };
-        let (part, undefined) = (part.name(), "no joint of the part is seen");
+        let (part, undefined) = (part.name(), "no joint of the part is visible");
         let parameters = json!({"alpha": alpha});
         Definition { name, part, unit: "1", better: Better::Higher, formula, undefined, parameters }
     };

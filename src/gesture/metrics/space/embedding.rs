@@ -44,11 +44,12 @@ pub fn hash() -> String {
 /// Encoder from the bytes of a file of `orator-lab train embedding`.
 pub fn parse(bytes: &[u8]) -> Result<MotionEncoder> {
     let (_, header) = safetensors::SafeTensors::read_metadata(bytes)?;
-    let facts = header.metadata().as_ref().and_then(|m| m.get("orator")).context("it was not written by orator")?;
+    let facts = header.metadata().as_ref().and_then(|m| m.get("orator")).context("not a file of orator")?;
     let facts: serde_json::Value = serde_json::from_str(facts)?;
-    ensure!(facts["kind"] == KIND, "it is of kind {}, expected {KIND}", facts["kind"]);
-    let config: Config = serde_json::from_value(facts["lesson"]["config"].clone()).context("its network is unknown")?;
-    ensure!(config == Config::default(), "its network is {config:?}, expected {:?}", Config::default());
+    ensure!(facts["kind"] == KIND, "unsupported kind {}: expected {KIND}", facts["kind"]);
+    let config: Config =
+        serde_json::from_value(facts["lesson"]["config"].clone()).context("invalid network configuration")?;
+    ensure!(config == Config::default(), "unsupported network {config:?}: expected {:?}", Config::default());
     let mut params = Params::frozen();
     let encoder = MotionEncoder::new(&mut params, &config)?;
     let tensors = load_buffer(bytes, &Device::Cpu)?;

@@ -32,8 +32,10 @@ impl InplaceOp2 for EmaUpdate {
     }
 
     fn cpu_fwd(&self, mean: &mut CpuStorage, layout: &Layout, now: &CpuStorage, now_layout: &Layout) -> Result<()> {
-        let CpuStorage::F32(mean) = mean else { candle_core::bail!("a mean of f32 tensors only") };
-        let Some((start, end)) = layout.contiguous_offsets() else { candle_core::bail!("mean: variable in pieces") };
+        let CpuStorage::F32(mean) = mean else { candle_core::bail!("the weight average needs f32 tensors") };
+        let Some((start, end)) = layout.contiguous_offsets() else {
+            candle_core::bail!("the weight average needs contiguous tensors")
+        };
         let now = orator_nn::cpu::tensor::slice::<f32>(now, now_layout)?;
         let Self(decay) = *self;
         let pieces = mean[start..end].chunks_mut(GRAIN).zip(now.chunks(GRAIN));

@@ -27,7 +27,7 @@ impl BatchPrefetcher<'_> {
     /// Errors of reading the batch.
     pub fn take(&mut self, step: usize) -> Result<WindowBatch> {
         let prefetched = match self.pending.take() {
-            Some(pending) => Some(self.results.recv().context("the thread that reads batches is lost")?)
+            Some(pending) => Some(self.results.recv().context("the thread that loads batches has stopped")?)
                 .filter(|_| pending == step)
                 .map(|(_, batch)| batch),
             None => None,
@@ -50,7 +50,8 @@ pub fn prefetch<R>(
     work: impl FnOnce(&mut BatchPrefetcher) -> Result<R>,
 ) -> Result<R> {
     // One reader thread, since the others are busy with the step.
-    let reader = ThreadPoolBuilder::new().num_threads(1).build().context("no thread to read batches")?;
+    let reader =
+        ThreadPoolBuilder::new().num_threads(1).build().context("cannot start the thread that loads batches")?;
     std::thread::scope(|scope| {
         let (requests, requested) = mpsc::channel();
         let (sender, results) = mpsc::channel();

@@ -173,22 +173,22 @@ impl RunningMean {
 
 /// Mean distance between the joints of consecutive windows at the same frame, where both are visible.
 #[derive(Default)]
-pub struct BlockSpread {
+pub struct BlockDistance {
     last: Option<(Array3<f32>, Array3<f32>, Array2<bool>)>,
     predicted: RunningMean,
     ground_truth: RunningMean,
 }
 
-impl BlockSpread {
+impl BlockDistance {
     pub fn add(&mut self, window: &HeldOutBlock) {
         if let Some((predicted, ground_truth, mask)) = &self.last {
             for ((t, joint), seen) in window.mask.indexed_iter() {
                 if *seen && mask[[t, joint]] && !is_duplicate(joint) {
-                    let apart = |a: &Array3<f32>, b: &Array3<f32>| {
+                    let distance = |a: &Array3<f32>, b: &Array3<f32>| {
                         (0..3).map(|k| f64::from(a[[t, joint, k]] - b[[t, joint, k]]).powi(2)).sum::<f64>().sqrt()
                     };
-                    self.predicted.add([apart(predicted, &window.predicted)]);
-                    self.ground_truth.add([apart(ground_truth, &window.ground_truth)]);
+                    self.predicted.add([distance(predicted, &window.predicted)]);
+                    self.ground_truth.add([distance(ground_truth, &window.ground_truth)]);
                 }
             }
         }

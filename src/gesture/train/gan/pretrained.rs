@@ -33,14 +33,14 @@ impl PretrainedModel {
         let contents = Contents::read(&path)?;
         let speakers = model::speakers(&contents.facts);
         let speakers =
-            speakers.with_context(|| format!("{} is no checkpoint of `orator train gan`", path.display()))?;
+            speakers.with_context(|| format!("{} is not a checkpoint of `orator train gan`", path.display()))?;
         Ok(Self { path, speakers, contents })
     }
 
     /// Description of the file and its speakers for messages.
     pub fn description(&self) -> String {
         let names: Vec<&str> = self.speakers.iter().map(|speaker| speaker.name.as_str()).collect();
-        format!("what {} learnt of {}", self.path.display(), names.join(", "))
+        format!("{} (trained on {})", self.path.display(), names.join(", "))
     }
 
     /// Kind of initial weights that this model provides for a training of `n_speakers` speakers.
@@ -64,12 +64,12 @@ impl PretrainedModel {
         settings: GanSettings,
         windows: &JoinedWindows,
     ) -> Result<GanTrainer> {
-        let (Some(own), Some(other)) = (speakers.first(), self.speakers.first()) else { bail!("there is no speaker") };
+        let (Some(own), Some(other)) = (speakers.first(), self.speakers.first()) else { bail!("no speaker to train") };
         let (own, other) = (&own.network, &other.network);
         ensure!(
             own.preset == other.preset && own.width == other.width && own.n_out == other.n_out,
-            "{} is a network of preset {:?}, width {} and {} numbers a pose, the training's one of preset {:?}, width {} and \
-             {}: set gan.preset and gan.channels as it had them",
+            "{} has preset {:?}, width {} and {} outputs per pose, this training preset {:?}, width {} and {} outputs: set \
+             gan.preset and gan.channels to the values of that model",
             self.path.display(),
             other.preset,
             other.width,
@@ -96,7 +96,7 @@ impl PretrainedModel {
                 trainer.initialise_from(&self.contents, None)
             }
         };
-        initialise().with_context(|| format!("cannot begin with {}", self.path.display()))?;
+        initialise().with_context(|| format!("cannot initialise from {}", self.path.display()))?;
         Ok(trainer)
     }
 

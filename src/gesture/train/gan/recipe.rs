@@ -3,7 +3,7 @@
 //! `auto` depends on the minutes of training speech.
 
 use anyhow::{Context, Result};
-use orator_base::text::length;
+use orator_base::text::{counted, length};
 use orator_dataset::config::{GanConfig, GanRecipe, GanSettings};
 use orator_dataset::{Dataset, Split};
 
@@ -62,14 +62,10 @@ const fn row(key: &'static str, paper: f64, new_layer: f64, auto: [f64; 4]) -> R
 /// Minutes of training speech for the columns of `auto`.
 const MINUTES: [f64; 4] = [2.0, 10.0, 30.0, 120.0];
 
-/// The learning rate of `auto` is ten times the paper's, because it runs far fewer than 90,000 steps. Weight averaging,
-/// augmentation and, most of all, strong weight decay (decoupled, Loshchilov & Hutter 2019) prevent overfitting. With
-/// 10 minutes of `demo speaker --speech`, a weight decay of 3, a dropout of 0.5 or more masking do not reliably learn
-/// the words that move a hand (22 examples each); they are learnt after about 1,000 steps, before which the errors
-/// rise, hence the patience. With 30 minutes the decay, dropout and steps of 10 minutes do not learn them. The layer of
-/// a new speaker is 1/60 of the weights and is learnt within 100 steps; the motion energy is already that of the
-/// others. PCK and correlations of the wrist speeds with 2 minutes: layer only 76.1 %, .90 / .85; `shared_rate` 0.006:
-/// 77.0 %, .89 / .86; 0.017: 76.5 %, .88 / .86; 1: 72.5 %, .73 / .80.
+/// `paper` has the published values (Rebol et al. 2021). `auto` was chosen on synthetic speakers (see
+/// `orator guide results`): its learning rate is ten times the paper's, because it runs far fewer than 90,000 steps;
+/// weight averaging, augmentation and decoupled weight decay (Loshchilov & Hutter 2019) prevent overfitting. The errors
+/// may rise before the words are learned, hence the patience.
 #[rustfmt::skip]
 const RECIPES: [RecipeRow; 23] = [
     //   key                  paper     new layer  auto: 2, 10, 30, 120 minutes
@@ -98,15 +94,12 @@ const RECIPES: [RecipeRow; 23] = [
     row("augment_pose_noise", 0.0,      0.0,       [0.0; 4]),
 ];
 
-/// Regularisation keys that keep their 10 minute values if several speakers are trained. PCK of a new speaker of 2
-/// minutes after a training of five speakers of 20 minutes each: 76.9 % with the decay for 10 minutes, 75.2 % with that
-/// for 100.
+/// Regularisation keys that have their 10 minute values if several speakers are trained, measured on new speakers.
 const KEYS_OF_TEN_MINUTES: [&str; 2] = ["dropout", "weight_decay"];
-/// Minutes of a new speaker up to which only the layer is trained. PCK of a new speaker of 20 minutes: 78.1 % with the
-/// layer after a training of five speakers of 60 minutes each, 77.4 % with a network of its own.
+/// Minutes of a new speaker up to which only the layer is trained, which is measured to be better there than a
+/// network of its own.
 const MAX_LAYER_MINUTES: f64 = 20.0;
-/// Factor of the learning rate for fine-tuning all weights of another speaker's network. PCK of a new speaker of 2
-/// minutes, fine-tuned from a network of five others with one embedding vector each: 74 % with 0.2, 70 % with 0.5.
+/// Factor of the learning rate for fine-tuning all weights of another speaker's network, the better of two measured.
 const FINE_TUNING_RATE: f64 = 0.2;
 
 /// Settings of a training: `requested`, with the recipe's values for this amount of speech and these initial weights
@@ -127,7 +120,7 @@ pub fn settings(requested: &GanConfig, material: &TrainingMaterial, initial: Ini
         GanRecipe::Auto => auto(row, minutes),
     };
     let settings = requested.filled(|key| RECIPES.iter().find(|row| row.key == key).map(value));
-    let mut settings = settings.context("the recipe does not fit the keys of [gan]")?;
+    let mut settings = settings.context("the recipe lacks a key of [gan]")?;
     if initial != InitialWeights::SeveralSpeakers {
         // All weights are trained here; a rate of 0 would freeze the network.
         settings.shared_rate = 1.0;
@@ -165,22 +158,22 @@ pub fn lines(of: &GanSettings, material: &TrainingMaterial, secs_a_step: Option<
     let values = serde_json::to_value(of)?;
     let (train, held_out) = (length(material.train_secs), length(material.validation_secs));
     let whose = if material.n_speakers > 1 { format!(" of {} speakers", material.n_speakers) } else { String::new() };
-    let time = secs_a_step.map(|secs| format!(", about {} here", length(secs * of.steps as f64))).unwrap_or_default();
+    let time = secs_a_step.map(|secs| format!(", about {}", length(secs * of.steps as f64))).unwrap_or_default();
     let end = match of.patience {
         0 => String::new(),
-        epochs => format!("; it ends early after {epochs} validations without a better score"),
+        epochs => format!("; stops early after {} without a better score", counted(epochs, "validation")),
     };
     let numbers = RECIPES[4..].iter().filter_map(|row| Some((row.key, values[row.key].as_f64()?)));
-    let numbers = numbers.map(|(key, value)| match value.abs() {
-        0.0..1e-3 => format!("{key} {value}"),
-        _ => format!("{key} {}", (value * 1e4).round() / 1e4),
+    let numbers = numbers.map(|(key, value)| {
+        let scale = if value.abs() < 1e-3 { 1e6 } else { 1e4 };
+        format!("{key} {}", (value * scale).round() / scale)
     });
     Ok(vec![
-        format!("recipe {} for {train} of speech{whose}, {held_out} held out", values["recipe"].as_str().unwrap_or("")),
         format!(
-            "  {} steps of {} windows{time}, with a validation each {} steps{end}",
-            of.steps, of.batch, of.epoch_steps
+            "recipe {}: {train} of speech to train on{whose}, {held_out} to validate on",
+            values["recipe"].as_str().unwrap_or("")
         ),
+        format!("  {} steps of {} windows{time}, a validation every {} steps{end}", of.steps, of.batch, of.epoch_steps),
         format!("  {}", numbers.collect::<Vec<_>>().join(", ")),
     ])
 }

@@ -126,9 +126,7 @@ pub fn below_mean_pose(l1: [f64; 2], pck: Option<[f64; 2]>) -> Option<String> {
     let share = share.map(|[model, mean]| format!("PCK {:.1} % against {:.1} %", 100.0 * model, 100.0 * mean));
     let metrics: Vec<String> = error.into_iter().chain(share).collect();
     let metrics = (!metrics.is_empty()).then(|| metrics.join(", "))?;
-    Some(format!(
-        "The model is below the mean pose: a pose that never moves is nearer to where the speaker is ({metrics})."
-    ))
+    Some(format!("The model is worse than the mean pose: a constant pose is closer to the truth ({metrics})."))
 }
 
 /// Message if a generator hardly moves, or moves alike for any audio; arguments as in [`Validation`].

@@ -19,11 +19,15 @@ pub fn check(datasets: &[&Dataset]) -> Result<()> {
         let (info, dir) = (dataset.info(), dataset.dir().display());
         ensure!(
             !info.no_sound,
-            "{dir} was imported without sound, so that there is no speech to learn from; import it with its sound files"
+            "{dir} was imported without audio, but training needs speech; import it with its audio files"
         );
         let earlier = datasets[..n].iter().find(|other| other.info().speaker == info.speaker);
         if let Some(other) = earlier {
-            bail!("{} and {dir} are both of {}; give one dataset a speaker", other.dir().display(), info.speaker);
+            bail!(
+                "{} and {dir} are both of speaker {}; give one dataset per speaker",
+                other.dir().display(),
+                info.speaker
+            );
         }
     }
     Ok(())
@@ -67,7 +71,7 @@ pub fn resume(metadata: &mut SpeakerMetadata, dataset: &Dataset, differences: &m
     let info = dataset.info();
     ensure!(
         metadata.name == info.speaker && metadata.fps == info.fps,
-        "it is of {} at {}, the dataset of {} at {}; choose another --out",
+        "it is a model of {} at {}, the dataset is of {} at {}; choose another --out",
         metadata.name,
         metadata.fps,
         info.speaker,
@@ -76,7 +80,7 @@ pub fn resume(metadata: &mut SpeakerMetadata, dataset: &Dataset, differences: &m
     let hash = dataset.hash()?;
     if metadata.dataset != hash {
         differences.push(
-            "the dataset is another now: its windows are trained on, with the checkpoint's mean, deviation and bones"
+            "the dataset has changed: training continues on it with the mean, deviation and bone lengths of the checkpoint"
                 .to_owned(),
         );
         metadata.dataset = hash;
@@ -101,8 +105,8 @@ fn channels(dataset: &Dataset, wanted: &[PostureChannel]) -> Result<Vec<ChannelN
         let stats = stats.with_context(|| {
             let (name, dir) = (channel.name(), dataset.dir().display());
             format!(
-                "gan.channels asks for \"{name}\", which {dir} does not show in any frame to train on: set posture = true \
-                 under [dataset] and make the dataset again, or leave it out"
+                "gan.channels has \"{name}\", which is not visible in any training frame of {dir}: set posture = true under \
+                 [dataset] and build the dataset again, or remove it from gan.channels"
             )
         })?;
         Ok(ChannelNormalisation::new(channel, stats.n_seen, stats.mean, stats.std))

@@ -21,16 +21,21 @@ impl SpeakerSet {
     /// No speaker, or another number than the network has; a speaker whose channels, frame rate or network differ from
     /// the first one's.
     pub fn new(of: Vec<SpeakerMetadata>, device: &Device) -> Result<Self> {
-        ensure!(!of.is_empty(), "there is no speaker to learn");
+        ensure!(!of.is_empty(), "no speaker to train");
         let first = &of[0];
-        ensure!(first.network.n_speakers.max(1) == of.len(), "a network of {} speakers", first.network.n_speakers);
+        ensure!(
+            first.network.n_speakers.max(1) == of.len(),
+            "the network has {} speakers, expected {}",
+            first.network.n_speakers,
+            of.len()
+        );
         for other in &of[1..] {
             let channels = |speaker: &SpeakerMetadata| -> Vec<_> {
                 speaker.normalisation.channels.iter().map(|channel| channel.channel).collect()
             };
             ensure!(
                 other.fps == first.fps && channels(other) == channels(first) && other.network == first.network,
-                "{} moves at {}, {} at {}, and one network learns one rate: set [video] fps and make both datasets anew",
+                "{} has {} and {} {}, but a network has one frame rate: set [video] fps and build both datasets again",
                 first.name,
                 first.fps,
                 other.name,

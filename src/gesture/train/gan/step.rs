@@ -279,7 +279,7 @@ impl GanTrainer {
     fn stored(&self) -> Result<Value> {
         let (channels, settings) = (&self.settings.channels, self.settings.clone());
         let mut speakers = self.speakers.all().iter().cloned();
-        let speaker = speakers.next().context("a training without a speaker")?;
+        let speaker = speakers.next().context("no speaker to train")?;
         let other_speakers = speakers.collect();
         let state = TrainerState { speaker, other_speakers, settings, step: self.step, best: self.best };
         let mut facts = serde_json::to_value(&state)?;
@@ -334,14 +334,13 @@ impl TrainerState {
     pub fn from_checkpoint(contents: &Contents) -> Result<Self> {
         ensure!(
             contents.facts["settings"].is_object(),
-            "it is no checkpoint that this version can go on from; choose another --out, or move that folder away"
+            "this version cannot resume it; choose another --out, or move that folder away"
         );
-        let state: Self = serde_json::from_value(contents.facts.clone())
-            .context("its facts are not those of this program's version")?;
+        let state: Self = serde_json::from_value(contents.facts.clone()).context("incompatible metadata")?;
         let GanSettings { batch, steps, epoch_steps, window_frames, .. } = state.settings;
         ensure!(
             batch > 1 && steps > 0 && epoch_steps > 0 && window_frames > 0,
-            "its settings have no batch, steps, epochs or windows"
+            "invalid settings: batch must be at least 2; steps, epoch_steps and window_frames at least 1"
         );
         Ok(state)
     }

@@ -20,6 +20,7 @@ use crate::train::{log, no_window};
 use anyhow::{Result, ensure};
 use orator_base::stage::progress::Progress;
 use orator_base::stage::workdir::{self, FolderLock};
+use orator_base::text::counted;
 use orator_dataset::config::{ComputeDevice, GanConfig, GanSettings};
 use orator_dataset::{Dataset, Split};
 use orator_formats::checkpoint;
@@ -65,7 +66,7 @@ pub fn train_with_callback(
     let resumed = resume(datasets, requested, folder, progress)?;
     let pretrained_model = from.filter(|_| resumed.is_none()).map(PretrainedModel::read).transpose()?;
     if let Some(pretrained_model) = &pretrained_model {
-        progress.say(&format!("beginning with {}", pretrained_model.description()));
+        progress.say(&format!("initialising from {}", pretrained_model.description()));
     }
     let window_frames = resumed.as_ref().map_or(requested.window_frames, |(stored, _)| stored.settings.window_frames);
     // Checked before the statistics are read, which an empty split does not have.
@@ -93,8 +94,8 @@ pub fn train_with_callback(
         })
         .collect::<Result<_>>()?;
     let n_windows: usize = loaders.iter().map(WindowLoader::len).sum();
-    let places = datasets.iter().map(|dataset| dataset.dir().display().to_string()).collect::<Vec<_>>().join(", ");
-    progress.say(&format!("{n_windows} windows of {places}; what is learnt goes to {}", folder.display()));
+    let dirs = datasets.iter().map(|dataset| dataset.dir().display().to_string()).collect::<Vec<_>>().join(", ");
+    progress.say(&format!("{} of {dirs}; writing checkpoints to {}", counted(n_windows, "window"), folder.display()));
     let held_out = ValidationIntervals::load(&normalised_datasets, &settings, progress)?;
     let metadata = |((dataset, normal), loader): (&(&Dataset, Normalisation), &WindowLoader)| {
         speaker_metadata::metadata(dataset, normal, loader, &settings, datasets.len())
@@ -243,7 +244,7 @@ fn resume(
         let n_stored = 1 + stored.other_speakers.len();
         ensure!(
             n_stored == datasets.len(),
-            "it is of {n_stored} speakers, and this training has {}; choose another --out",
+            "it has {n_stored} speakers, this training {}; choose another --out",
             datasets.len()
         );
         let speakers = std::iter::once(&mut stored.speaker).chain(&mut stored.other_speakers);
@@ -257,11 +258,11 @@ fn resume(
 fn check(settings: &GanConfig) -> Result<()> {
     ensure!(
         settings.window_frames > 0 && settings.window_frames.is_multiple_of(FRAMES_MULTIPLE),
-        "gan.window_frames is {}: it must be a multiple of {FRAMES_MULTIPLE}",
+        "gan.window_frames is {}: expected a multiple of {FRAMES_MULTIPLE} above 0",
         settings.window_frames
     );
     if let Some(batch) = settings.batch.given() {
-        ensure!(batch > 1, "gan.batch is {batch}: batch norm needs at least 2 windows");
+        ensure!(batch > 1, "gan.batch is {batch}: expected at least 2 (for batch norm)");
     }
     ensure!(
         settings.checkpoint_every > 0 && settings.epoch_steps.given() != Some(0) && settings.stride_frames > 0,

@@ -2,7 +2,7 @@
 //! generated as a whole, as in `generate`, and evaluated in blocks of the window length.
 
 use super::block_metrics::{
-    AngleSums, BlockErrors, BlockSettings, BlockSpread, HeldOutBlock, NormalisedBlock, PredictorSums, RunningMean,
+    AngleSums, BlockDistance, BlockErrors, BlockSettings, HeldOutBlock, NormalisedBlock, PredictorSums, RunningMean,
     bone_changes, mean_error, reduction,
 };
 use super::score::{self, Validation};
@@ -57,7 +57,7 @@ impl ValidationIntervals {
                 }
             });
         }
-        all.context("there is no speaker to validate on")
+        all.context("no speaker to validate on")
     }
 
     fn of_speaker(
@@ -73,7 +73,7 @@ impl ValidationIntervals {
         let mut loader = WindowLoader::load(dataset, split, normal, n_frames, n_frames)?;
         if loader.is_empty() {
             let cause = no_window::cause(dataset, split, needed(n_frames)).unwrap_or_default();
-            progress.say(&format!("no window is held out, the figures below are on those to train on: {cause}"));
+            progress.say(&format!("no validation windows, so the metrics are those of training windows: {cause}"));
             split = Split::Train;
             loader = WindowLoader::load(dataset, split, normal, n_frames, n_frames)?;
         }
@@ -98,7 +98,7 @@ impl ValidationIntervals {
         let (generator, speakers) = (trainer.ema_generator(), trainer.speakers.all());
         let (mut predicted, mut mean_pose, mut ground_truth) =
             (PredictorSums::default(), PredictorSums::default(), PredictorSums::default());
-        let (mut change, mut spread) = (RunningMean::default(), BlockSpread::default());
+        let (mut change, mut spread) = (RunningMean::default(), BlockDistance::default());
         let mut errors: Vec<BlockErrors> = speakers.iter().map(|_| BlockErrors::default()).collect();
         let channels = &speakers[0].normalisation.channels;
         let mut angles: Vec<AngleSums> = channels.iter().map(|_| AngleSums::default()).collect();

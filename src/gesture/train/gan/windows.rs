@@ -80,7 +80,7 @@ impl<'d> WindowLoader<'d> {
         n_frames: usize,
         stride: usize,
     ) -> Result<Self> {
-        ensure!(n_frames > 0 && stride > 0, "a window needs at least one frame, and a stride of at least one");
+        ensure!(n_frames > 0 && stride > 0, "window length and stride must be at least 1 frame");
         let fps = dataset.info().fps;
         let long = dataset.samples(split).into_iter().filter(|sample| sample.n_frames >= n_frames).collect();
         let intervals = TrainingIntervals::open(dataset, long, normal, max_bytes)?;
@@ -154,7 +154,11 @@ impl<'d> WindowLoader<'d> {
         if changes.is_empty() {
             return self.batch(which);
         }
-        ensure!(which.len() == changes.len() && which.iter().all(|i| *i < self.len()), "windows {which:?}");
+        ensure!(
+            which.len() == changes.len() && which.iter().all(|i| *i < self.len()),
+            "invalid windows {which:?}: expected one change for each window below {}",
+            self.len()
+        );
         let both: Vec<_> = which.iter().zip(changes).collect();
         let changed = |(i, change): &(&usize, &WindowChange)| self.changed(self.starts[**i], change);
         let rows: Vec<WindowRows> = both.par_iter().map(changed).collect::<Result<_>>()?;
@@ -218,7 +222,11 @@ impl<'d> WindowLoader<'d> {
 
     /// Batch of the windows with these indices (each below `len`).
     pub fn batch(&self, which: &[usize]) -> Result<WindowBatch> {
-        ensure!(!which.is_empty() && which.iter().all(|i| *i < self.len()), "windows {which:?} of {}", self.len());
+        ensure!(
+            !which.is_empty() && which.iter().all(|i| *i < self.len()),
+            "invalid windows {which:?}: expected indices below {}",
+            self.len()
+        );
         let n_mels = mel_frames(self.fps, self.n_frames);
         let (mut mels, mut poses, mut mask) = (Vec::new(), Vec::new(), Vec::new());
         let read = |i: &usize| {
@@ -291,7 +299,7 @@ impl<'d> JoinedWindows<'d> {
                 });
             }
         }
-        joined(&parts).context("no window was asked for")
+        joined(&parts).context("no windows requested")
     }
 }
 

@@ -112,7 +112,7 @@ impl Adam {
     pub fn load(&mut self, prefix: &str, tensors: &BTreeMap<String, Tensor>) -> anyhow::Result<()> {
         let values = |name: String, n: usize| -> anyhow::Result<Vec<f32>> {
             let tensor = tensors.get(&name).with_context(|| format!("tensor {name} is missing"))?;
-            ensure!(tensor.elem_count() == n, "tensor {name} has {} numbers, expected {n}", tensor.elem_count());
+            ensure!(tensor.elem_count() == n, "tensor {name} has {} values, expected {n}", tensor.elem_count());
             Ok(tensor.flatten_all()?.to_vec1()?)
         };
         let halves = values(format!("{prefix}step"), 2)?;
@@ -254,8 +254,8 @@ impl InplaceOp2 for AdamUpdate<'_> {
     }
 
     fn cpu_fwd(&self, values: &mut CpuStorage, layout: &Layout, grad: &CpuStorage, grad_layout: &Layout) -> Result<()> {
-        let CpuStorage::F32(values) = values else { candle_core::bail!("adam moves f32 tensors only") };
-        let Some((start, end)) = layout.contiguous_offsets() else { candle_core::bail!("adam: variable in pieces") };
+        let CpuStorage::F32(values) = values else { candle_core::bail!("Adam needs f32 tensors") };
+        let Some((start, end)) = layout.contiguous_offsets() else { candle_core::bail!("Adam: not contiguous") };
         let grad = orator_nn::cpu::tensor::slice::<f32>(grad, grad_layout)?;
         let moments = &mut *self.moments.borrow_mut();
         let AdamScalars { beta1, beta2, eps, scale, rate, correction, keep } = self.scalars;

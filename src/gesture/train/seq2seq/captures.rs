@@ -43,24 +43,26 @@ impl CaptureFolder {
         let paths = entries.map(|entry| Ok(entry?.path())).collect::<Result<Vec<PathBuf>>>()?;
         let of_kind = |kind: &'static str| paths.iter().filter(move |path| has_ending(path, kind));
         if let Some(wav) = of_kind("wav").find(|wav| !paths.contains(&wav.with_extension("bvh"))) {
-            bail!("{} has no motion: {} is not there", wav.display(), wav.with_extension("bvh").display());
+            bail!("{} has no motion: {} does not exist", wav.display(), wav.with_extension("bvh").display());
         }
         let capture = |bvh: &PathBuf| -> Result<Capture> {
             let wav = bvh.with_extension("wav");
-            ensure!(paths.contains(&wav), "{} has no sound: {} is not there", bvh.display(), wav.display());
+            ensure!(paths.contains(&wav), "{} has no audio: {} does not exist", bvh.display(), wav.display());
             let transcript = ENDINGS.iter().map(|ending| bvh.with_extension(ending)).find(|path| paths.contains(path));
             let is_held_out = hold_out.contains(&stem(bvh));
             Ok(Capture { bvh: bvh.clone(), wav, transcript, is_held_out })
         };
         let mut captures = of_kind("bvh").map(capture).collect::<Result<Vec<Capture>>>()?;
         captures.sort_by(|a, b| a.bvh.cmp(&b.bvh));
-        let first = captures.first().with_context(|| format!("{} holds no NAME.bvh with NAME.wav", dir.display()))?;
+        let first = captures
+            .first()
+            .with_context(|| format!("no captures in {}: expected NAME.bvh with NAME.wav", dir.display()))?;
         if let Some(name) = hold_out.iter().find(|name| !captures.iter().any(|capture| stem(&capture.bvh) == **name)) {
-            bail!("{} is to be held out, but {} holds no {name}.bvh", name, dir.display());
+            bail!("cannot hold out {}: {} has no {name}.bvh", name, dir.display());
         }
         ensure!(
             captures.iter().any(|capture| !capture.is_held_out),
-            "{}: all captures are held out, none is left to train on",
+            "{}: all captures are held out, and none remains to train on",
             dir.display()
         );
         let rate = probe::probe(&first.wav)?.audio.map_or(0, |audio| audio.rate);
@@ -140,7 +142,7 @@ impl CaptureFolder {
 }
 
 fn read_sound(path: &Path, rate: u32) -> Result<Sound> {
-    audio::read_mono(path, rate)?.with_context(|| format!("{} has no sound", path.display()))
+    audio::read_mono(path, rate)?.with_context(|| format!("{} has no audio", path.display()))
 }
 
 fn has_ending(path: &Path, kind: &str) -> bool {

@@ -67,7 +67,11 @@ impl SegmentLoader {
     /// # Errors
     /// An index of `len` or more; no index.
     pub fn batch(&self, which: &[usize]) -> Result<SegmentBatch> {
-        ensure!(which.iter().all(|i| *i < self.len()), "segments {which:?} of {}", self.len());
+        ensure!(
+            which.iter().all(|i| *i < self.len()),
+            "invalid segments {which:?}: expected indices below {}",
+            self.len()
+        );
         self.batch_of_starts(&which.iter().map(|i| self.starts[*i]).collect::<Vec<_>>())
     }
 
@@ -81,7 +85,7 @@ impl SegmentLoader {
     /// # Errors
     /// A segment without a complete preceding one (`has_segment_before`).
     pub fn batch_before(&self, which: &[usize]) -> Result<SegmentBatch> {
-        ensure!(which.iter().all(|i| self.has_segment_before(*i)), "no segment before one of {which:?}");
+        ensure!(which.iter().all(|i| self.has_segment_before(*i)), "no complete segment before one of {which:?}");
         let predicted = self.metadata.network.predicted;
         let start = |(i, start): (usize, usize)| (i, start - predicted);
         self.batch_of_starts(&which.iter().map(|i| start(self.starts[*i])).collect::<Vec<_>>())
@@ -89,7 +93,7 @@ impl SegmentLoader {
 
     /// Batch of the segments given by sequence index and first frame of their previous poses.
     fn batch_of_starts(&self, starts: &[(usize, usize)]) -> Result<SegmentBatch> {
-        ensure!(!starts.is_empty(), "a batch of no segments");
+        ensure!(!starts.is_empty(), "empty batch of segments");
         let SequenceMetadata { architecture, network, .. } = &self.metadata;
         let Config { previous, predicted, pose, audio, .. } = *network;
         let (mut audio_values, mut before, mut real, mut known) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());

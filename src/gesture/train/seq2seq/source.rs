@@ -69,7 +69,7 @@ impl TrainingSource<'_> {
             Self::Dataset(dataset) => {
                 ensure!(
                     !dataset.info().no_sound,
-                    "{} was imported without sound, so that there is no speech to learn from",
+                    "{} was imported without audio, but training needs speech; import it with its audio files",
                     dataset.dir().display()
                 );
                 let normalisation = normalisation(dataset)?;
@@ -99,7 +99,9 @@ impl TrainingSource<'_> {
                 })
             }
             (Self::Captures(captures), PoseFormat::Captured(maps)) => captures.sequences(maps, context),
-            _ => bail!("the checkpoint is of the other kind of data; choose another --out"),
+            _ => {
+                bail!("the checkpoint was trained on another kind of data (dataset or captures); choose another --out")
+            }
         }
     }
 }

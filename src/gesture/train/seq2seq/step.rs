@@ -195,10 +195,10 @@ impl SequenceState {
         let kind = SequenceMetadata::kind();
         ensure!(
             contents.facts["settings"].is_object() && contents.facts["speaker"]["kind"] == kind,
-            "it is no checkpoint of `orator train seq2seq` that this version can go on from; choose another --out, or move \
+            "it is not a checkpoint of `orator train seq2seq` that this version can resume; choose another --out, or move \
              that folder away"
         );
-        serde_json::from_value(contents.facts.clone()).context("its facts are not those of this program's version")
+        serde_json::from_value(contents.facts.clone()).context("incompatible metadata")
     }
 
     /// Settings of the resumed training, and a message for each difference from `requested`.

@@ -20,6 +20,7 @@ use anyhow::{Context, Result, ensure};
 use candle_core::{Device, Tensor};
 use orator_base::stage::progress::Progress;
 use orator_base::stage::workdir::{self, FolderLock};
+use orator_base::text::counted;
 use orator_dataset::Split;
 use orator_dataset::config::Seq2seqConfig;
 use orator_formats::checkpoint;
@@ -78,7 +79,7 @@ pub fn train_with_callback(
             let mismatched = vectors.filter(|vectors| vectors.dim() != network.word);
             ensure!(
                 mismatched.is_none(),
-                "the word vectors have {} numbers, the words of the checkpoint in {} {}: leave them out, or choose another \
+                "the word vectors have {} dimensions, those of the checkpoint in {} {}: leave them out, or choose another \
                  --out",
                 mismatched.map_or(0, WordVectors::dim),
                 folder.display(),
@@ -96,7 +97,7 @@ pub fn train_with_callback(
             if let Some(vectors) = vectors {
                 let words = initial.0.metadata.vocabulary.words();
                 let n_known = vectors.n_known(words.iter().map(String::as_str));
-                progress.say(&format!("{n_known} of {} words begin with their vectors", words.len()));
+                progress.say(&format!("{n_known} of {} have pretrained vectors", counted(words.len(), "word")));
             }
             initial
         }
@@ -105,13 +106,13 @@ pub fn train_with_callback(
     let train = SegmentLoader::new(splits.train, &trainer.metadata, trainer.settings.stride_frames);
     ensure!(
         !train.is_empty(),
-        "{}: no motion to train on is as long as a segment of {} frames",
+        "{}: no training motion is as long as a segment ({} frames)",
         source.path(),
         needed.n_frames
     );
     progress.say(&format!(
-        "{} segments of {}; what is learnt goes to {}",
-        train.len(),
+        "{} of {}; writing checkpoints to {}",
+        counted(train.len(), "segment"),
         source.path(),
         folder.display()
     ));
@@ -121,9 +122,9 @@ pub fn train_with_callback(
             TrainingSource::Dataset(dataset) => {
                 no_window::cause(dataset, Split::Validation, needed).unwrap_or_default()
             }
-            TrainingSource::Captures(_) => "`--hold-out NAME` names captures to validate on".to_owned(),
+            TrainingSource::Captures(_) => "use `--hold-out NAME` for captures to validate on".to_owned(),
         };
-        progress.say(&format!("no segment is held out, the figures below are on those to train on: {cause}"));
+        progress.say(&format!("no validation segments, so the metrics are those of training segments: {cause}"));
     }
     let held_out = ValidationSegments::new(&held_out, &train, trainer.settings.batch)?;
     let mut training = SequenceTraining { trainer: &mut trainer, loader: &train, held_out: &held_out };
@@ -172,7 +173,7 @@ fn initialise_words(trainer: &SequenceTrainer, vectors: Option<&WordVectors>) ->
     let SequenceMetadata { architecture, vocabulary, network, .. } = &trainer.metadata;
     let Some(encoder) = architecture::word_encoder(*architecture) else { return Ok(()) };
     let found = trainer.params().trainables().find(|(name, _)| *name == format!("{encoder}.embedding.weight"));
-    let (_, table) = found.context("this network has no table of words")?;
+    let (_, table) = found.context("the network has no word embedding")?;
     let mut rows = table.to_vec2::<f32>()?;
     rows[PADDING as usize] = vec![0.0; network.word];
     rows[UNKNOWN as usize] = vec![1.0; network.word];
@@ -290,14 +291,16 @@ fn resume(
         let metadata = &mut stored.speaker;
         ensure!(
             metadata.name == name && metadata.fps == fps && metadata.rate == rate,
-            "it is of {} at {}, sound at {} Hz, the data of {name} at {fps}, {rate} Hz; choose another --out",
+            "it is a model of {} at {}, audio at {} Hz; the data are of {name} at {fps}, {rate} Hz; choose another --out",
             metadata.name,
             metadata.fps,
             metadata.rate
         );
         let hash = source.hash()?;
         if metadata.dataset != hash {
-            differences.push("the data are others now: trained on with the checkpoint's means and words".to_owned());
+            differences.push(
+                "the data have changed: training continues with the checkpoint's means and vocabulary".to_owned(),
+            );
             metadata.dataset = hash;
         }
         Ok((stored, differences))
@@ -305,7 +308,7 @@ fn resume(
 }
 
 fn check(settings: &Seq2seqConfig) -> Result<()> {
-    ensure!(settings.batch > 1, "seq2seq.batch is {}: batch norm needs at least 2 segments", settings.batch);
+    ensure!(settings.batch > 1, "seq2seq.batch is {}: expected at least 2 (for batch norm)", settings.batch);
     ensure!(
         settings.checkpoint_every > 0 && settings.epoch_steps > 0 && settings.hidden > 0,
         "seq2seq.checkpoint_every, seq2seq.epoch_steps and seq2seq.hidden must be at least 1"

@@ -44,7 +44,7 @@ pub struct SequenceValidation {
 struct Sums {
     error: [f64; 2],
     change: [f64; 2],
-    apart: [f64; 2],
+    distance: [f64; 2],
     n_known: f64,
     n_segments: usize,
 }
@@ -72,12 +72,12 @@ impl ValidationSegments {
             }
             for (i, poses) in [&predicted, &batch.real].into_iter().enumerate() {
                 sums.change[i] += number(&differences(poses, 1)?.sqr()?.sum_all()?)?;
-                sums.apart[i] += number(&differences(poses, 0)?.abs()?.sum_all()?)?;
+                sums.distance[i] += number(&differences(poses, 0)?.abs()?.sum_all()?)?;
             }
         }
-        let Sums { error, change, apart, n_known, n_segments } = sums;
+        let Sums { error, change, distance, n_known, n_segments } = sums;
         let ratio = |[own, other]: [f64; 2], default: f64| if other > 0.0 { own / other } else { default };
-        let (energy, spread) = (ratio(change, 0.0), ratio(apart, 1.0));
+        let (energy, spread) = (ratio(change, 0.0), ratio(distance, 1.0));
         Ok(SequenceValidation {
             split: self.split.to_owned(),
             n_segments,

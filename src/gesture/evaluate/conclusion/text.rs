@@ -1,10 +1,11 @@
 //! Formats the table as text for a terminal.
 
+use super::conclusion::{better_than_constant_pose, depends_on_audio};
 use super::labels;
-use super::verdict::{better_than_nothing, depends_on_audio};
 use crate::evaluate::baseline::baselines::PredictorKind;
 use crate::evaluate::table::table::{FEW_BLOCKS, N_COSTLY_DRAWS, N_DRAWS, PredictorRow, Table};
 use crate::metrics::catalogue::Better;
+use orator_base::text::{counted, length};
 use std::fmt::Write as _;
 
 /// Text with the table, descriptions of its columns, and conclusions.
@@ -12,9 +13,11 @@ use std::fmt::Write as _;
 /// `all` shows every metric; otherwise arms, fingers and wrists are only shown for correct keypoints and joint errors.
 pub fn text(table: &Table, all: bool) -> String {
     let Table { n_clips, n_blocks, n_frames, secs, .. } = table;
-    let clips = if *n_clips == 1 { "clip" } else { "clips" };
     let mut text = format!(
-        "{n_clips} {clips}, {secs:.1} s, {n_frames} frames, {n_blocks} blocks of about {:.1} s\n\n",
+        "{}, {}, {n_frames} frames, {} of about {:.1} s\n\n",
+        counted(*n_clips, "clip"),
+        length(*secs),
+        counted(*n_blocks, "block"),
         table.block_length.secs
     );
     let is_shown = |i: &usize| (all || is_main(table, *i)) && table.is_shown(*i);
@@ -34,14 +37,14 @@ pub fn text(table: &Table, all: bool) -> String {
     for (i, name) in first.iter().enumerate() {
         text += &line(name, &mut columns.iter().map(|cells| cells[i + 2].as_str()));
     }
-    let few = if *n_blocks < FEW_BLOCKS { "; with so few blocks they say little" } else { "" };
+    let few = if *n_blocks < FEW_BLOCKS { "; unreliable with so few blocks" } else { "" };
     let _ = writeln!(
         text,
-        "\nin brackets: 95 % intervals, {N_DRAWS} draws of the blocks (Frechet distances, correlations: {N_COSTLY_DRAWS}){few}"
+        "\nin brackets: 95 % bootstrap intervals, {N_DRAWS} draws of the blocks ({N_COSTLY_DRAWS} for Frechet distances and correlations){few}"
     );
-    text += "which way is better stands before each name: more, less, like the truth\n";
+    text += "before each name: whether higher values, lower values, or values close to those of the truth are better\n";
     if !all {
-        text += "--all shows the other figures of arms, fingers and wrists too\n";
+        text += "--all also shows the other metrics of arms, fingers and wrists\n";
     }
     for row in &table.rows {
         let _ = writeln!(text, "{}: {}", row.name(), row.description);
@@ -54,9 +57,9 @@ pub fn text(table: &Table, all: bool) -> String {
     }
     for own in table.predictions() {
         let _ = writeln!(text);
-        for verdict in [better_than_nothing(table, own), depends_on_audio(table, own)] {
+        for conclusion in [better_than_constant_pose(table, own), depends_on_audio(table, own)] {
             let of = own.checkpoint.as_ref().map(|of| format!("{}: ", of.name)).unwrap_or_default();
-            let _ = writeln!(text, "{of}{}", verdict.text());
+            let _ = writeln!(text, "{of}{}", conclusion.text());
         }
     }
     text
@@ -92,10 +95,10 @@ fn is_main(table: &Table, index: usize) -> bool {
 fn row_label(table: &Table, index: usize) -> String {
     let definition = &table.definitions[index];
     let sign = match definition.better {
-        Better::Higher => "more",
-        Better::Lower => "less",
-        Better::NearerTruth => "like",
-        Better::Neither => "    ",
+        Better::Higher => "higher",
+        Better::Lower => "lower ",
+        Better::NearerTruth => "truth ",
+        Better::Neither => "      ",
     };
     let unit = labels::unit(definition);
     let unit = if unit.is_empty() { String::new() } else { format!(" ({unit})") };

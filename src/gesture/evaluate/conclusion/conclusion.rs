@@ -8,6 +8,7 @@ use crate::evaluate::table::sign_flips::{MIN_BLOCKS, TestedDifference};
 use crate::evaluate::table::table::{PredictorRow, Table};
 use crate::metrics::catalogue::Better;
 use orator_base::math::estimate::Estimate;
+use orator_base::text::counted;
 use serde::Serialize;
 
 /// Aspect of motion that a metric describes.
@@ -15,7 +16,6 @@ use serde::Serialize;
 #[serde(rename_all = "snake_case")]
 pub enum Aspect {
     /// Position of the joints at each moment.
-    #[serde(rename = "place")]
     Position,
     /// Poses and their sequence.
     Poses,
@@ -37,7 +37,6 @@ pub enum Answer {
 /// Vote of a metric.
 #[derive(Clone, Debug, Serialize)]
 pub struct Vote {
-    #[serde(rename = "figure")]
     pub metric: String,
     pub aspect: Aspect,
     /// Predictor of the comparison.
@@ -45,13 +44,13 @@ pub struct Vote {
     pub answer: Answer,
     /// Gain in the unit of the metric with its simultaneous interval over all votes; below 0: worse.
     pub gain: Estimate,
-    /// p value, adjusted for all votes of the verdict.
+    /// p value, adjusted for all votes of the conclusion.
     pub p: f64,
 }
 
 /// Answer to a question with the votes behind it.
 #[derive(Clone, Debug, Serialize)]
-pub struct Verdict {
+pub struct Conclusion {
     /// One of `yes`, `no`, `in part`, `undecided`.
     pub word: &'static str,
     /// Full sentence without the votes.
@@ -61,12 +60,12 @@ pub struct Verdict {
 }
 
 /// Compares the prediction with the better of the constant poses.
-pub fn better_than_nothing(table: &Table, own: &PredictorRow) -> Verdict {
-    let question = "Is it better than doing nothing?";
+pub fn better_than_constant_pose(table: &Table, own: &PredictorRow) -> Conclusion {
+    let question = "Is the prediction better than a constant pose?";
     let aspects = [Aspect::Position, Aspect::Poses, Aspect::Movement];
     let votes = votes(table, own, &aspects, |index| better_constant_pose(table, index));
-    if let Some(why) = inconclusive_because(table, &votes) {
-        return undecided(question, &why);
+    if let Some(reason) = inconclusive_because(table, &votes) {
+        return undecided(question, &reason);
     }
     let of = |aspect: Aspect| votes.iter().filter(move |vote| vote.aspect == aspect);
     let others = || votes.iter().filter(|vote| vote.aspect != Aspect::Position);
@@ -81,10 +80,10 @@ pub fn better_than_nothing(table: &Table, own: &PredictorRow) -> Verdict {
     let position = of(Aspect::Position).next().map(|_| combined(of(Aspect::Position)));
     let rest = others().next().map(|_| rest);
     let position_text = match position {
-        Some(Answer::Yes) => "it is nearer to where the speaker is than a pose that never moves",
-        Some(Answer::No) => "a pose that never moves is nearer to where the speaker is",
-        Some(Answer::Undecided) => "it is not shown to be nearer to where the speaker is than a pose that never moves",
-        None => "no metric of this convention compares positions with a pose that never moves",
+        Some(Answer::Yes) => "its joint positions are closer to the truth than a constant pose",
+        Some(Answer::No) => "the joint positions of a constant pose are closer to the truth",
+        Some(Answer::Undecided) => "its joint positions are not shown to be closer to the truth than a constant pose",
+        None => "no metric of this convention compares joint positions with a constant pose",
     };
     let motion_text = match rest {
         Some(Answer::Yes) => "its poses and movements are more like the speaker's",
@@ -100,9 +99,8 @@ pub fn better_than_nothing(table: &Table, own: &PredictorRow) -> Verdict {
         _ => "undecided",
     };
     let oracle = table.row(PredictorKind::MeanPose).is_some_and(|row| row.description.contains("oracle"));
-    let oracle =
-        if oracle { " (The pose is taken from the truth itself, which no predictor knows: a hard rival.)" } else { "" };
-    Verdict {
+    let oracle = if oracle { " (The constant pose is computed from the truth itself, which favours it.)" } else { "" };
+    Conclusion {
         word,
         sentence: format!("{question} {}: {position_text}; {motion_text}.{oracle}", capitalised(word)),
         votes,
@@ -134,48 +132,49 @@ fn answer(tested: &TestedDifference) -> Answer {
 
 /// Compares the prediction with a mismatched one: its own shifted prediction if there is one, since the motion of
 /// another clip also differs in posture.
-pub fn depends_on_audio(table: &Table, own: &PredictorRow) -> Verdict {
-    let question = "Does it hear?";
+pub fn depends_on_audio(table: &Table, own: &PredictorRow) -> Conclusion {
+    let question = "Does the prediction depend on the audio?";
     let of_own =
         |kind: PredictorKind| table.rows.iter().find(|row| row.kind == kind && row.checkpoint == own.checkpoint);
     let other = of_own(PredictorKind::LatePrediction).or_else(|| of_own(PredictorKind::MismatchedPrediction));
-    let Some(other) = other else { return undecided(question, "there is nothing to hold it against") };
+    let Some(other) = other else { return undecided(question, "there is no mismatched prediction to compare with") };
     let votes = votes(table, own, &[Aspect::Position, Aspect::Beat], |_| Some(other));
-    if let Some(why) = inconclusive_because(table, &votes) {
-        return undecided(question, &why);
+    if let Some(reason) = inconclusive_because(table, &votes) {
+        return undecided(question, &reason);
     }
     let (word, description) = match combined(votes.iter()) {
-        Answer::Yes => ("yes", "its motion fits its own sound better than a motion made for another sound or moment"),
-        Answer::No => ("no", "a motion made for another sound or moment fits better"),
+        Answer::Yes => {
+            ("yes", "its motion matches its own audio better than motion generated for other audio or another time")
+        }
+        Answer::No => ("no", "motion generated for other audio or another time matches its audio better"),
         Answer::Undecided if votes.iter().any(|vote| vote.answer == Answer::Yes) => {
-            ("in part", "its motion fits its own sound better in some figures and worse in others")
+            ("in part", "its motion matches its own audio better in some metrics and worse in others")
         }
         Answer::Undecided => (
             "undecided",
-            "its motion is not shown to fit its own sound better than a motion made for another sound or moment",
+            "its motion is not shown to match its own audio better than motion generated for other audio or another time",
         ),
     };
-    Verdict { word, sentence: format!("{question} {}: {description}.", capitalised(word)), votes }
+    Conclusion { word, sentence: format!("{question} {}: {description}.", capitalised(word)), votes }
 }
 
-fn undecided(question: &str, why: &str) -> Verdict {
-    Verdict { word: "undecided", sentence: format!("{question} Undecided: {why}."), votes: Vec::new() }
+fn undecided(question: &str, reason: &str) -> Conclusion {
+    Conclusion { word: "undecided", sentence: format!("{question} Undecided: {reason}."), votes: Vec::new() }
 }
 
 /// Reason why no conclusion can be drawn from these votes, if any.
 fn inconclusive_because(table: &Table, votes: &[Vote]) -> Option<String> {
     if table.trained_on {
-        return Some("the speaker was trained on these very clips; use another split".to_owned());
+        return Some("the model was trained on these clips; evaluate another split".to_owned());
     }
     if votes.is_empty() {
-        return Some("this convention has no figure that could say".to_owned());
+        return Some("no metric of this convention measures it".to_owned());
     }
     let (n_blocks, secs) = (table.n_blocks, table.block_length.secs);
-    let (blocks, are) = if n_blocks == 1 { ("block", "is") } else { ("blocks", "are") };
+    let (blocks, are) = (counted(n_blocks, "block"), if n_blocks == 1 { "is" } else { "are" });
     (n_blocks < MIN_BLOCKS).then(|| {
-        let least = MIN_BLOCKS;
         format!(
-            "{n_blocks} {blocks} of about {secs:.1} s {are} too few to say (at least {least}); hold out more motion"
+            "{blocks} of about {secs:.1} s {are} too few for a conclusion (at least {MIN_BLOCKS} are needed); hold out more motion"
         )
     })
 }
@@ -212,17 +211,17 @@ fn aspect(table: &Table, index: usize) -> Option<Aspect> {
     let starts = |start: &str| definition.name.starts_with(start);
     // The metric for the whole body, or else for the first part that has a value.
     let has_name = |i: &usize| table.definitions[*i].name == definition.name && table.is_shown(*i);
-    let is_whole = (0..table.definitions.len()).find(has_name) == Some(index);
+    let is_main_part = (0..table.definitions.len()).find(has_name) == Some(index);
     match definition.better {
         Better::Neither => None,
         // Only the first of several thresholds, planes and parts.
         _ if starts("pck") => is_first("pck").then_some(Aspect::Position),
         _ if starts("maje") => Some(Aspect::Position),
         _ if starts("mpjpe") => is_first("mpjpe").then_some(Aspect::Position),
-        _ if starts("frechet") => is_whole.then_some(Aspect::Poses),
+        _ if starts("frechet") => is_main_part.then_some(Aspect::Poses),
         _ if starts("hellinger") => is_first("hellinger").then_some(Aspect::Movement),
         _ if starts("jerk") => is_first("jerk").then_some(Aspect::Movement),
-        _ if starts("beat") => is_whole.then_some(Aspect::Beat),
+        _ if starts("beat") => is_main_part.then_some(Aspect::Beat),
         _ => None,
     }
 }
@@ -241,7 +240,7 @@ fn combined<'a>(votes: impl Iterator<Item = &'a Vote>) -> Answer {
     }
 }
 
-impl Verdict {
+impl Conclusion {
     /// Sentence, followed by a line for each kind of vote, such as `better: a; b`.
     pub fn text(&self) -> String {
         let of = |answer: Answer| {
@@ -249,7 +248,7 @@ impl Verdict {
                 self.votes.iter().filter(|v| v.answer == answer).map(|v| v.metric.as_str()).collect();
             names.join("; ")
         };
-        let parts = [(Answer::Yes, "better"), (Answer::No, "worse"), (Answer::Undecided, "not told apart")];
+        let parts = [(Answer::Yes, "better"), (Answer::No, "worse"), (Answer::Undecided, "no significant difference")];
         let parts = parts.into_iter().map(|(answer, word)| (word, of(answer))).filter(|(_, names)| !names.is_empty());
         parts.fold(self.sentence.clone(), |text, (word, names)| format!("{text}\n  {word}: {names}"))
     }

@@ -16,20 +16,20 @@ const NAMES: [(&str, &str); 25] = [
     ("acceleration", "acceleration"),
     ("jerk", "jerk"),
     ("speed", "speed"),
-    ("hellinger", "speeds unlike the truth's (Hellinger)"),
+    ("hellinger", "speed distribution (Hellinger distance)"),
     ("average_pairwise_distance", "distance between poses"),
-    ("bone_change", "bone change per frame"),
-    ("bone_deviation", "bone deviation"),
-    ("maje", "mean coordinate error after the seed"),
+    ("bone_change", "bone length change per frame"),
+    ("bone_deviation", "bone length deviation"),
+    ("maje", "mean coordinate error after the seed frames"),
     ("beat_consistency", "beat consistency"),
     ("beat_alignment", "beat alignment"),
     ("frechet_pose", "Frechet distance, poses"),
-    ("frechet_window", "Frechet distance, movements of a second"),
-    ("frechet_embedding", "Frechet distance, movements, embedded"),
+    ("frechet_window", "Frechet distance, windows of a second"),
+    ("frechet_embedding", "Frechet distance, embedded windows"),
     ("cca", "canonical correlation"),
     ("angle_error", "angle error"),
     ("angular_speed", "angular speed"),
-    ("hellinger_angular_speed", "angular speeds unlike the truth's (Hellinger)"),
+    ("hellinger_angular_speed", "distribution of angular speeds (Hellinger distance)"),
     ("angle_correlation", "correlation of angles"),
 ];
 
@@ -74,12 +74,12 @@ pub fn part(definition: &Definition) -> &'static str {
     }
 }
 
-/// Short text for the better direction: more, less, or as the ground truth.
+/// Short text for the better direction: higher, lower, or close to the ground truth.
 pub const fn direction(better: Better) -> &'static str {
     match better {
-        Better::Higher => "more is better",
-        Better::Lower => "less is better",
-        Better::NearerTruth => "as the truth is best",
+        Better::Higher => "higher is better",
+        Better::Lower => "lower is better",
+        Better::NearerTruth => "closest to the truth is best",
         Better::Neither => "",
     }
 }
