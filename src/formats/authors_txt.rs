@@ -23,7 +23,7 @@ const NECK_TOLERANCE: f32 = 1e-3;
 ///
 /// The line with a wrong number of values, an invalid number or a neck away from the origin; a file without frames.
 pub fn read(path: &Path, fps: FrameRate) -> anyhow::Result<Motion> {
-    let text = input::read_text(path, input::MOST_DATA).with_context(|| format!("cannot read {}", path.display()))?;
+    let text = input::read_text(path, input::MAX_DATA).with_context(|| format!("cannot read {}", path.display()))?;
     parse(&text, fps).with_context(|| format!("{} is not motion in the authors' layout", path.display()))
 }
 

@@ -28,7 +28,7 @@ pub fn facts(path: &Path) -> anyhow::Result<Value> {
 /// Applies `parse` to the contents of a file. Errors name the file.
 pub fn read_with<T>(path: &Path, parse: fn(&[u8]) -> anyhow::Result<T>) -> anyhow::Result<T> {
     let bytes =
-        input::read(path, input::MOST_DATA).with_context(|| format!("cannot read the weights {}", path.display()))?;
+        input::read(path, input::MAX_DATA).with_context(|| format!("cannot read the weights {}", path.display()))?;
     parse(&bytes).with_context(|| format!("{} is not a checkpoint or weights file", path.display()))
 }
 

@@ -46,7 +46,7 @@ pub fn is_description(path: &Path) -> bool {
 /// The description is unreadable, has no plausible frame rate, or is for a number of frames other than `n_frames`.
 pub fn rate(path: &Path, n_frames: usize) -> Result<Option<FrameRate>> {
     let (description_path, file) = (path_of(path), path.display());
-    let text = match input::read(&description_path, input::MOST_TEXT) {
+    let text = match input::read(&description_path, input::MAX_TEXT) {
         Ok(text) => text,
         Err(error) if error.kind() == ErrorKind::NotFound => return Ok(None),
         Err(error) => return Err(error).with_context(|| format!("cannot read {}", description_path.display())),

@@ -121,7 +121,7 @@ impl MediaInfo {
     ///
     /// The file is unreadable or incomplete, or has an invalid duration or frame rate.
     pub fn read(path: &Path) -> Result<Self> {
-        let bytes = input::read(path, input::MOST_TEXT).with_context(|| format!("cannot read {}", path.display()))?;
+        let bytes = input::read(path, input::MAX_TEXT).with_context(|| format!("cannot read {}", path.display()))?;
         let info: Self = serde_json::from_slice(&bytes).with_context(|| format!("{} is incomplete", path.display()))?;
         for (field, secs) in [("duration_secs", info.duration_secs), ("audio_secs", info.audio_secs.unwrap_or(0.0))] {
             ensure!(secs.is_finite() && secs >= 0.0, "{}: `{field}` is {secs}, expected 0 or more", path.display());

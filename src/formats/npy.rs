@@ -17,7 +17,7 @@ use std::path::Path;
 /// Reads a motion at `fps` from an f32 or f64 array [T, 49, 3] or [T, 147] (joint by joint), in metres. Joints with a
 /// non-finite coordinate are missing and cleared in the mask.
 pub fn read(path: &Path, fps: FrameRate) -> anyhow::Result<Motion> {
-    let bytes = input::read(path, input::MOST_DATA).with_context(|| format!("cannot open {}", path.display()))?;
+    let bytes = input::read(path, input::MAX_DATA).with_context(|| format!("cannot open {}", path.display()))?;
     let numbers = match typed::<f32>(&bytes) {
         Ok(None) => parse::<f64, IxDyn>(&bytes).map(|array| array.mapv(|v| v as f32)),
         Ok(Some(array)) => Ok(array),

@@ -12,7 +12,7 @@ use std::path::Path;
 ///
 /// The file is unreadable, not in the format of the segment stage, or has an offset of 60 s or more.
 pub fn read(path: &Path) -> Result<Option<SoundOffset>> {
-    let bytes = match input::read(path, input::MOST_TEXT) {
+    let bytes = match input::read(path, input::MAX_TEXT) {
         Ok(bytes) => bytes,
         Err(error) if error.kind() == ErrorKind::NotFound => return Ok(None),
         Err(error) => return Err(error).with_context(|| format!("cannot read {}", path.display())),

@@ -191,11 +191,11 @@ impl StatusCheck<'_> {
             Some(earlier) => State::Stale(DirtyReason::WaitsFor { stage: earlier.to_string() }),
             None => runner::state(&**stage, unit, &self.pipeline.config().settings.work.dir, self.hashes),
         };
-        if !matches!(state, State::Fresh(_)) {
+        if !matches!(state, State::UpToDate(_)) {
             waits_for.get_or_insert(name);
         }
         match state {
-            State::Fresh(record) => status(UnitState::Fresh, record.line),
+            State::UpToDate(record) => status(UnitState::Fresh, record.line),
             State::Stale(why @ DirtyReason::NeverDone) => status(UnitState::NeverDone, why.to_string()),
             State::Stale(why @ DirtyReason::WaitsFor { .. }) => status(UnitState::Waits, why.to_string()),
             State::Stale(why) => status(UnitState::Stale, why.to_string()),

@@ -59,7 +59,7 @@ impl Bvh {
     /// The file is unreadable or not BVH; the message names what was expected.
     pub fn read(path: &Path) -> Result<Self> {
         let text =
-            input::read_text(path, input::MOST_DATA).with_context(|| format!("cannot read {}", path.display()))?;
+            input::read_text(path, input::MAX_DATA).with_context(|| format!("cannot read {}", path.display()))?;
         Self::parse(&text).with_context(|| format!("{} is no readable BVH", path.display()))
     }
 

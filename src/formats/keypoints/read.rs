@@ -39,7 +39,7 @@ pub fn read(path: &Path) -> Result<FoundKeypoints> {
 }
 
 fn read_file(path: &Path) -> Result<FoundKeypoints> {
-    let bytes = input::read(path, input::MOST_DATA).with_context(|| format!("cannot read {}", path.display()))?;
+    let bytes = input::read(path, input::MAX_DATA).with_context(|| format!("cannot read {}", path.display()))?;
     match bytes.get(..4) {
         _ if path.extension().is_some_and(|end| end == "npz") => arrays::read_npz(path),
         Some(b"PK\x03\x04") => arrays::read_npz(path),

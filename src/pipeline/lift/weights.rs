@@ -61,7 +61,7 @@ fn load<T>(
         return parse(builtin, kind, make).with_context(|| format!("the built-in {kind} does not fit this program"));
     }
     let bytes =
-        input::read(path, input::MOST_DATA).with_context(|| format!("cannot read the weights {}", path.display()))?;
+        input::read(path, input::MAX_DATA).with_context(|| format!("cannot read the weights {}", path.display()))?;
     parse(&bytes, kind, make)
         .with_context(|| format!("{} does not hold weights of `orator-lab train lifter --part {part}`", path.display()))
 }

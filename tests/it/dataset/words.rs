@@ -3,7 +3,7 @@
 
 use crate::fixtures::media::lifted_videos::{settings, shard_with_words, video};
 use orator_base::stage::Unit;
-use orator_base::stage::ledger::{TranscriptAccount, WordCount};
+use orator_base::stage::ledger::{TranscriptReport, WordCount};
 use orator_base::stage::progress::Silent;
 use orator_base::types::time::FrameRate;
 use orator_dataset::config::DatasetConfig;
@@ -63,7 +63,7 @@ fn words(dir: &Path) -> BTreeMap<String, Option<Vec<Word>>> {
     samples.into_iter().map(|sample| (sample.key.to_string(), dataset.read(&sample).unwrap().words)).collect()
 }
 
-fn account(dir: &Path, name: &str) -> TranscriptAccount {
+fn account(dir: &Path, name: &str) -> TranscriptReport {
     let lines = read_ledgers(dir).unwrap().into_iter();
     lines.filter(|line| line.file.starts_with(name)).find_map(|line| line.ledger.words).unwrap()
 }

@@ -114,7 +114,7 @@ fn what_the_files_do_not_say_is_asked_for_by_its_key() {
     std::fs::write(dir.path().join("other.wav"), "").unwrap();
     for (keys, expected) in [
         ("keypoints = \"kp\"", "kp/clip: keypoints have no sound; write `audio = [\"FOLDER\"]` beside `keypoints`"),
-        ("keypoints = \"kp\"\naudio = \"none\"", "the sound of this stage: cannot read"),
+        ("keypoints = \"kp\"\naudio = \"none\"", "cannot hash the sound: cannot read"),
         ("keypoints = [\"kp\", \"none/*.npz\"]\naudio = \"other.wav\"", "none/*.npz: no file matches"),
         ("keypoints = \"kp\"\naudio = \"other.wav\"", "kp/clip: it does not say its frames a second; write `fps = 25`"),
         (
