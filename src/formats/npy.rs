@@ -28,7 +28,7 @@ pub fn read(path: &Path, fps: FrameRate) -> anyhow::Result<Motion> {
     let is_motion = matches!(shape[..], [_, N_JOINTS, 3]) || matches!(shape[..], [_, n] if n == 3 * N_JOINTS);
     ensure!(
         is_motion,
-        "{} has the shape {shape:?}, expected [frames, {N_JOINTS}, 3] or [frames, {}]",
+        "{} has shape {shape:?}, expected [frames, {N_JOINTS}, 3] or [frames, {}]",
         path.display(),
         3 * N_JOINTS
     );
@@ -190,25 +190,25 @@ impl Layout {
         ensure!(bytes.starts_with(MAGIC), "not a .npy file of version 1.0");
         let length = match bytes.get(8..10) {
             Some(&[low, high]) => usize::from(u16::from_le_bytes([low, high])),
-            _ => bail!("the .npy header is cut off"),
+            _ => bail!("the .npy header is truncated"),
         };
-        let text = bytes.get(10..10 + length).context("the .npy header is cut off")?;
+        let text = bytes.get(10..10 + length).context("the .npy header is truncated")?;
         let text = std::str::from_utf8(text).context("the .npy header is not text")?;
         let descr = element.descr();
         ensure!(text.contains(&format!("'descr': '{descr}'")), "the array does not hold {descr} values");
         ensure!(text.contains("'fortran_order': False"), "the array is not in C order");
         let shape = text.split_once("'shape': (").and_then(|(_, rest)| rest.split_once(')'));
-        let (shape, _) = shape.context("the .npy header names no shape")?;
+        let (shape, _) = shape.context("the .npy header has no shape")?;
         let numbers = shape.split(',').map(str::trim).filter(|n| !n.is_empty()).map(str::parse::<usize>);
-        let shape = numbers.collect::<Result<Vec<_>, _>>().context("the .npy header's shape is not numbers")?;
+        let shape = numbers.collect::<Result<Vec<_>, _>>().context("the shape in the .npy header is not numeric")?;
         let Some((&n_rows, rest)) = shape.split_first() else { bail!("the array has no rows") };
-        ensure!(rest == row, "the array has the shape {shape:?}, expected [T, {row:?}]");
+        ensure!(rest == row, "the array has shape {shape:?}, expected [T, {row:?}]");
         let layout =
             Layout { data_at: 10 + length, n_rows, row_bytes: row.iter().product::<usize>() * element.bytes() };
         let data_bytes = n_rows.checked_mul(layout.row_bytes).and_then(|n| n.checked_add(layout.data_at));
         ensure!(
             data_bytes.is_some_and(|n| n as u64 == file_bytes),
-            "the header promises {n_rows} rows, which is not the size of the file ({file_bytes} bytes)"
+            "the header states {n_rows} rows, which does not match the file size ({file_bytes} bytes)"
         );
         Ok(layout)
     }

@@ -18,8 +18,13 @@ pub fn read(path: &Path) -> Result<Option<SoundOffset>> {
         Err(error) => return Err(error).with_context(|| format!("cannot read {}", path.display())),
     };
     let offset: SoundOffset = serde_json::from_slice(&bytes)
-        .with_context(|| format!("{} is not as the segment stage writes it", path.display()))?;
-    ensure!(offset.secs.abs() < 60.0, "{}: an offset of {} s", path.display(), offset.secs);
+        .with_context(|| format!("{} is damaged or not written by the segment stage", path.display()))?;
+    ensure!(
+        offset.secs.abs() < 60.0,
+        "{}: invalid offset {:.3} s: expected less than 60 s",
+        path.display(),
+        offset.secs
+    );
     Ok(Some(offset))
 }
 

@@ -129,7 +129,7 @@ impl Stage for ExtractStage {
         facts.insert("n_cuts".into(), n_cuts.into());
         let kept = |damage: &String| format!("; damaged, what could be read is kept: {damage}");
         let damage = media.damage.as_ref().map(kept).unwrap_or_default();
-        let remarks = media.remarks().iter().fold(String::new(), |text, remark| text + "; " + remark);
+        let remarks = media.notes().iter().fold(String::new(), |text, remark| text + "; " + remark);
         Ok(Report { line: format!("{n_frames} frames at {rate}, {cuts}, {sound}{remarks}{damage}"), facts })
     }
 }

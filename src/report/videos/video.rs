@@ -46,7 +46,7 @@ impl VideoSummary {
             video.note("The file is gone: there are no pictures of it.");
         }
         if let Ok(media) = MediaInfo::read(&Artifact::MediaInfo.path(work, unit)) {
-            media.remarks().iter().for_each(|remark| video.note(&format!("In the file: {remark}.")));
+            media.notes().iter().for_each(|remark| video.note(&format!("In the file: {remark}.")));
             if let Some(reason) = media.not_judged() {
                 video.note(&format!("Made {reason}."));
             }

@@ -120,7 +120,7 @@ fn what_is_of_another_rate_is_measured_beside_it_by_time() {
     assert!(code == 1 && said.contains("a rate is wrong (--fps)"), "{said}");
     std::fs::write(path_of(&dir.join("made.npy")), "{\"fps\": 30}").unwrap();
     let same = done(dir, args);
-    assert!(!same["notes"].to_string().contains("does not say its rate"), "{}", same["notes"]);
+    assert!(!same["notes"].to_string().contains("has no frame rate"), "{}", same["notes"]);
     let noted = done(dir, &format!("{args} --fps 25"));
     assert!(
         noted["notes"].to_string().contains("made.npy says 30 fps: 25 fps (--fps) is not for it"),

@@ -244,7 +244,7 @@ fn what_can_be_mended_is_measured_with_a_note() {
     noted("t.npy", "longer.npy", &[], "120 frames of truth, 114 of prediction: cut to 114");
     noted("t.npy", "away.npy", &[], "neck stands 0.87 m from the origin");
     noted("t.npy", "30.npz", &[], "at 30 fps was resampled to 15 fps");
-    let exact = noted("t.txt", "t.npy", &[], "does not say its rate");
+    let exact = noted("t.txt", "t.npy", &[], "has no frame rate");
     assert_eq!(value(&exact, "pck_2d", "all", "prediction"), 1.0);
     // telephone sound has onsets, and three hours of sound beside eight seconds of motion are no matter
     let phone = noted("t.npy", "few-nan.npy", &["--audio", "phone.wav", "--convention", "aist"], "NaN");
