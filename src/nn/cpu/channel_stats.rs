@@ -1,8 +1,8 @@
 //! Statistics over the rows of a matrix whose columns are channels, and batch norm followed by leaky ReLU on such
 //! rows, on plain slices. Sums run over blocks of fixed size in a fixed order.
 
+use super::spin_pool::{parallel_for, parallel_map};
 use super::tensor::{GRAIN, LANES, Scalar, SharedOutputPtr, written};
-use super::thread_team::{parallel_for, parallel_map};
 use super::vectorised::vectorised;
 use rayon::prelude::*;
 

@@ -2,8 +2,8 @@
 //! positions of a padded copy.
 
 use super::kernel::{MAX_ROWS, TileJob, TileSteps, panels};
+use super::spin_pool::parallel_for;
 use super::tensor::{LANES, Scalar, SharedOutputPtr, aligned, written};
-use super::thread_team::parallel_for;
 use std::ops::Range;
 
 /// Weights in tile order: consecutive panels of columns; each panel has one row per summation step.

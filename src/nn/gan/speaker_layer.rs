@@ -54,7 +54,9 @@ fn of_speakers(table: &Tensor, speakers: &[u32], n_sounds: usize) -> Result<Tens
         return Ok(table.clone());
     }
     if speakers.len() != n_sounds || speakers.iter().any(|speaker| *speaker as usize >= n_speakers) {
-        candle_core::bail!("{n_sounds} sounds are of speakers {speakers:?}; the network knows {n_speakers}");
+        candle_core::bail!(
+            "speakers {speakers:?} of {n_sounds} inputs: expected one index below {n_speakers} for each input"
+        );
     }
     table.index_select(&Tensor::new(speakers, table.device())?, 0)
 }

@@ -64,7 +64,7 @@ pub fn max_difference(
     let (of_a, of_b) = (backward(&a)?, backward(&b)?);
     let mut worst = most(&a, &b)?;
     for var in &vars {
-        let (Some(a), Some(b)) = (of_a.get(var), of_b.get(var)) else { candle_core::bail!("no gradient") };
+        let (Some(a), Some(b)) = (of_a.get(var), of_b.get(var)) else { candle_core::bail!("an input has no gradient") };
         let difference = most(a, b)?;
         worst = if difference > worst || difference.is_nan() { difference } else { worst };
     }
@@ -90,12 +90,12 @@ pub fn check_thread_independence(
         pool.install(|| {
             let y = f(&inputs)?;
             let gradients = y.sqr()?.sum_all()?.backward()?;
-            let Some(gradient) = gradients.get(&weight) else { candle_core::bail!("no gradient") };
+            let Some(gradient) = gradients.get(&weight) else { candle_core::bail!("input {which} has no gradient") };
             Ok([y.flatten_all()?.to_vec1()?, gradient.flatten_all()?.to_vec1()?])
         })
     };
     if run(1)? != run(3)? {
-        candle_core::bail!("one thread and three give different numbers");
+        candle_core::bail!("the results for one and for three threads differ");
     }
     Ok(())
 }

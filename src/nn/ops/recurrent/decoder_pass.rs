@@ -1,4 +1,4 @@
-//! The decoder's loop over one piece of a batch, forward and backward.
+//! The decoder's loop over one chunk of a batch, forward and backward.
 
 use super::cell::{BackwardCell, ForwardCell, GruSizes, widen};
 use crate::cpu::packed_matrix::PackedMatrix;
@@ -15,8 +15,8 @@ pub struct DecoderSizes {
     pub cell: GruSizes,
     /// Number of keys of each sequence.
     pub n_keys: Vec<usize>,
-    /// Number of rows per piece.
-    pub piece: usize,
+    /// Number of rows per chunk.
+    pub chunk: usize,
 }
 
 impl DecoderSizes {
@@ -50,13 +50,13 @@ impl DecoderSizes {
             && !self.n_keys.contains(&0)
             && self.batch * self.n_previous * self.n_steps * self.cell.input * self.cell.hidden > 0;
         if !fits {
-            candle_core::bail!("decoder: starts {start:?} and keys {keys:?} do not fit {n_weights} weights");
+            candle_core::bail!("decoder: start {start:?} and keys {keys:?} do not fit {n_weights} weights");
         }
         Ok(())
     }
 }
 
-/// Lengths of the values that the forward pass of a piece of `n` rows saves, in order: gates of every step; states of
+/// Lengths of the values that the forward pass of a chunk of `n` rows saves, in order: gates of every step; states of
 /// every step and the initial one; attention weights, and inputs of the output layer, of every step with an output.
 fn saved_len(s: &DecoderSizes, n: usize) -> [usize; 4] {
     let (width, steps) = (s.cell.width(), s.n_previous + s.n_steps);
@@ -83,7 +83,7 @@ fn sequences(s: &DecoderSizes) -> impl Iterator<Item = (usize, usize)> {
     firsts.zip(s.n_keys.iter().copied())
 }
 
-/// Keys of a piece, padded to complete vectors.
+/// Keys of a chunk, padded to complete vectors.
 fn wide_keys<T: Scalar>(s: &DecoderSizes, keys: &[T]) -> Vec<T> {
     let mut wide = vec![T::zero(); keys.len() / s.cell.hidden * s.cell.width()];
     widen(keys, s.cell.hidden, &mut wide, s.cell.width());
