@@ -290,7 +290,7 @@ pub(crate) mod tests {
             let joints = Array3::from_shape_fn((n_frames, N_JOINTS, 3), |(t, j, k)| bits[(t * N_JOINTS + j) * 3 + k]);
             let motion = Motion::from_joints(FrameRate::new(15, 1), joints);
             let is_finite_joint = |t: usize, j: usize| (0..3).all(|k| motion.joints[[t, j, k]].is_finite());
-            proptest::prop_assert!(motion.mask.indexed_iter().all(|((t, j), seen)| *seen == is_finite_joint(t, j)));
+            proptest::prop_assert!(motion.mask.indexed_iter().all(|((t, j), is_visible)| *is_visible == is_finite_joint(t, j)));
             let folder = tempfile::tempdir().unwrap();
             let path = folder.path().join("a.npy");
             write(&path, &motion).unwrap();

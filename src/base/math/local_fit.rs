@@ -64,7 +64,7 @@ impl LocalFit {
         let mut noise = noise_around(values, self.noise_half);
         for (t, noise) in noise.iter_mut().enumerate() {
             let around = t.saturating_sub(self.smooth_half)..(t + self.smooth_half + 1);
-            let known = around.filter_map(|u| known.get(u)).fold(0.0, |most: f64, &known| most.max(known));
+            let known = around.filter_map(|u| known.get(u)).fold(0.0, |max: f64, &known| max.max(known));
             *noise = noise.max(known);
         }
         let half_width = (EXTENT * self.sigmas.last().copied().unwrap_or(0.0)).ceil() as usize;

@@ -54,7 +54,7 @@ pub fn max_difference(
     let vars = inputs.iter().map(Var::from_tensor).collect::<Result<Vec<_>>>()?;
     let inputs: Vec<Tensor> = vars.iter().map(|var| var.as_tensor().clone()).collect();
     let (a, b) = (a(&inputs)?, b(&inputs)?);
-    let most = |a: &Tensor, b: &Tensor| {
+    let largest_difference = |a: &Tensor, b: &Tensor| {
         let difference = (a - b)?.abs()?;
         // A maximum ignores NaN, a sum does not.
         let (largest, sum) = (difference.max_all()?.to_scalar::<f64>()?, difference.sum_all()?.to_scalar::<f64>()?);
@@ -62,10 +62,10 @@ pub fn max_difference(
     };
     let backward = |y: &Tensor| (y * pattern(y.dims(), 0.5)?)?.sum_all()?.backward();
     let (of_a, of_b) = (backward(&a)?, backward(&b)?);
-    let mut worst = most(&a, &b)?;
+    let mut worst = largest_difference(&a, &b)?;
     for var in &vars {
         let (Some(a), Some(b)) = (of_a.get(var), of_b.get(var)) else { candle_core::bail!("an input has no gradient") };
-        let difference = most(a, b)?;
+        let difference = largest_difference(a, b)?;
         worst = if difference > worst || difference.is_nan() { difference } else { worst };
     }
     Ok(worst)

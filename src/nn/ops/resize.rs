@@ -42,7 +42,7 @@ pub struct ResizedPart {
 impl ResizedPart {
     /// Returns the input frame at or before the position of frame `i` of the result, and the fraction of the distance
     /// to the next.
-    fn place(&self, i: usize) -> (usize, f64) {
+    fn source(&self, i: usize) -> (usize, f64) {
         let at = i as f64 * self.n_in as f64 / self.n_out as f64;
         let before = (at as usize).min(self.n_in.saturating_sub(1));
         (before, at - before as f64)
@@ -50,8 +50,8 @@ impl ResizedPart {
 
     /// Returns the required input frames.
     pub fn needed(&self) -> Range<usize> {
-        let last = self.place(self.frames.end.saturating_sub(1)).0;
-        self.place(self.frames.start).0..(last + 2).min(self.n_in)
+        let last = self.source(self.frames.end.saturating_sub(1)).0;
+        self.source(self.frames.start).0..(last + 2).min(self.n_in)
     }
 }
 
@@ -62,7 +62,7 @@ pub fn linear_part(x: &Tensor, part: &ResizedPart) -> Result<Tensor> {
         candle_core::bail!("cannot interpolate frames {:?} from {} of {needed:?}", part.frames, x.dim(1)?);
     }
     let of = part.frames.clone().map(|i| {
-        let (before, share) = part.place(i);
+        let (before, share) = part.source(i);
         (before - needed.start, (before - needed.start + 1).min(needed.len() - 1), share)
     });
     mix(x, None, FrameInterpolation { n_in: needed.len(), of: of.collect() })

@@ -64,13 +64,13 @@ fn saved_len(s: &DecoderSizes, n: usize) -> [usize; 4] {
 }
 
 /// Column of the output weights for a position in the padded input of the output layer; `None` in the padding.
-fn output_column(s: &DecoderSizes, place: usize) -> Option<usize> {
-    let (part, i) = (place / s.cell.width(), place % s.cell.width());
+fn output_column(s: &DecoderSizes, position: usize) -> Option<usize> {
+    let (part, i) = (position / s.cell.width(), position % s.cell.width());
     (i < s.cell.hidden).then_some(part * s.cell.hidden + i)
 }
 
 /// Position in the dropout mask of the first input of the output layer of row `row` at step `step`.
-fn drop_place(s: &DecoderSizes, row: usize, step: usize) -> usize {
+fn mask_position(s: &DecoderSizes, row: usize, step: usize) -> usize {
     (row * s.n_steps + step) * s.n_read() * s.cell.width()
 }
 
@@ -149,7 +149,7 @@ impl<'a, T: Scalar> ForwardDecoder<'a, T> {
                     attend(state, &keys[first * width..][..n * width], &mut weights[first..][..n], context);
                 }
                 if let Some(mask) = self.mask {
-                    drop_out(read, drop_place(s, begin + row, step), mask);
+                    drop_out(read, mask_position(s, begin + row, step), mask);
                 }
             }
             out.chunks_exact_mut(self.bias.len()).for_each(|row| row.copy_from_slice(&self.bias));
@@ -226,7 +226,7 @@ impl<'a, T: Scalar> BackwardDecoder<'a, T> {
                 for row in 0..n {
                     let of_read = &mut of_read[row * read_len..][..read_len];
                     if let Some(mask) = self.mask {
-                        drop_out(of_read, drop_place(s, begin + row, step), mask);
+                        drop_out(of_read, mask_position(s, begin + row, step), mask);
                     }
                     let (own, contexts) = of_read.split_at(width);
                     let of_state = &mut of_state[row * width..][..width];

@@ -139,7 +139,7 @@ impl GruOp {
     }
 
     /// Position of the output of step `k` in a row of the result; `None` for steps without output.
-    fn place(&self, direction: usize, k: usize, s: &PassSizes) -> Option<usize> {
+    fn position(&self, direction: usize, k: usize, s: &PassSizes) -> Option<usize> {
         let GruOptions { n_directions, last, .. } = self.options;
         let time = Self::time(direction, k, s);
         let at = |time: usize| (time * n_directions + direction) * s.cell.hidden;
@@ -179,9 +179,9 @@ impl CpuOperator for GruOp {
                     let x = &x[Self::time(direction, k, s) * s.cell.input..];
                     let (previous, next) = states[k * n * width..][..2 * n * width].split_at_mut(n * width);
                     cell.step(x, x_row, previous, gates, next);
-                    let Some(place) = self.place(direction, k, s) else { continue };
+                    let Some(position) = self.position(direction, k, s) else { continue };
                     for (y, state) in y.chunks_exact_mut(s.row).zip(next.chunks_exact(width)) {
-                        y[place..][..hidden].copy_from_slice(&state[..hidden]);
+                        y[position..][..hidden].copy_from_slice(&state[..hidden]);
                     }
                 }
             }
@@ -232,9 +232,9 @@ impl CpuOperator for GruOp {
                 let steps = gates.chunks_exact(n * 4 * width).zip(of_gates.chunks_exact_mut(n * 4 * width));
                 for (k, ((gates, of_gates), inputs)) in steps.zip(inputs.chunks_exact_mut(n * input)).enumerate().rev()
                 {
-                    if let Some(place) = self.place(direction, k, s) {
+                    if let Some(position) = self.position(direction, k, s) {
                         for (to, grad) in of_state.chunks_exact_mut(width).zip(grad.chunks_exact(s.row)) {
-                            to.iter_mut().zip(&grad[place..][..hidden]).for_each(|(to, grad)| *to += *grad);
+                            to.iter_mut().zip(&grad[position..][..hidden]).for_each(|(to, grad)| *to += *grad);
                         }
                     }
                     cell.step(gates, &states[k * n * width..][..n * width], &mut of_state, of_gates);
