@@ -195,7 +195,7 @@ impl Layout {
         let text = bytes.get(10..10 + length).context("the .npy header is truncated")?;
         let text = std::str::from_utf8(text).context("the .npy header is not text")?;
         let descr = element.descr();
-        ensure!(text.contains(&format!("'descr': '{descr}'")), "the array does not hold {descr} values");
+        ensure!(text.contains(&format!("'descr': '{descr}'")), "the array does not have {descr} values");
         ensure!(text.contains("'fortran_order': False"), "the array is not in C order");
         let shape = text.split_once("'shape': (").and_then(|(_, rest)| rest.split_once(')'));
         let (shape, _) = shape.context("the .npy header has no shape")?;
@@ -290,7 +290,7 @@ pub(crate) mod tests {
             let joints = Array3::from_shape_fn((n_frames, N_JOINTS, 3), |(t, j, k)| bits[(t * N_JOINTS + j) * 3 + k]);
             let motion = Motion::from_joints(FrameRate::new(15, 1), joints);
             let is_finite_joint = |t: usize, j: usize| (0..3).all(|k| motion.joints[[t, j, k]].is_finite());
-            proptest::prop_assert!(motion.mask.indexed_iter().all(|((t, j), is_visible)| *is_visible == is_finite_joint(t, j)));
+            proptest::prop_assert!(motion.mask.indexed_iter().all(|((t, j), m)| *m == is_finite_joint(t, j)));
             let folder = tempfile::tempdir().unwrap();
             let path = folder.path().join("a.npy");
             write(&path, &motion).unwrap();

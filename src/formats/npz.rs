@@ -152,10 +152,10 @@ impl Npz {
         let mut entry = entry.take(stated.saturating_add(1));
         let mut bytes = Vec::new();
         entry.by_ref().take(npy::MAX_HEADER_BYTES).read_to_end(&mut bytes).with_context(unreadable)?;
-        if let Some(promised) = npy::file_bytes(&bytes) {
+        if let Some(in_header) = npy::file_bytes(&bytes) {
             ensure!(
-                promised == stated,
-                "{}: array `{name}` has {stated} bytes, but its header states {promised}: copy or save the file again",
+                in_header == stated,
+                "{}: array `{name}` has {stated} bytes, but its header states {in_header}: copy or save the file again",
                 self.path.display()
             );
         }

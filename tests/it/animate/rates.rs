@@ -147,5 +147,5 @@ fn units_of_captured_joints_are_found_out() {
     let turned = Motion { joints: motion.joints.mapv(|v| -v.abs()), ..motion };
     joints_npz::write(&path.with_extension("npz"), &turned).unwrap();
     let notes = motion_file::read(&path.with_extension("npz"), None).unwrap().notes;
-    assert!(notes.iter().any(|note| note.contains("as where y points up")), "{notes:?}");
+    assert!(notes.iter().any(|note| note.contains("so y seems to point up")), "{notes:?}");
 }

@@ -216,7 +216,7 @@ fn bad_input_is_refused_in_clear_words() {
         (&["t.npy", "away.npy", "--audio", "t.npy"], "t.npy"),
         (&["t.npy", "away.npy", "--audio", "short.wav"], "is it the sound of another clip?"),
         (&["t.npy", "away.npy", "--alpha", "0"], "alpha of PCK"),
-        (&["t.npy", "away.npy", "--fps", "0"], "frames a second"),
+        (&["t.npy", "away.npy", "--fps", "0"], "expected 1 to 1000 fps"),
     ];
     for (args, says) in cases {
         let (sides, more) = args.split_at(2);

@@ -89,7 +89,7 @@ fn what_lies_in_no_picture_is_refused() {
         ("far", (|[x, y]| [x * 1e4, y * 1e4]) as fn([f32; 2]) -> [f32; 2], "implausible coordinates (median"),
         ("left", |[x, y]| [x - 4000.0, y], "have a negative x"),
         ("up", |[x, y]| [x, -y], "have a negative y"),
-        ("centred", |[x, y]| [x / 2000.0 - 1.0, y / 1500.0 - 1.0], "lie between -1 and 1"),
+        ("centred", |[x, y]| [x / 2000.0 - 1.0, y / 1500.0 - 1.0], "are between -1 and 1"),
     ] {
         let file = format!("{name}.npz");
         write(&dir.join(&file), &placed(&k, place), Some([4000, 3000]));
@@ -101,5 +101,5 @@ fn what_lies_in_no_picture_is_refused() {
         Array3::from_shape_fn((20, 52, 2), |(t, j, k)| ((t + 3 * j + k) % 7) as f32 / 7.0 * f32::from(u8::from(j > 0)));
     write_npy(dir.join("pats.npy"), &pats).unwrap();
     let (joints, said) = lift(dir, "pats.npy --size 640x480");
-    assert!(joints.is_none() && said.contains("pats.npy") && said.contains("no pixels"), "{said}");
+    assert!(joints.is_none() && said.contains("pats.npy") && said.contains("expected pixels of the video"), "{said}");
 }
