@@ -58,7 +58,7 @@ fn another_size_inside_a_file_is_brought_to_the_first() {
     }
     let (media, timeline, line) = extract(&path);
     assert_eq!((media.n_resizes, media.image_size, media.damage), (2, [128, 64], None));
-    assert!(line.contains("change their size 2 times"), "{line}");
+    assert!(line.contains("the image size changes 2 times"), "{line}");
     assert!(timeline.restart[15] && timeline.restart[30], "{:?}", timeline.restart);
     // The shape is the same at the first change: what is seen stays in its place.
     assert!(timeline.shot_score[15] < 0.2 && timeline.shot_score[30] == 1.0, "{:?}", timeline.shot_score);
