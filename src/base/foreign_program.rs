@@ -12,7 +12,7 @@ use tempfile::TempDir;
 /// The folder for temporary files is not writable.
 pub fn empty_folder() -> Result<TempDir> {
     let temp_dir = std::env::temp_dir();
-    tempfile::tempdir().with_context(|| format!("cannot make an empty folder in {} (TMPDIR)", temp_dir.display()))
+    tempfile::tempdir().with_context(|| format!("cannot create a temporary folder in {} (TMPDIR)", temp_dir.display()))
 }
 
 /// Returns a command that runs `program` in `folder`. The child looks up a bare name in PATH after it has changed to

@@ -8,9 +8,9 @@ use std::os::unix::fs::{FileTypeExt, OpenOptionsExt};
 use std::path::Path;
 
 /// Maximum size in bytes of a text file: configuration, JSON records, tables.
-pub const MOST_TEXT: u64 = 256 << 20;
+pub const MAX_TEXT: u64 = 256 << 20;
 /// Maximum size in bytes of a file of motion, keypoints or weights.
-pub const MOST_DATA: u64 = 4 << 30;
+pub const MAX_DATA: u64 = 4 << 30;
 
 /// Opens a regular file for reading.
 ///
@@ -35,19 +35,18 @@ pub fn open(path: impl AsRef<Path>) -> Result<File> {
 /// Reads a regular file completely.
 ///
 /// # Errors
-/// Those of [`open`]; the file is larger than `most_bytes`.
-pub fn read(path: impl AsRef<Path>, most_bytes: u64) -> Result<Vec<u8>> {
+/// Those of [`open`]; the file is larger than `max_bytes`.
+pub fn read(path: impl AsRef<Path>, max_bytes: u64) -> Result<Vec<u8>> {
     let file = open(path)?;
     let n_bytes = file.metadata()?.len();
     let mut bytes = Vec::new();
-    if n_bytes <= most_bytes {
+    if n_bytes <= max_bytes {
         bytes.try_reserve_exact(n_bytes as usize)?;
         // Limited again, because the file may grow while it is read.
-        file.take(most_bytes.saturating_add(1)).read_to_end(&mut bytes)?;
+        file.take(max_bytes.saturating_add(1)).read_to_end(&mut bytes)?;
     }
-    if n_bytes.max(bytes.len() as u64) > most_bytes {
-        let shown =
-            if most_bytes < 1 << 20 { format!("{most_bytes} bytes") } else { format!("{} MiB", most_bytes >> 20) };
+    if n_bytes.max(bytes.len() as u64) > max_bytes {
+        let shown = if max_bytes < 1 << 20 { format!("{max_bytes} bytes") } else { format!("{} MiB", max_bytes >> 20) };
         return Err(Error::new(ErrorKind::FileTooLarge, format!("it exceeds the limit of {shown}")));
     }
     Ok(bytes)
@@ -57,8 +56,8 @@ pub fn read(path: impl AsRef<Path>, most_bytes: u64) -> Result<Vec<u8>> {
 ///
 /// # Errors
 /// Those of [`read`]; the text is not UTF-8.
-pub fn read_text(path: impl AsRef<Path>, most_bytes: u64) -> Result<String> {
-    let text = String::from_utf8(read(path, most_bytes)?);
+pub fn read_text(path: impl AsRef<Path>, max_bytes: u64) -> Result<String> {
+    let text = String::from_utf8(read(path, max_bytes)?);
     text.map_err(|error| Error::new(ErrorKind::InvalidData, format!("it is not UTF-8 text: {}", error.utf8_error())))
 }
 
@@ -88,7 +87,7 @@ mod tests {
         let pipe = std::process::Command::new("mkfifo").arg(at("pipe")).status().unwrap();
         let _socket = std::os::unix::net::UnixListener::bind(at("socket")).unwrap();
         assert_eq!(read(at("a.txt"), 5).unwrap(), b"words");
-        assert_eq!(read_text(at("link.txt"), MOST_TEXT).unwrap(), "words");
+        assert_eq!(read_text(at("link.txt"), MAX_TEXT).unwrap(), "words");
         let error_of = |name: &str| read(at(name), 4).unwrap_err().to_string();
         assert_eq!(error_of("a.txt"), "it exceeds the limit of 4 bytes");
         assert!(pipe.success());

@@ -1,8 +1,8 @@
 //! Formatting of counts, numbers and durations for readers.
 
 /// Count with its noun: `1 video`, `2 videos`.
-pub fn counted(n: usize, what: &str) -> String {
-    if n == 1 { format!("1 {what}") } else { format!("{n} {what}s") }
+pub fn counted(n: usize, noun: &str) -> String {
+    if n == 1 { format!("1 {noun}") } else { format!("{n} {noun}s") }
 }
 
 /// Duration in whole seconds, with two units from a minute on: `59 s`, `1 min 01 s`, `2 h 03 min`.
@@ -54,9 +54,9 @@ pub fn with_unit(value: f64, unit: &str) -> String {
     format!("{} {unit}", number(value)).trim_end().to_owned()
 }
 
-/// Share of `part` in `whole` in percent; a dash if `whole` is not positive.
-pub fn percent(part: f64, whole: f64) -> String {
-    if whole > 0.0 { format!("{:.1} %", 100.0 * part / whole + 0.0) } else { "\u{2013}".to_owned() }
+/// Share of `part` in `total` in percent; a dash if `total` is not positive.
+pub fn percent(part: f64, total: f64) -> String {
+    if total > 0.0 { format!("{:.1} %", 100.0 * part / total + 0.0) } else { "\u{2013}".to_owned() }
 }
 
 #[cfg(test)]

@@ -23,7 +23,7 @@ impl VideoBones {
     /// # Errors
     /// An unreadable file, or invalid lengths (`check_lengths`).
     pub fn read(path: &Path) -> Result<Self> {
-        let bytes = input::read(path, input::MOST_TEXT).with_context(|| format!("cannot read {}", path.display()))?;
+        let bytes = input::read(path, input::MAX_TEXT).with_context(|| format!("cannot read {}", path.display()))?;
         let bones: Self = serde_json::from_slice(&bytes)
             .with_context(|| format!("{} is not a file of bone lengths: run the stage lift again", path.display()))?;
         check_lengths("lengths_metres", &bones.lengths_metres).with_context(|| path.display().to_string())?;

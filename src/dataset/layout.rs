@@ -24,7 +24,7 @@ pub const CHECKSUMS: &str = "checksums.b3";
 
 /// Reads a JSON file of a dataset; the error names the file.
 pub(crate) fn read_json<T: DeserializeOwned>(path: &Path) -> Result<T> {
-    let bytes = input::read(path, input::MOST_TEXT).with_context(|| format!("cannot read {}", path.display()))?;
+    let bytes = input::read(path, input::MAX_TEXT).with_context(|| format!("cannot read {}", path.display()))?;
     serde_json::from_slice(&bytes)
         .with_context(|| format!("{} is not a valid file of a dataset: run the dataset stage again", path.display()))
 }

@@ -114,7 +114,7 @@ impl Dataset {
     pub fn hash(&self) -> Result<String> {
         let path = self.dir.join(CHECKSUMS);
         let checksums =
-            input::read(&path, input::MOST_TEXT).with_context(|| format!("cannot read {}", path.display()))?;
+            input::read(&path, input::MAX_TEXT).with_context(|| format!("cannot read {}", path.display()))?;
         Ok(blake3::hash(&checksums).to_hex().to_string())
     }
 

@@ -3,7 +3,7 @@
 
 use super::file_name;
 use anyhow::{Result, ensure};
-use orator_base::stage::ledger::{TranscriptAccount, WordCount};
+use orator_base::stage::ledger::{TranscriptReport, WordCount};
 use orator_formats::transcript::{Transcript, Word};
 use std::path::Path;
 
@@ -18,7 +18,7 @@ const ROUNDING_SECS: f64 = 1e-5;
 pub struct VideoWords {
     /// Words sorted by midpoint.
     words: Vec<Word>,
-    account: TranscriptAccount,
+    account: TranscriptReport,
 }
 
 impl VideoWords {
@@ -30,7 +30,7 @@ impl VideoWords {
             let file = path.map(file_name);
             Self {
                 words: Vec::new(),
-                account: TranscriptAccount { file, notes: vec![note], ..TranscriptAccount::default() },
+                account: TranscriptReport { file, notes: vec![note], ..TranscriptReport::default() },
             }
         };
         let Some(path) = path else { return none("no transcript has the name of the video".to_owned()) };
@@ -72,7 +72,7 @@ impl VideoWords {
         }
         words.sort_by(|a, b| midpoint_secs(a).total_cmp(&midpoint_secs(b)));
         let count = WordCount { n_words, n_outside, ..WordCount::default() };
-        Ok(Self { words, account: TranscriptAccount { file: Some(file_name(path)), count, notes } })
+        Ok(Self { words, account: TranscriptReport { file: Some(file_name(path)), count, notes } })
     }
 
     /// Words of the sample from `start_secs` to `end_secs`, sorted by start; times count from the start of the sample
@@ -92,7 +92,7 @@ impl VideoWords {
     }
 
     /// Transcript account with the words counted that are in samples with these start and end times, seconds.
-    pub fn account(&self, samples: impl IntoIterator<Item = (f64, f64)>) -> TranscriptAccount {
+    pub fn account(&self, samples: impl IntoIterator<Item = (f64, f64)>) -> TranscriptReport {
         let n_kept = samples.into_iter().map(|(start, end)| self.within(start, end).len()).sum();
         let mut account = self.account.clone();
         account.count.n_kept = n_kept;

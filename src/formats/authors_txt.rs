@@ -23,7 +23,7 @@ const NECK_TOLERANCE: f32 = 1e-3;
 ///
 /// The line with a wrong number of values, an invalid number or a neck away from the origin; a file without frames.
 pub fn read(path: &Path, fps: FrameRate) -> anyhow::Result<Motion> {
-    let text = input::read_text(path, input::MOST_DATA).with_context(|| format!("cannot read {}", path.display()))?;
+    let text = input::read_text(path, input::MAX_DATA).with_context(|| format!("cannot read {}", path.display()))?;
     parse(&text, fps).with_context(|| format!("{} is not motion in the authors' layout", path.display()))
 }
 
@@ -35,7 +35,7 @@ pub fn parse(text: &str, fps: FrameRate) -> anyhow::Result<Motion> {
         for (word, column) in line.split_whitespace().zip(1..) {
             match word.parse::<f32>() {
                 Ok(number) => numbers.push(number),
-                Err(_) => bail!("line {n}, number {column}: `{word}` is no number"),
+                Err(_) => bail!("line {n}, column {column}: `{word}` is not a number"),
             }
         }
         let found = numbers.len() - before;
@@ -43,11 +43,11 @@ pub fn parse(text: &str, fps: FrameRate) -> anyhow::Result<Motion> {
         let neck = &numbers[before..before + 3];
         ensure!(
             !neck.iter().any(|v| v.abs() > NECK_TOLERANCE),
-            "line {n}: the first joint (the neck) stands at {neck:?} m, expected the origin"
+            "line {n}: the first joint (the neck) is at {neck:?} m, expected the origin"
         );
     }
     let n_frames = numbers.len() / N_NUMBERS;
-    ensure!(n_frames > 0, "no frame in it");
+    ensure!(n_frames > 0, "the file has no frames");
     let joints = Array3::from_shape_fn((n_frames, N_JOINTS, 3), |(frame, joint, axis)| {
         numbers[frame * N_NUMBERS + 3 * swap_authors_order(joint) + axis]
     });
@@ -113,9 +113,9 @@ mod tests {
         let good = format!("0 0 0 {line}\n");
         let error_of = |text: &str| format!("{:#}", parse(text, FPS).unwrap_err());
         assert!(error_of(&format!("{good}{good}0 0 0 1\n")).contains("line 3: 4 numbers, expected 147"));
-        assert!(error_of(&format!("{good}0 0 zero {line}\n")).contains("line 2, number 3: `zero`"));
+        assert!(error_of(&format!("{good}0 0 zero {line}\n")).contains("line 2, column 3: `zero`"));
         assert!(error_of(&format!("1 0 0 {line}\n")).contains("line 1: the first joint"));
-        assert!(error_of("\n\n").contains("no frame"));
+        assert!(error_of("\n\n").contains("no frames"));
     }
 
     proptest::proptest! {

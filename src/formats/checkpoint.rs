@@ -27,15 +27,14 @@ pub fn facts(path: &Path) -> anyhow::Result<Value> {
 
 /// Applies `parse` to the contents of a file. Errors name the file.
 pub fn read_with<T>(path: &Path, parse: fn(&[u8]) -> anyhow::Result<T>) -> anyhow::Result<T> {
-    let bytes =
-        input::read(path, input::MOST_DATA).with_context(|| format!("cannot read the weights {}", path.display()))?;
+    let bytes = input::read(path, input::MAX_DATA).with_context(|| format!("cannot read {}", path.display()))?;
     parse(&bytes).with_context(|| format!("{} is not a checkpoint or weights file", path.display()))
 }
 
 /// Metadata in the contents of a file.
 pub fn facts_of(bytes: &[u8]) -> anyhow::Result<Value> {
     let (_, header) = safetensors::SafeTensors::read_metadata(bytes)?;
-    let facts = header.metadata().as_ref().and_then(|m| m.get(METADATA)).context("it was not written by orator")?;
+    let facts = header.metadata().as_ref().and_then(|m| m.get(METADATA)).context("it has no metadata of orator")?;
     Ok(serde_json::from_str(facts)?)
 }
 

@@ -46,27 +46,27 @@ pub fn is_description(path: &Path) -> bool {
 /// The description is unreadable, has no plausible frame rate, or is for a number of frames other than `n_frames`.
 pub fn rate(path: &Path, n_frames: usize) -> Result<Option<FrameRate>> {
     let (description_path, file) = (path_of(path), path.display());
-    let text = match input::read(&description_path, input::MOST_TEXT) {
+    let text = match input::read(&description_path, input::MAX_TEXT) {
         Ok(text) => text,
         Err(error) if error.kind() == ErrorKind::NotFound => return Ok(None),
         Err(error) => return Err(error).with_context(|| format!("cannot read {}", description_path.display())),
     };
     let description_path = description_path.display();
-    let remedy = || format!("delete it, or write {{\"fps\": [30, 1]}} (or what {file} has) into it");
+    let remedy = || format!("delete it, or replace its content with {{\"fps\": [30, 1]}} (the rate of {file})");
     let description: JointsDescription = serde_json::from_slice(&text)
-        .with_context(|| format!("{description_path} does not say the frames a second of {file}: {}", remedy()))?;
+        .with_context(|| format!("{description_path} has no frame rate for {file}: {}", remedy()))?;
     let rate = match description.fps {
         DescribedRate::Fraction([num, den]) if num > 0 && den > 0 => Some(FrameRate::new(num, den)),
         DescribedRate::Number(per_sec) => FrameRate::nearest(per_sec),
         DescribedRate::Fraction(_) => None,
     };
     let Some(rate) = rate.filter(|rate| rate.is_plausible()) else {
-        bail!("{description_path}: its `fps` is no frame rate of motion, 1 to 1000 frames a second: {}", remedy())
+        bail!("{description_path}: invalid `fps`: expected 1 to 1000 frames per second; {}", remedy())
     };
     if let Some(described) = description.n_frames {
         ensure!(
             described == n_frames,
-            "{description_path} describes {described} frames and {file} has {n_frames}: it is of another motion; {}",
+            "{description_path} describes {described} frames, but {file} has {n_frames}; {}",
             remedy()
         );
     }
@@ -121,7 +121,7 @@ mod tests {
         text("{\"fps\": 0.5}");
         assert_error("1 to 1000");
         text("{\"rate\": 30}");
-        assert_error("does not say the frames a second");
+        assert_error("has no frame rate");
         text("no JSON");
         assert_error("delete it");
     }

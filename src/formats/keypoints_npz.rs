@@ -73,15 +73,15 @@ pub fn read_sized(path: &Path, size: Option<[u32; 2]>) -> Result<(Keypoints, Vec
         let size = size.or(known_size).filter(|size| size.iter().all(|px| *px >= MIN_IMAGE_SIDE));
         let Some([width, height]) = size else {
             bail!(
-                "{}: its coordinates lie in 0..1, shares of the picture's width and height, and the picture's size is not \
-                 known: give it with --size, like --size 1280x720, add `image_size` [1280, 720] to the file, or write pixels",
+                "{}: coordinates are fractions of the image size (0..1), and the image size is \
+                 unknown: set it with --size, e.g. --size 1280x720, or add `image_size` [1280, 720] to the file",
                 path.display()
             );
         };
         let n_negative = range::coordinates(&keypoints).filter(|xy| xy[0] < 0.0 || xy[1] < 0.0).count();
         ensure!(
             n_negative * 5 < range::coordinates(&keypoints).count().max(1),
-            "{}: its coordinates lie between -1 and 1: expected pixels, or shares of the picture from 0 to 1",
+            "{}: coordinates are between -1 and 1: expected pixels, or fractions of the image size from 0 to 1",
             path.display()
         );
         for points in [&mut keypoints.body, &mut keypoints.left_hand, &mut keypoints.right_hand] {
@@ -90,7 +90,7 @@ pub fn read_sized(path: &Path, size: Option<[u32; 2]>) -> Result<(Keypoints, Vec
                 point[1] = point[1] * height as f32 - 0.5;
             }
         }
-        notes.push(format!("coordinates in 0..1: taken as shares of the picture, {width}x{height} px"));
+        notes.push(format!("coordinates in 0..1: interpreted as fractions of the image size, {width}x{height} px"));
     }
     Ok((keypoints, notes))
 }
@@ -103,7 +103,7 @@ pub(super) fn read_as_written(path: &Path) -> Result<(Keypoints, Option<[u32; 2]
     let n_frames = body.shape()[0];
     let mut hand = |name: &str, notes: &mut Vec<String>| {
         if !npz.has(name) {
-            notes.push(format!("no `{name}`: taken as not seen"));
+            notes.push(format!("no `{name}`: marked as not detected"));
             return Ok(Array3::zeros((n_frames, N_HAND, 3)));
         }
         points(npz.floats(name, &[Some(n_frames), Some(N_HAND), Some(3)])?)
@@ -113,7 +113,7 @@ pub(super) fn read_as_written(path: &Path) -> Result<(Keypoints, Option<[u32; 2]
     let fps = if npz.has("fps") {
         npz.frame_rate("fps")?
     } else {
-        notes.push("no `fps`: taken as 15".to_owned());
+        notes.push("no `fps`: assuming 15 fps".to_owned());
         FrameRate::new(15, 1)
     };
     let known_size = if npz.has("image_size") {
@@ -122,13 +122,13 @@ pub(super) fn read_as_written(path: &Path) -> Result<(Keypoints, Option<[u32; 2]
         match (side(size[0]), side(size[1])) {
             (Some(width), Some(height)) => Some([width, height]),
             _ => bail!(
-                "{}: `image_size` is {size}, expected width and height of the picture in px, each 1 to 1000000; \
-                 leave the array out if they are not known",
+                "{}: invalid `image_size` {size}: expected width and height in px, each 1 to 1000000; \
+                 omit the array if they are unknown",
                 path.display()
             ),
         }
     } else {
-        notes.push("no `image_size`: taken from the farthest points".to_owned());
+        notes.push("no `image_size`: estimated from the farthest points".to_owned());
         None
     };
     let extent = |axis: usize| body.slice(ndarray::s![.., .., axis]).fold(1.0f32, |m, &v| m.max(v)).min(1e6).ceil();

@@ -56,7 +56,7 @@ fn is_zero(n: &usize) -> bool {
 }
 
 /// Checks that require images, as listed in messages.
-const IMAGE_CHECKS: &str = "cuts, still pictures and whether the person is a picture";
+const IMAGE_CHECKS: &str = "cuts, static images and printed or on-screen persons";
 
 impl MediaInfo {
     /// Video with a known length and nothing else.
@@ -82,37 +82,40 @@ impl MediaInfo {
     }
 
     /// Notes on unusual properties of the file and how each one was handled.
-    pub fn remarks(&self) -> Vec<String> {
-        let mut remarks = Vec::new();
+    pub fn notes(&self) -> Vec<String> {
+        let mut notes = Vec::new();
         if self.pictures.deinterlace {
-            remarks.push("interlaced, deinterlaced".to_owned());
+            notes.push("interlaced: deinterlaced".to_owned());
         }
         if self.pictures.mirrored {
-            remarks.push("mirrored, turned back".to_owned());
+            notes.push("mirrored: flipped back".to_owned());
         }
         if let Some(hdr) = &self.hdr {
-            remarks.push(format!("HDR ({hdr}), tone-mapped"));
+            notes.push(format!("HDR ({hdr}): tone-mapped"));
         }
         if self.n_resizes > 0 {
             let times = if self.n_resizes == 1 { "once".to_owned() } else { format!("{} times", self.n_resizes) };
-            remarks.push(format!("the pictures change their size {times}, brought to the first"));
+            notes.push(format!("the image size changes {times}: scaled to the first size"));
         }
         if let Some(area) = self.active_area {
-            remarks.push(format!("bars, {}x{} px between them looked at", area.width, area.height));
+            notes.push(format!("black bars: only the {}x{} px between them are analysed", area.width, area.height));
         }
         if let Some(tracks) = &self.audio_tracks {
             let named: Vec<&str> =
                 tracks.languages.iter().map(|name| if name.is_empty() { "?" } else { name }).collect();
-            let (n, taken) = (tracks.n_tracks, tracks.taken);
-            remarks.push(format!("{n} sound tracks ({}), number {taken} taken: extract.audio_track", named.join(", ")));
+            let (n, selected) = (tracks.n_tracks, tracks.selected);
+            notes.push(format!(
+                "{n} audio tracks ({}): number {selected} is used (extract.audio_track)",
+                named.join(", ")
+            ));
         }
-        remarks
+        notes
     }
 
     /// Note on the checks that were skipped because there are no images; `None` for a video.
     pub fn not_judged(&self) -> Option<String> {
         let format = self.keypoints_from.as_ref()?;
-        Some(format!("from keypoints ({format}), without pictures: {IMAGE_CHECKS} are not judged"))
+        Some(format!("from keypoints ({format}), without images: {IMAGE_CHECKS} are not checked"))
     }
 
     /// Reads `media.json`.
@@ -121,10 +124,15 @@ impl MediaInfo {
     ///
     /// The file is unreadable or incomplete, or has an invalid duration or frame rate.
     pub fn read(path: &Path) -> Result<Self> {
-        let bytes = input::read(path, input::MOST_TEXT).with_context(|| format!("cannot read {}", path.display()))?;
-        let info: Self = serde_json::from_slice(&bytes).with_context(|| format!("{} is incomplete", path.display()))?;
+        let bytes = input::read(path, input::MAX_TEXT).with_context(|| format!("cannot read {}", path.display()))?;
+        let info: Self =
+            serde_json::from_slice(&bytes).with_context(|| format!("{} is damaged or incomplete", path.display()))?;
         for (field, secs) in [("duration_secs", info.duration_secs), ("audio_secs", info.audio_secs.unwrap_or(0.0))] {
-            ensure!(secs.is_finite() && secs >= 0.0, "{}: `{field}` is {secs}, expected 0 or more", path.display());
+            ensure!(
+                secs.is_finite() && secs >= 0.0,
+                "{}: invalid `{field}` {secs}: expected 0 or more",
+                path.display()
+            );
         }
         info.fps.checked().with_context(|| format!("{}: `fps`", path.display()))?;
         Ok(info)

@@ -17,7 +17,7 @@ use std::path::Path;
 /// Reads a motion at `fps` from an f32 or f64 array [T, 49, 3] or [T, 147] (joint by joint), in metres. Joints with a
 /// non-finite coordinate are missing and cleared in the mask.
 pub fn read(path: &Path, fps: FrameRate) -> anyhow::Result<Motion> {
-    let bytes = input::read(path, input::MOST_DATA).with_context(|| format!("cannot open {}", path.display()))?;
+    let bytes = input::read(path, input::MAX_DATA).with_context(|| format!("cannot open {}", path.display()))?;
     let numbers = match typed::<f32>(&bytes) {
         Ok(None) => parse::<f64, IxDyn>(&bytes).map(|array| array.mapv(|v| v as f32)),
         Ok(Some(array)) => Ok(array),
@@ -28,7 +28,7 @@ pub fn read(path: &Path, fps: FrameRate) -> anyhow::Result<Motion> {
     let is_motion = matches!(shape[..], [_, N_JOINTS, 3]) || matches!(shape[..], [_, n] if n == 3 * N_JOINTS);
     ensure!(
         is_motion,
-        "{} has the shape {shape:?}, expected [frames, {N_JOINTS}, 3] or [frames, {}]",
+        "{} has shape {shape:?}, expected [frames, {N_JOINTS}, 3] or [frames, {}]",
         path.display(),
         3 * N_JOINTS
     );
@@ -190,25 +190,25 @@ impl Layout {
         ensure!(bytes.starts_with(MAGIC), "not a .npy file of version 1.0");
         let length = match bytes.get(8..10) {
             Some(&[low, high]) => usize::from(u16::from_le_bytes([low, high])),
-            _ => bail!("the .npy header is cut off"),
+            _ => bail!("the .npy header is truncated"),
         };
-        let text = bytes.get(10..10 + length).context("the .npy header is cut off")?;
+        let text = bytes.get(10..10 + length).context("the .npy header is truncated")?;
         let text = std::str::from_utf8(text).context("the .npy header is not text")?;
         let descr = element.descr();
-        ensure!(text.contains(&format!("'descr': '{descr}'")), "the array does not hold {descr} values");
+        ensure!(text.contains(&format!("'descr': '{descr}'")), "the array does not have {descr} values");
         ensure!(text.contains("'fortran_order': False"), "the array is not in C order");
         let shape = text.split_once("'shape': (").and_then(|(_, rest)| rest.split_once(')'));
-        let (shape, _) = shape.context("the .npy header names no shape")?;
+        let (shape, _) = shape.context("the .npy header has no shape")?;
         let numbers = shape.split(',').map(str::trim).filter(|n| !n.is_empty()).map(str::parse::<usize>);
-        let shape = numbers.collect::<Result<Vec<_>, _>>().context("the .npy header's shape is not numbers")?;
+        let shape = numbers.collect::<Result<Vec<_>, _>>().context("the shape in the .npy header is not numeric")?;
         let Some((&n_rows, rest)) = shape.split_first() else { bail!("the array has no rows") };
-        ensure!(rest == row, "the array has the shape {shape:?}, expected [T, {row:?}]");
+        ensure!(rest == row, "the array has shape {shape:?}, expected [T, {row:?}]");
         let layout =
             Layout { data_at: 10 + length, n_rows, row_bytes: row.iter().product::<usize>() * element.bytes() };
         let data_bytes = n_rows.checked_mul(layout.row_bytes).and_then(|n| n.checked_add(layout.data_at));
         ensure!(
             data_bytes.is_some_and(|n| n as u64 == file_bytes),
-            "the header promises {n_rows} rows, which is not the size of the file ({file_bytes} bytes)"
+            "the header states {n_rows} rows, which does not match the file size ({file_bytes} bytes)"
         );
         Ok(layout)
     }
@@ -290,7 +290,7 @@ pub(crate) mod tests {
             let joints = Array3::from_shape_fn((n_frames, N_JOINTS, 3), |(t, j, k)| bits[(t * N_JOINTS + j) * 3 + k]);
             let motion = Motion::from_joints(FrameRate::new(15, 1), joints);
             let is_finite_joint = |t: usize, j: usize| (0..3).all(|k| motion.joints[[t, j, k]].is_finite());
-            proptest::prop_assert!(motion.mask.indexed_iter().all(|((t, j), seen)| *seen == is_finite_joint(t, j)));
+            proptest::prop_assert!(motion.mask.indexed_iter().all(|((t, j), m)| *m == is_finite_joint(t, j)));
             let folder = tempfile::tempdir().unwrap();
             let path = folder.path().join("a.npy");
             write(&path, &motion).unwrap();

@@ -37,7 +37,7 @@ impl Npz {
         let file = input::open(path).with_context(|| format!("cannot open {}", path.display()))?;
         let n_file_bytes = file.metadata().with_context(|| format!("cannot open {}", path.display()))?.len();
         let mut archive = ZipArchive::new(BufReader::new(file))
-            .with_context(|| format!("{} is no .npz file (numpy.savez writes one)", path.display()))?;
+            .with_context(|| format!("{} is not an .npz file: expected the output of numpy.savez", path.display()))?;
         let mut n_bytes = 0u64;
         for at in 0..archive.len() {
             let entry = archive.by_index_raw(at).with_context(|| format!("{} is damaged", path.display()))?;
@@ -47,7 +47,7 @@ impl Npz {
         let max_bytes = MAX_BYTES.max(n_file_bytes);
         ensure!(
             n_bytes <= max_bytes,
-            "{}: its arrays unpack to more than {} MiB, which is not read; save fewer arrays in one file",
+            "{}: the arrays unpack to more than {} MiB, the limit; save fewer arrays in one file",
             path.display(),
             max_bytes >> 20
         );
@@ -74,7 +74,7 @@ impl Npz {
     pub fn numbers(&mut self, name: &str, shape: &[AxisLength]) -> Result<ArrayD<f64>> {
         let found = npy::numbers(&self.bytes(name)?);
         let Some(array) = self.readable(name, found)? else {
-            bail!("{}: array `{name}` has an unknown number type; save it as float32 or float64", self.path.display());
+            bail!("{}: array `{name}` has an unsupported type; save it as float32 or float64", self.path.display());
         };
         self.check(name, array.shape(), shape)?;
         Ok(array)
@@ -121,7 +121,7 @@ impl Npz {
         };
         rate.with_context(|| {
             format!(
-                "{}: `{name}` is {values:?}, no frame rate (one number, or numerator and denominator)",
+                "{}: invalid frame rate `{name}` {values:?}: expected one number, or numerator and denominator",
                 self.path.display()
             )
         })
@@ -143,7 +143,7 @@ impl Npz {
     /// Raw bytes of the array's `.npy` entry; the size in its header is checked before the data are decompressed.
     fn bytes(&mut self, name: &str) -> Result<Vec<u8>> {
         let Some(at) = self.names.iter().position(|n| n == name) else {
-            bail!("{} has no array `{name}`; it has: {}", self.path.display(), self.names.join(", "));
+            bail!("{} has no array `{name}`; found: {}", self.path.display(), self.names.join(", "));
         };
         let unreadable = || format!("{}: array `{name}` cannot be read", self.path.display());
         let entry = self.archive.by_index(at).with_context(unreadable)?;
@@ -152,15 +152,15 @@ impl Npz {
         let mut entry = entry.take(stated.saturating_add(1));
         let mut bytes = Vec::new();
         entry.by_ref().take(npy::MAX_HEADER_BYTES).read_to_end(&mut bytes).with_context(unreadable)?;
-        if let Some(promised) = npy::file_bytes(&bytes) {
+        if let Some(in_header) = npy::file_bytes(&bytes) {
             ensure!(
-                promised == stated,
-                "{}: array `{name}` has {stated} bytes, its header promises {promised}: copy or save the file again",
+                in_header == stated,
+                "{}: array `{name}` has {stated} bytes, but its header states {in_header}: copy or save the file again",
                 self.path.display()
             );
         }
         entry.read_to_end(&mut bytes).with_context(unreadable)?;
-        ensure!(bytes.len() as u64 == stated, "{}: it has other than the {stated} bytes stated", unreadable());
+        ensure!(bytes.len() as u64 == stated, "{}: its size differs from the stated {stated} bytes", unreadable());
         Ok(bytes)
     }
 
@@ -355,12 +355,12 @@ mod tests {
             Npz::open(&changed).and_then(|mut npz| npz.floats("body", &[])).map(drop)
         };
         let text = format!("{:#}", stated(1 << 20).unwrap_err());
-        assert!(text.contains("b.npz") && text.contains("`body` has 1048576 bytes, its header promises"), "{text}");
+        assert!(text.contains("b.npz") && text.contains("`body` has 1048576 bytes, but its header states"), "{text}");
         let text = format!("{:#}", stated(u32::MAX - 1).unwrap_err());
         assert!(text.contains("b.npz") && text.contains("unpack to more than 2048 MiB"), "{text}");
         packed(&path, "(8,)", 8 << 20);
         let text = format!("{:#}", Npz::open(&path).unwrap().floats("body", &[]).unwrap_err());
-        assert!(text.contains("has 8388608 bytes, its header promises 160"), "{text}");
+        assert!(text.contains("has 8388608 bytes, but its header states 160"), "{text}");
         archive(&path, &npy_with_shape("(1000000000000,)"), zip::CompressionMethod::Stored);
         let text = format!("{:#}", Npz::open(&path).unwrap().floats("body", &[]).unwrap_err());
         assert!(text.contains("a.npz") && text.contains("body"), "{text}");

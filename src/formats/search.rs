@@ -37,7 +37,11 @@ fn walk(
     if !visited.insert(folder.canonicalize().with_context(listing)?) || !enter(folder) {
         return Ok(());
     }
-    ensure!(depth > 0, "{} lies more than {MAX_DEPTH} folders deep; name a folder nearer to it", folder.display());
+    ensure!(
+        depth > 0,
+        "{} is nested more than {MAX_DEPTH} folders deep; start at a folder further down",
+        folder.display()
+    );
     let entries = std::fs::read_dir(folder).with_context(listing)?;
     let mut entries = entries.map(|entry| Ok(entry?.path())).collect::<Result<Vec<_>>>().with_context(listing)?;
     entries.sort();

@@ -12,14 +12,19 @@ use std::path::Path;
 ///
 /// The file is unreadable, not in the format of the segment stage, or has an offset of 60 s or more.
 pub fn read(path: &Path) -> Result<Option<SoundOffset>> {
-    let bytes = match input::read(path, input::MOST_TEXT) {
+    let bytes = match input::read(path, input::MAX_TEXT) {
         Ok(bytes) => bytes,
         Err(error) if error.kind() == ErrorKind::NotFound => return Ok(None),
         Err(error) => return Err(error).with_context(|| format!("cannot read {}", path.display())),
     };
     let offset: SoundOffset = serde_json::from_slice(&bytes)
-        .with_context(|| format!("{} is not as the segment stage writes it", path.display()))?;
-    ensure!(offset.secs.abs() < 60.0, "{}: an offset of {} s", path.display(), offset.secs);
+        .with_context(|| format!("{} is damaged or not written by the segment stage", path.display()))?;
+    ensure!(
+        offset.secs.abs() < 60.0,
+        "{}: invalid offset {:.3} s: expected less than 60 s",
+        path.display(),
+        offset.secs
+    );
     Ok(Some(offset))
 }
 

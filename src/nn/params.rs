@@ -18,8 +18,8 @@ pub fn open_device(on_card: bool) -> anyhow::Result<Device> {
         return Ok(Device::Cpu);
     }
     Device::new_cuda(0).context(
-        "no NVIDIA card can be used: gan.device = \"cuda\" needs a card and a program built with `cargo build --release \
-         --features cuda`; gan.device = \"cpu\" needs neither",
+        "no usable NVIDIA GPU: gan.device = \"cuda\" needs a GPU and a program built with `cargo build --release \
+         --features cuda`; set gan.device = \"cpu\" to train without",
     )
 }
 
@@ -106,7 +106,7 @@ impl Params {
 
     fn make(&self, name: &str, shape: &[usize], init: Init) -> Result<Var> {
         if self.trainable.contains_key(name) || self.buffers.contains_key(name) {
-            candle_core::bail!("two tensors are called {name}");
+            candle_core::bail!("duplicate tensor name {name}");
         }
         let fan = |dims: &[usize]| dims.iter().product::<usize>().max(1) as f64;
         let kernel_len = fan(shape.get(2..).unwrap_or(&[]));
@@ -160,7 +160,7 @@ impl Params {
             var.set(&tensor.to_dtype(self.dtype)?.to_device(&self.device)?)?;
         }
         match tensors.keys().find(|name| !self.all().any(|(own, _)| own == name.as_str())) {
-            Some(name) => bail!("tensor {name} belongs to no layer of this network"),
+            Some(name) => bail!("unexpected tensor {name}: this network has no such layer"),
             None => Ok(()),
         }
     }

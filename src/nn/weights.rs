@@ -23,10 +23,10 @@ impl Contents {
         self.tensors.iter().filter_map(strip).collect()
     }
 
-    /// Checks that the file may contain a network of at least `least` weights, before memory is allocated for it.
-    pub fn expect_numbers(&self, least: usize) -> anyhow::Result<()> {
+    /// Checks that the file may contain a network of at least `min_numbers` weights, before memory is allocated for it.
+    pub fn expect_numbers(&self, min_numbers: usize) -> anyhow::Result<()> {
         let n_numbers: usize = self.tensors.values().map(Tensor::elem_count).sum();
-        ensure!(least <= n_numbers, "its network has {least} weights or more, the file {n_numbers}");
+        ensure!(min_numbers <= n_numbers, "the file has {n_numbers} weights, but its network at least {min_numbers}");
         Ok(())
     }
 
@@ -51,11 +51,11 @@ impl Contents {
         let file = safetensors::SafeTensors::deserialize(bytes)?;
         let load = |(name, view): (String, safetensors::tensor::TensorView)| {
             let (dtype, expected) = (view.dtype(), dtypes[0]);
-            ensure!(dtypes.contains(&dtype), "the tensor {name} is of type {dtype:?}, expected {expected:?}");
+            ensure!(dtypes.contains(&dtype), "tensor {name} has type {dtype:?}, expected {expected:?}");
             let tensor = view.load(&Device::Cpu)?;
             ensure!(
                 is_finite(&tensor)?,
-                "the tensor {name} holds a number that is not finite: it was damaged, or its training failed"
+                "tensor {name} has a value that is not finite: the file is damaged, or the training diverged"
             );
             Ok((name, tensor))
         };
@@ -113,7 +113,7 @@ mod tests {
             let tensor = Tensor::new(&[1f32, 2.0], &Device::Cpu)?.to_dtype(dtype)?;
             Contents { facts: json!({}), tensors: BTreeMap::from([("net.w".to_owned(), tensor)]) }.write(&file)?;
             let text = format!("{:#}", Contents::read(&file).err().context("it was read")?);
-            let expected = format!("the tensor net.w is of type {dtype:?}, expected F32");
+            let expected = format!("tensor net.w has type {dtype:?}, expected F32");
             assert!(text.contains("step-0000001.safetensors") && text.contains(&expected), "{text}");
             assert_eq!(Contents::from_bytes(&std::fs::read(&file)?).is_ok(), dtype == DType::F16);
         }

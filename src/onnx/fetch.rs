@@ -78,7 +78,7 @@ impl<'a> Fetcher<'a> {
         let without_licence = |bytes, source| Obtained { bytes, licence: None, source };
         if let Some(found) = self.in_mirror(&entry.sha256) {
             let bytes =
-                input::read(found, input::MOST_DATA).with_context(|| format!("cannot read {}", found.display()))?;
+                input::read(found, input::MAX_DATA).with_context(|| format!("cannot read {}", found.display()))?;
             return write(entry, path, without_licence(bytes, FetchSource::Mirror(found.to_owned())));
         }
         let mut failures = String::new();
@@ -161,7 +161,7 @@ impl<'a> Fetcher<'a> {
         let read = |file: &super::SourceFile| {
             let path =
                 self.in_mirror(&file.sha256).with_context(|| format!("the mirror does not contain {}", file.path))?;
-            Ok(input::read(path, input::MOST_DATA)?)
+            Ok(input::read(path, input::MAX_DATA)?)
         };
         Ok((source.files.iter().map(read).collect::<Result<_>>()?, None))
     }

@@ -39,7 +39,7 @@ impl Manifest {
     pub fn load(dir: &Path) -> Result<Self> {
         let mut manifest = Self::builtin()?;
         let path = dir.join(MANIFEST_FILE);
-        match input::read_text(&path, input::MOST_TEXT) {
+        match input::read_text(&path, input::MAX_TEXT) {
             Ok(text) => {
                 let own = Self::parse(&text).with_context(|| path.display().to_string())?;
                 manifest.runtime = own.runtime.or(manifest.runtime);

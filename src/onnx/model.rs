@@ -136,7 +136,7 @@ pub(super) fn open_session(runtime: &Runtime, entry: &ModelEntry, dir: &Path) ->
     if !path.exists() {
         return Err(ModelError::Missing { id: id(), path });
     }
-    let bytes = match input::read(&path, input::MOST_DATA) {
+    let bytes = match input::read(&path, input::MAX_DATA) {
         Ok(bytes) => bytes,
         Err(error) => return Err(ModelError::Unreadable { id: id(), path, error: error.to_string() }),
     };

@@ -281,7 +281,7 @@ impl ModelStore {
         let folder = file.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
         Model::open(runtime, &entry, folder).with_context(|| format!("{} does not match {like:?}", file.display()))?;
         let manifest = self.dir.join(MANIFEST_FILE);
-        let written = match input::read_text(&manifest, input::MOST_TEXT) {
+        let written = match input::read_text(&manifest, input::MAX_TEXT) {
             Ok(text) => text,
             Err(error) if error.kind() == std::io::ErrorKind::NotFound => String::new(),
             Err(error) => return Err(error).with_context(|| format!("cannot read {}", manifest.display())),

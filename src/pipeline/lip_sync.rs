@@ -50,7 +50,7 @@ pub fn compare(opening: &[f32], time_secs: &[f64], is_speech: &[bool], voice: &O
     let matched = LipVoiceMatch::new(opening, time_secs, is_speech, voice, fps);
     let offset = matched.offset();
     let (middle_secs, near_secs) = match offset {
-        Some(offset) if offset.is_sure() => (offset.secs, NEAR_SECS),
+        Some(offset) if offset.is_reliable() => (offset.secs, NEAR_SECS),
         Some(offset) if offset.compared_secs >= WIDE_BELOW_SECS => (0.0, NEAR_SECS),
         _ => (0.0, WIDE_SECS),
     };
@@ -239,7 +239,7 @@ pub mod tests {
         for (k, delay) in [-0.4, -0.21, 0.0, 0.033, 0.1, 0.4].into_iter().enumerate() {
             let found = compared(10.0, true, delay, k as u64);
             let offset = found.offset.unwrap();
-            assert!((offset.secs - delay).abs() < 0.02 && offset.is_sure(), "{delay}: {offset:?}");
+            assert!((offset.secs - delay).abs() < 0.02 && offset.is_reliable(), "{delay}: {offset:?}");
             assert!(found.score.iter().all(|score| *score > 0.5), "{delay}: {:?}", found.score);
         }
     }
@@ -249,7 +249,7 @@ pub mod tests {
         let mut n_sure = 0;
         for seed in 0..12 {
             let (own, other) = (compared(12.0, true, 0.0, seed), compared(12.0, false, 0.0, seed));
-            n_sure += usize::from(other.offset.unwrap().is_sure());
+            n_sure += usize::from(other.offset.unwrap().is_reliable());
             assert!(own.score[60] > other.score[60] + 0.2, "{seed}: {} {}", own.score[60], other.score[60]);
         }
         assert!(n_sure <= 1, "{n_sure} of 12 voices of others are surely those of the mouth");
@@ -271,7 +271,7 @@ pub mod tests {
         assert!(found.score[..110].iter().all(|score| *score > 0.5) && found.score[200..].iter().all(|s| s.is_nan()));
         let static_lips: Vec<f32> = opening.iter().map(|opening| 0.1 + 0.01 * opening).collect();
         let found = compare(&static_lips, &times, &all, &voice, FPS);
-        assert!(found.score.iter().all(|score| *score < 0.1) && !found.offset.unwrap().is_sure());
+        assert!(found.score.iter().all(|score| *score < 0.1) && !found.offset.unwrap().is_reliable());
         assert_eq!(compare(&[], &[], &[], &Openness::default(), FPS), LipSync::default());
     }
 }

@@ -65,7 +65,7 @@ pub fn ready(config: &Config, videos: &Videos, hashes: &HashCache) -> Result<Vec
     let stages =
         StageName::OF_VIDEOS.into_iter().map(|name| build(name, config, all, &[])).collect::<Result<Vec<_>>>()?;
     let state = |stage: &dyn Stage, unit: &Unit| runner::state(stage, unit, &config.settings.work.dir, hashes);
-    let fresh = |unit: &&Unit| stages.iter().all(|stage| matches!(state(&**stage, unit), State::Fresh(_)));
+    let fresh = |unit: &&Unit| stages.iter().all(|stage| matches!(state(&**stage, unit), State::UpToDate(_)));
     Ok(videos.units.iter().filter(fresh).cloned().collect())
 }
 

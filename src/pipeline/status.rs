@@ -194,11 +194,11 @@ impl StatusCheck<'_> {
             Some(earlier) => State::Stale(DirtyReason::WaitsFor { stage: earlier.to_string() }),
             None => runner::state(&**stage, unit, &self.pipeline.config().settings.work.dir, self.hashes),
         };
-        if !matches!(state, State::Fresh(_)) {
+        if !matches!(state, State::UpToDate(_)) {
             waits_for.get_or_insert(name);
         }
         match state {
-            State::Fresh(record) => status(UnitState::UpToDate, record.line),
+            State::UpToDate(record) => status(UnitState::UpToDate, record.line),
             State::Stale(reason @ DirtyReason::NeverDone) => status(UnitState::NeverDone, reason.to_string()),
             State::Stale(reason @ DirtyReason::WaitsFor { .. }) => status(UnitState::Waits, reason.to_string()),
             State::Stale(reason) => status(UnitState::Stale, reason.to_string()),

@@ -3,7 +3,7 @@
 use anyhow::Result;
 use ndarray::Array3;
 use orator_base::motion::bones;
-use orator_base::stage::ledger::{Kept, Ledger, TranscriptAccount, WordCount};
+use orator_base::stage::ledger::{Kept, Ledger, TranscriptReport, WordCount};
 use orator_base::types::pose3d::Motion;
 use orator_base::types::posture::Posture;
 use orator_base::types::sound::Sound;
@@ -48,9 +48,9 @@ impl SpokenVideo {
 
     fn source(&self) -> VideoSource {
         let (secs, n_frames) = (self.secs(), self.motion.n_frames());
-        let words = self.words.as_ref().map(|words| TranscriptAccount {
+        let words = self.words.as_ref().map(|words| TranscriptReport {
             count: WordCount { n_words: words.len(), n_kept: words.len(), ..WordCount::default() },
-            ..TranscriptAccount::default()
+            ..TranscriptReport::default()
         });
         VideoSource {
             name: self.name.clone(),

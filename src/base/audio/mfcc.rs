@@ -103,9 +103,9 @@ pub fn silence(rate: u32) -> [f64; N_CEPSTRA] {
 
 /// Weights of each band over the bins [26][513]: triangles between bins that are equally spaced in mel.
 fn bands(rate: u32) -> Vec<Vec<f64>> {
-    let most = 2595.0 * (1.0 + f64::from(rate) / 2.0 / 700.0).log10();
+    let max_mel = 2595.0 * (1.0 + f64::from(rate) / 2.0 / 700.0).log10();
     let corner = |i: usize| {
-        let hz = 700.0 * (10f64.powf(most * i as f64 / (N_CEPSTRA + 1) as f64 / 2595.0) - 1.0);
+        let hz = 700.0 * (10f64.powf(max_mel * i as f64 / (N_CEPSTRA + 1) as f64 / 2595.0) - 1.0);
         ((FFT + 1) as f64 * hz / f64::from(rate)).floor()
     };
     let weights = |band: usize| {

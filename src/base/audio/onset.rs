@@ -35,26 +35,26 @@ pub fn onsets(samples: &[f32]) -> Vec<f64> {
 /// First pass: maximum level of any band in decibels.
 pub struct Loudest {
     spectra: Spectra,
-    most: f32,
+    max: f32,
 }
 
 impl Default for Loudest {
     fn default() -> Self {
-        Self { spectra: Spectra::new(), most: f32::NEG_INFINITY }
+        Self { spectra: Spectra::new(), max: f32::NEG_INFINITY }
     }
 }
 
 impl Loudest {
     /// Processes the next samples.
     pub fn push(&mut self, samples: &[f32]) {
-        let most = &mut self.most;
-        self.spectra.push(samples, |bands| *most = bands.iter().fold(*most, |most, db| most.max(*db)));
+        let max = &mut self.max;
+        self.spectra.push(samples, |bands| *max = bands.iter().fold(*max, |max, db| max.max(*db)));
     }
 
     /// Returns the maximum level in decibels.
     pub fn finish(mut self) -> f32 {
         self.push(&[0.0; WINDOW / 2]);
-        self.most
+        self.max
     }
 }
 
@@ -117,13 +117,13 @@ impl Flux {
 /// Returns the frames whose strength, scaled to 0..1, exceeds the mean around them by at least `DELTA`. (At this rate
 /// and hop librosa's other conditions, local maximum and waiting time, span less than a frame.)
 fn peaks(strengths: &[f32]) -> Vec<usize> {
-    let least = strengths.iter().copied().fold(f32::INFINITY, f32::min);
-    let most = strengths.iter().copied().fold(f32::NEG_INFINITY, f32::max) - least;
+    let min = strengths.iter().copied().fold(f32::INFINITY, f32::min);
+    let range = strengths.iter().copied().fold(f32::NEG_INFINITY, f32::max) - min;
     // No frames, or constant strength.
-    if most.is_nan() || most <= 0.0 {
+    if range.is_nan() || range <= 0.0 {
         return Vec::new();
     }
-    let scaled: Vec<f32> = strengths.iter().map(|v| (v - least) / (most + f32::MIN_POSITIVE)).collect();
+    let scaled: Vec<f32> = strengths.iter().map(|v| (v - min) / (range + f32::MIN_POSITIVE)).collect();
     let is_peak = |i: &usize| {
         let around = &scaled[i.saturating_sub(AROUND)..(i + AROUND + 1).min(scaled.len())];
         f64::from(scaled[*i]) >= f64::from(around.iter().sum::<f32>()) / around.len() as f64 + DELTA
@@ -166,12 +166,12 @@ fn bands() -> Vec<Band> {
     const BREAK_HZ: f64 = 1000.0;
     let step = 6.4f64.ln() / 27.0;
     let nyquist = f64::from(SAMPLE_RATE) / 2.0;
-    let most = BREAK_HZ / LINEAR + (nyquist / BREAK_HZ).ln() / step;
+    let max_mel = BREAK_HZ / LINEAR + (nyquist / BREAK_HZ).ln() / step;
     let hz = |mel: f64| match mel * LINEAR {
         hz if hz < BREAK_HZ => hz,
         _ => BREAK_HZ * (step * (mel - BREAK_HZ / LINEAR)).exp(),
     };
-    let corner = |i: usize| hz(most * i as f64 / (N_MELS + 1) as f64);
+    let corner = |i: usize| hz(max_mel * i as f64 / (N_MELS + 1) as f64);
     let band = |i: usize| {
         let (left, middle, right) = (corner(i), corner(i + 1), corner(i + 2));
         let weight = |bin: usize| {

@@ -72,11 +72,11 @@ impl OpennessMeter {
 impl Openness {
     /// Returns the openness at a time in seconds, interpolated linearly; NaN outside the sound.
     pub fn at(&self, secs: f64) -> f32 {
-        let place = (secs * f64::from(SAMPLE_RATE) - WINDOW as f64 / 2.0) / HOP as f64;
-        if !(place >= 0.0 && place <= self.0.len().saturating_sub(1) as f64) || self.0.is_empty() {
+        let position = (secs * f64::from(SAMPLE_RATE) - WINDOW as f64 / 2.0) / HOP as f64;
+        if !(position >= 0.0 && position <= self.0.len().saturating_sub(1) as f64) || self.0.is_empty() {
             return f32::NAN;
         }
-        let (before, part) = (place as usize, place.fract() as f32);
+        let (before, part) = (position as usize, position.fract() as f32);
         let after = self.0.get(before + 1).unwrap_or(&self.0[before]);
         self.0[before] + part * (after - self.0[before])
     }

@@ -12,7 +12,7 @@ const MAX_STEPS: usize = 60;
 /// decomposition.
 pub fn factor(matrix: &Array2<f64>) -> Array2<f64> {
     let mut rest = matrix.clone();
-    let floor = ROUNDING * rest.diag().iter().fold(0.0, |most: f64, v| most.max(*v));
+    let floor = ROUNDING * rest.diag().iter().fold(0.0, |max: f64, v| max.max(*v));
     let mut columns: Vec<Array1<f64>> = Vec::new();
     while columns.len() < matrix.nrows() {
         let largest = rest.diag().into_iter().copied().enumerate().max_by(|a, b| a.1.total_cmp(&b.1));

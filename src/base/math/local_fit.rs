@@ -64,7 +64,7 @@ impl LocalFit {
         let mut noise = noise_around(values, self.noise_half);
         for (t, noise) in noise.iter_mut().enumerate() {
             let around = t.saturating_sub(self.smooth_half)..(t + self.smooth_half + 1);
-            let known = around.filter_map(|u| known.get(u)).fold(0.0, |most: f64, &known| most.max(known));
+            let known = around.filter_map(|u| known.get(u)).fold(0.0, |max: f64, &known| max.max(known));
             *noise = noise.max(known);
         }
         let half_width = (EXTENT * self.sigmas.last().copied().unwrap_or(0.0)).ceil() as usize;
@@ -122,9 +122,9 @@ impl LocalFit {
 
 /// Weights of `frames` in the parabola fitted around `t`, evaluated at `t`; too few frames give weight 1 to `t` alone.
 fn parabola(frames: Range<usize>, t: usize, sigma: f64) -> Vec<f64> {
-    let place = |u: usize| (u as f64 - t as f64) / sigma;
+    let distance = |u: usize| (u as f64 - t as f64) / sigma;
     let terms: Vec<(f64, f64)> =
-        frames.map(place).map(|d| (d, if d.abs() <= EXTENT { (-0.5 * d * d).exp() } else { 0.0 })).collect();
+        frames.map(distance).map(|d| (d, if d.abs() <= EXTENT { (-0.5 * d * d).exp() } else { 0.0 })).collect();
     let moment = |power: i32| terms.iter().map(|(d, w)| w * d.powi(power)).sum::<f64>();
     let [m0, m1, m2, m3, m4] = [0, 1, 2, 3, 4].map(moment);
     // First row of the inverse of the matrix of moments, without the division by the determinant.

@@ -28,10 +28,10 @@ pub fn norm(a: Vec3) -> f64 {
     dot(a, a).sqrt()
 }
 
-/// Direction of `a`; `None` if its length is not greater than `least` or is NaN.
-pub fn unit(a: Vec3, least: f64) -> Option<Vec3> {
+/// Direction of `a`; `None` if its length is not greater than `min_length` or is NaN.
+pub fn unit(a: Vec3, min_length: f64) -> Option<Vec3> {
     let length = norm(a);
-    (length > least).then(|| scale(a, 1.0 / length))
+    (length > min_length).then(|| scale(a, 1.0 / length))
 }
 
 /// Component of `a` perpendicular to the unit vector `axis`.
@@ -41,9 +41,9 @@ pub fn across(a: Vec3, axis: Vec3) -> Vec3 {
 
 /// Returns a unit vector perpendicular to the unit vector `a`.
 pub fn any_across(a: Vec3) -> Vec3 {
-    let least = (0..3).min_by(|&i, &j| a[i].abs().total_cmp(&a[j].abs())).unwrap_or(0);
+    let smallest = (0..3).min_by(|&i, &j| a[i].abs().total_cmp(&a[j].abs())).unwrap_or(0);
     let mut pick = [0.0; 3];
-    pick[least] = 1.0;
+    pick[smallest] = 1.0;
     let side = across(pick, a);
     scale(side, 1.0 / norm(side))
 }

@@ -4,12 +4,12 @@ use ndarray::{ArrayView2, ArrayView3};
 
 /// Mean norm of the jerk (m/s^3) of `joints` in `positions` [T, n, 3] at `fps` frames per second. Each pair is a joint
 /// and the joint that it is measured relative to (the root for none). Only windows of four frames in which both joints
-/// are visible in `seen` [T, n] are counted; `None` if there is none.
-pub fn mean(positions: ArrayView3<f32>, seen: ArrayView2<bool>, fps: f64, joints: &[(usize, usize)]) -> Option<f64> {
+/// are visible in `visible` [T, n] are counted; `None` if there is none.
+pub fn mean(positions: ArrayView3<f32>, visible: ArrayView2<bool>, fps: f64, joints: &[(usize, usize)]) -> Option<f64> {
     let (mut sum, mut n) = (0.0, 0usize);
     for start in 0..positions.shape()[0].saturating_sub(3) {
         for &(joint, origin) in joints {
-            if !(start..start + 4).all(|t| seen[[t, joint]] && seen[[t, origin]]) {
+            if !(start..start + 4).all(|t| visible[[t, joint]] && visible[[t, origin]]) {
                 continue;
             }
             let squares = (0..3).map(|axis| {
@@ -36,12 +36,12 @@ mod tests {
             let secs = t as f32 / 15.0;
             if joint == 1 && axis == 2 { 2.0 * secs * secs * secs } else { 0.1 }
         });
-        let mut seen = Array2::from_elem((12, 2), true);
-        let jerk = |seen: &Array2<bool>| mean(positions.view(), seen.view(), 15.0, &[(1, 0)]);
-        assert!((jerk(&seen).unwrap() - 12.0).abs() < 0.05);
-        seen[[5, 1]] = false;
-        assert!((jerk(&seen).unwrap() - 12.0).abs() < 0.05);
-        seen.fill(false);
-        assert_eq!(jerk(&seen), None);
+        let mut visible = Array2::from_elem((12, 2), true);
+        let jerk = |visible: &Array2<bool>| mean(positions.view(), visible.view(), 15.0, &[(1, 0)]);
+        assert!((jerk(&visible).unwrap() - 12.0).abs() < 0.05);
+        visible[[5, 1]] = false;
+        assert!((jerk(&visible).unwrap() - 12.0).abs() < 0.05);
+        visible.fill(false);
+        assert_eq!(jerk(&visible), None);
     }
 }

@@ -38,7 +38,7 @@ const SEATED_BELOW: f64 = 0.4;
 /// Estimates the posture for the frames of the keypoints [T, 17, 3] (COCO; x px, y px, score).
 pub fn estimate(body: ArrayView3<f32>, lifted: LiftedBody) -> Posture {
     let n_frames = body.shape()[0];
-    let mut posture = Posture::unseen(n_frames);
+    let mut posture = Posture::missing(n_frames);
     for (t, angles) in face::angles(body).into_iter().enumerate() {
         let angles = angles.unwrap_or([f64::NAN; 3]);
         (0..3).for_each(|k| posture.head[[t, k]] = angles[k] as f32);

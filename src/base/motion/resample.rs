@@ -32,7 +32,7 @@ pub fn at_rate(motion: &Motion, fps: FrameRate) -> Motion {
     let kernels: Vec<ResamplingKernel> =
         (0..n_frames).map(|n| ResamplingKernel::at(fps.secs(n) * from.per_sec(), from, fps)).collect();
     for joint in 0..N_JOINTS {
-        let seen = |frame: usize| motion.mask[[frame.min(n_source - 1), joint]];
+        let is_visible = |frame: usize| motion.mask[[frame.min(n_source - 1), joint]];
         for (start, end) in runs(motion, joint) {
             let tracks: [Vec<f64>; 3] =
                 std::array::from_fn(|k| (start..end).map(|t| f64::from(motion.joints[[t, joint, k]])).collect());
@@ -44,7 +44,7 @@ pub fn at_rate(motion: &Motion, fps: FrameRate) -> Motion {
                 for (k, track) in tracks.iter().enumerate() {
                     joints[[n, joint, k]] = kernel.apply(track, start) as f32;
                 }
-                mask[[n, joint]] = seen(below) && seen(above);
+                mask[[n, joint]] = is_visible(below) && is_visible(above);
             }
         }
     }

@@ -45,13 +45,13 @@ pub fn check(motion: &Motion) -> Result<()> {
     let Some(length) = arm_bone(motion).filter(|length| !ACCEPTED.contains(length)) else { return Ok(()) };
     let unlikely = |metres: f32| (length * metres / ADULT).ln().abs();
     let fitting = UNITS.into_iter().filter(|(_, metres)| PLAUSIBLE.contains(&(length * metres)));
-    let needed =
-        "joints must be in metres about the neck (x image right, y down, z away), where a person's are 0.1 to 0.6";
+    let expected = "expected 0.1 to 0.6: coordinates are metres relative to the neck (x image right, y down, z away)";
     match fitting.min_by(|a, b| unlikely(a.1).total_cmp(&unlikely(b.1))) {
         Some((unit, metres)) => bail!(
-            "its arm bones are {length:.3} long; {needed}: it seems to be in {unit}; multiply every coordinate by {metres}"
+            "its arm bones are {length:.3} long, {expected}; the file seems to be in {unit}; multiply every coordinate by \
+             {metres}"
         ),
-        None => bail!("its arm bones are {length:.3} long, a person's in no known unit; {needed}"),
+        None => bail!("its arm bones are {length:.3} long, which is implausible in every known unit; {expected}"),
     }
 }
 
@@ -109,7 +109,7 @@ mod tests {
             let advice = format!("seems to be in {unit}; multiply every coordinate by {metres}");
             assert!(text.ends_with(&advice), "{by}: {text}");
         }
-        assert!(check(&times(1e6)).unwrap_err().to_string().contains("no known unit"));
+        assert!(check(&times(1e6)).unwrap_err().to_string().contains("every known unit"));
         check(&Motion { joints: &motion.joints * f32::NAN, ..motion }).unwrap();
     }
 

@@ -62,7 +62,7 @@ impl FromStr for StageName {
     fn from_str(name: &str) -> anyhow::Result<Self> {
         match Self::ALL.into_iter().find(|stage| stage.as_str() == name || stage.former() == Some(name)) {
             Some(stage) => Ok(stage),
-            None => bail!("no stage is called {name}; there are: {}", Self::ALL.map(Self::as_str).join(", ")),
+            None => bail!("unknown stage `{name}`: expected one of {}", Self::ALL.map(Self::as_str).join(", ")),
         }
     }
 }

@@ -37,7 +37,9 @@ pub fn attempt(
             None => workdir::replace_folder(&attempt, folder)?,
         }
         let Report { line, facts } = report.clone();
-        Record { fingerprint: fingerprint.clone(), outputs, line, facts }.write(folder).context("cannot record it")?;
+        Record { fingerprint: fingerprint.clone(), outputs, line, facts }
+            .write(folder)
+            .context("cannot write its record")?;
         Ok(report)
     };
     let finished = finish();

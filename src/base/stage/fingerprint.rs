@@ -31,7 +31,7 @@ impl Fingerprint {
     pub fn now(stage: &dyn Stage, unit: &Unit, hashes: &HashCache) -> Result<Self> {
         let mut inputs = BTreeMap::new();
         for input in stage.inputs(unit)? {
-            let hash = hashes.hash(&input.path).with_context(|| format!("the {} of this stage", input.role))?;
+            let hash = hashes.hash(&input.path).with_context(|| format!("cannot hash the {}", input.role))?;
             inputs.insert(input.role, hash);
         }
         Ok(Self { stage: stage.name().to_owned(), version: stage.version(), settings: stage.settings(unit), inputs })

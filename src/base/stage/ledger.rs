@@ -22,12 +22,12 @@ pub struct Ledger {
     pub failed: Vec<Failed>,
     /// Account of the words; `None`: no transcript was requested.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub words: Option<TranscriptAccount>,
+    pub words: Option<TranscriptReport>,
 }
 
 /// Account of a video's transcript.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub struct TranscriptAccount {
+pub struct TranscriptReport {
     /// File name of the transcript; `None`: the video has no transcript.
     pub file: Option<String>,
     #[serde(flatten)]
@@ -124,12 +124,12 @@ impl Ledger {
     /// # Errors
     /// The file cannot be read or is not a ledger; its intervals are not contiguous or do not fill the duration.
     pub fn read(path: &Path) -> Result<Self> {
-        let bytes = input::read(path, input::MOST_TEXT).with_context(|| format!("cannot read {}", path.display()))?;
+        let bytes = input::read(path, input::MAX_TEXT).with_context(|| format!("cannot read {}", path.display()))?;
         let ledger: Self =
-            serde_json::from_slice(&bytes).with_context(|| format!("{} is no ledger", path.display()))?;
+            serde_json::from_slice(&bytes).with_context(|| format!("{} is not a ledger", path.display()))?;
         ensure!(
             ledger.is_whole(),
-            "{}: its stretches do not fill {} s end to end",
+            "{}: expected adjacent intervals from 0 to {:.2} s, without gaps or overlaps",
             path.display(),
             ledger.duration_secs
         );

@@ -20,7 +20,7 @@ impl<'a> OverallProgress<'a> {
     /// Begins the task. The work on a unit at a stage is the size of its source file in bytes times the stage's cost.
     pub fn begin(stages: &[&dyn Stage], units: &[Unit], progress: &'a dyn Progress) -> Self {
         let total_work = units.iter().flat_map(|unit| stages.iter().map(|stage| work(*stage, unit))).sum();
-        let label = format!("{} of {}", names(stages), crate::text::counted(units.len(), "unit"));
+        let label = format!("{} ({})", names(stages), crate::text::counted(units.len(), "unit"));
         let task = progress.begin(&label, PARTS);
         Self { progress, task, total_work, done: Mutex::new((0.0, 0)), has_estimate: AtomicBool::new(false) }
     }
@@ -166,7 +166,7 @@ mod tests {
 
     impl Progress for Counted {
         fn begin(&self, label: &str, _total: u64) -> Box<dyn Task + '_> {
-            if label.contains(" of ") { Box::new(self.clone()) } else { Box::new(Silent) }
+            if label.contains("(2 units)") { Box::new(self.clone()) } else { Box::new(Silent) }
         }
         fn say(&self, _line: &str) {}
     }

@@ -29,7 +29,7 @@ pub enum Event<'a> {
     /// A stage finished the unit; `line` is the stage's report.
     Done { stage: &'a str, unit: &'a str, line: &'a str },
     /// A stage skipped the unit, whose results are up to date.
-    Fresh { stage: &'a str, unit: &'a str },
+    UpToDate { stage: &'a str, unit: &'a str },
     /// The unit failed at a stage.
     Failed { stage: &'a str, unit: &'a str, error: &'a str },
     /// An entry of the configuration matches no video.
@@ -46,13 +46,13 @@ impl Event<'_> {
     /// Formats a line for the user; `None` for events that are not printed.
     pub fn message(&self) -> Option<String> {
         match self {
-            Self::Fresh { .. } | Self::Done { line: "", .. } => None,
+            Self::UpToDate { .. } | Self::Done { line: "", .. } => None,
             Self::Done { stage, unit, line } => Some(format!("done    {stage} {unit}: {line}")),
             Self::Failed { stage, unit, error } => Some(format!("failed  {stage} {unit}: {error}")),
             Self::NoVideo { speaker, error } => Some(format!("failed  {speaker}: {error}")),
             Self::Estimate { line } => Some((*line).to_owned()),
             Self::Advice { line } => Some(format!("note    {line}")),
-            Self::LeftOut { unit } => Some(format!("left out of the dataset: {unit} (`orator status --why` says why)")),
+            Self::LeftOut { unit } => Some(format!("excluded from the dataset: {unit} (see `orator status --why`)")),
         }
     }
 }

@@ -52,16 +52,16 @@ pub enum DirtyReason {
 impl fmt::Display for DirtyReason {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::NeverDone => write!(f, "never done"),
-            Self::Forced => write!(f, "asked for by --force"),
+            Self::NeverDone => write!(f, "not run yet"),
+            Self::Forced => write!(f, "forced by --force"),
             Self::StageChanged { was, now } => write!(f, "the stage changed from version {was} to {now}"),
             Self::SettingChanged { key, was, now } => write!(f, "{key} changed from {was} to {now}"),
             Self::InputChanged { role } => write!(f, "the {role} changed"),
-            Self::InputAdded { role } => write!(f, "the {role} is new"),
-            Self::InputRemoved { role } => write!(f, "the {role} is gone"),
-            Self::OutputMissing { file } => write!(f, "its file {file} is missing"),
-            Self::OutputChanged { file } => write!(f, "its file {file} is not what was written"),
-            Self::WaitsFor { stage } => write!(f, "waits for {stage}"),
+            Self::InputAdded { role } => write!(f, "the {role} was added"),
+            Self::InputRemoved { role } => write!(f, "the {role} was removed"),
+            Self::OutputMissing { file } => write!(f, "output {file} is missing"),
+            Self::OutputChanged { file } => write!(f, "output {file} was modified"),
+            Self::WaitsFor { stage } => write!(f, "waiting for {stage}"),
         }
     }
 }

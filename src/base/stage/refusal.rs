@@ -25,17 +25,17 @@ macro_rules! refusals {
 
 refusals! {
     /// Fraction of the frames with sound.
-    NoSound: "no sound", "", "no sound track, or it has ended";
+    NoSound: "no sound", "", "no audio track, or it has ended";
     /// Loudness in dB of full scale.
-    Quiet: "quiet", "dB", "the sound is too quiet for speech";
+    Quiet: "quiet", "dB", "the audio is too quiet for speech";
     /// Fraction of the sound that is speech.
-    NoSpeech: "no speech", "", "the sound is not speech";
+    NoSpeech: "no speech", "", "the audio is not speech";
     /// Correlation between the visible mouth and the voice.
-    OffScreenSpeaker: "voice of another", "", "the voice is not that of the person seen";
+    OffScreenSpeaker: "voice of another", "", "the voice belongs to an off-screen speaker";
     /// Seconds for which the picture is static.
-    Static: "still", "s", "the picture stands still";
+    Static: "still", "s", "the picture is static";
     /// Highest score of face and arms.
-    NoPerson: "no person", "", "nobody is seen";
+    NoPerson: "no person", "", "no person is detected";
     /// Distance between the shoulders in px.
     Small: "too small", "px", "the speaker is too small in the picture";
     /// Score of nose and eyes.
@@ -47,39 +47,39 @@ refusals! {
     /// Lowest score of shoulders and elbows.
     Arms: "arms", "", "shoulders or elbows are not visible";
     /// Seconds for which a hand is missing because the other hand was detected at its position.
-    OtherHand: "other hand", "s", "one hand is found in the place of the other";
+    OtherHand: "other hand", "s", "one hand is detected at the position of the other";
     /// Seconds for which a hand is missing.
     HandGap: "hands", "s", "a hand is not visible for too long";
     /// Shoulder widths that the neck moves from one frame to the next.
     Jump: "jump", "shoulder widths", "the speaker jumps from frame to frame";
     /// Seconds of an interval that remain beside a shot boundary.
-    Cut: "cut", "s", "a cut leaves too short an interval";
+    Cut: "cut", "s", "the interval before or after a cut is too short";
     /// Seconds of an interval that remain beside a change of the tracked person.
-    Identity: "other person", "s", "a change of person leaves too short an interval";
+    Identity: "other person", "s", "the interval before or after a change of person is too short";
     /// Seconds of an interval that remain between other refusals.
-    TooShort: "too short", "s", "too short between other refusals";
+    TooShort: "too short", "s", "too short between other rejected intervals";
     /// Fraction of the frames in which the less visible hand is visible.
     HandShare: "hands", "", "a hand is not visible for too long";
     /// Fraction of the frames with too many persons.
-    Crowd: "crowd", "", "too many people are in view";
+    Crowd: "crowd", "", "too many persons are in view";
     /// Deviation of a lifted bone from its length in the video, as a fraction of that length.
-    Bones: "bones", "bone lengths", "a lifted bone is far off its length";
+    Bones: "bones", "bone lengths", "a lifted bone deviates too much from its length";
     /// Number of joints that are not visible for longer than lifting interpolates.
-    MissingJoints: "open", "joints", "joints stay unseen for too long";
+    MissingJoints: "open", "joints", "joints are not visible for too long";
     /// Seconds that are also in another video of the dataset.
-    Duplicate: "duplicate", "s", "another video has it already";
+    Duplicate: "duplicate", "s", "duplicate of another video";
     /// Seconds omitted between two splits of a video.
-    SplitGap: "between splits", "s", "left out between two splits";
+    SplitGap: "between splits", "s", "omitted between two splits";
     /// An imported take without a sound file, or its frames after the end of the sound.
-    NoSoundFile: "no sound", "s", "no sound was found, or it has ended";
+    NoSoundFile: "no sound", "s", "no audio file was found, or the audio has ended";
     /// An imported take that was predicted by a model.
-    Prediction: "prediction", "", "a model predicted it";
+    Prediction: "prediction", "", "predicted by a model";
     /// Difference in seconds between the lengths of sound and motion of an imported take.
-    LengthMismatch: "out of step", "s", "sound and motion differ in length";
+    LengthMismatch: "out of step", "s", "audio and motion differ in length";
     /// Number of frames of an imported take with both motion and sound.
-    FewFrames: "too short", "frames", "sound and motion have too few frames in common";
+    FewFrames: "too short", "frames", "audio and motion have too few frames in common";
     /// Seconds that the imported shards do not contain.
-    NotImported: "not here", "s", "the imported shards do not hold it";
+    NotImported: "not here", "s", "not contained in the imported shards";
 }
 
 impl Refusal {

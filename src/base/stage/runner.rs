@@ -17,7 +17,7 @@ use std::sync::{Arc, Mutex};
 /// State of a unit at a stage.
 #[derive(Clone, Debug)]
 pub enum State {
-    Fresh(Record),
+    UpToDate(Record),
     Stale(DirtyReason),
     Failed(String),
 }
@@ -49,7 +49,7 @@ pub fn state(stage: &dyn Stage, unit: &Unit, work: &Path, hashes: &HashCache) ->
         None => Some(DirtyReason::NeverDone),
     };
     match (dirty, record) {
-        (None, Some(record)) => State::Fresh(record),
+        (None, Some(record)) => State::UpToDate(record),
         (dirty, _) => match Failure::read(&folder) {
             Some(failure) if failure.fingerprint.as_ref() == Some(&now) => State::Failed(failure.error),
             _ => State::Stale(dirty.unwrap_or(DirtyReason::NeverDone)),
@@ -114,7 +114,9 @@ pub fn run_stages(
     let answers = ended.into_iter().map(|answers| answers.into_inner().unwrap_or_default());
     let completed = |mut answers: Vec<StageOutcome>| {
         if answers.len() < stages.len() && !matches!(answers.last(), Some(StageOutcome::Failed(_))) {
-            answers.push(StageOutcome::Failed(Arc::new(anyhow!("the worker was lost"))));
+            answers.push(StageOutcome::Failed(Arc::new(anyhow!(
+                "internal error: the worker thread ended without a result"
+            ))));
         }
         answers
     };
@@ -134,7 +136,7 @@ pub fn run_parts(
     hashes: &HashCache,
     progress: &dyn Progress,
 ) -> Result<()> {
-    if matches!(state(stage, unit, work, hashes), State::Fresh(_)) {
+    if matches!(state(stage, unit, work, hashes), State::UpToDate(_)) {
         return Ok(());
     }
     let fingerprint = Fingerprint::now(stage, unit, hashes)?;
@@ -164,7 +166,7 @@ fn report(answer: &StageOutcome, stage: &dyn Stage, unit: &Unit, progress: &dyn 
             progress.event(&Event::Failed { stage, unit: &unit, error: &format!("{error:#}") });
         }
         StageOutcome::Done(report) => progress.event(&Event::Done { stage, unit: &unit, line: &report.line }),
-        StageOutcome::Skipped(_) => progress.event(&Event::Fresh { stage, unit: &unit }),
+        StageOutcome::Skipped(_) => progress.event(&Event::UpToDate { stage, unit: &unit }),
     }
 }
 

@@ -80,11 +80,15 @@ pub trait Stage: Sync {
     }
     /// Processes part `part`, counted from 0: writes its files into the empty folder `out` and nowhere else.
     fn run_part(&self, unit: &Unit, part: usize, _out: &Path, _progress: &dyn Progress) -> anyhow::Result<()> {
-        anyhow::bail!("{} of {unit} has no part {part}", self.name())
+        anyhow::bail!("stage {} cannot process part {part} of {unit}: it does not split units", self.name())
     }
     /// Builds the unit's files in the empty folder `out` from the folders of all `parts`, in order.
     fn join(&self, unit: &Unit, parts: &[PathBuf], _out: &Path) -> anyhow::Result<Report> {
-        anyhow::bail!("{} of {unit} has no {} parts", self.name(), parts.len())
+        anyhow::bail!(
+            "stage {} cannot join the parts of {unit} ({}): it does not split units",
+            self.name(),
+            parts.len()
+        )
     }
 }
 

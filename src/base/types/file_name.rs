@@ -16,9 +16,7 @@ pub struct FileName(String);
 
 /// Error: the text is not a [`FileName`].
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error(
-    "{0:?} is no name of a file: expected 1 to {MAX_BYTES} bytes without /, \\, control characters or a dot at the beginning"
-)]
+#[error("invalid file name {0:?}: expected 1 to {MAX_BYTES} bytes, no leading dot, no / or \\, no control characters")]
 pub struct FileNameError(String);
 
 impl FileName {
@@ -95,7 +93,7 @@ mod tests {
         }
         for name in ["", ".", "..", ".hidden", "a/b", "/abs/x", "../../x", "a\\b", "a\nb", "a\0", &"x".repeat(256)] {
             let text = FileName::new(name).unwrap_err().to_string();
-            assert!(text.contains("no name of a file") && text.len() < 500, "{text}");
+            assert!(text.contains("invalid file name") && text.len() < 500, "{text}");
             assert!(serde_json::from_str::<FileName>(&serde_json::to_string(name).unwrap()).is_err(), "{name:?}");
         }
     }

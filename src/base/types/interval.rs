@@ -39,14 +39,15 @@ pub struct Intervals {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Windows64 {
     pub stride_5: usize,
-    pub apart: usize,
+    #[serde(rename = "apart")]
+    pub disjoint: usize,
 }
 
 impl Intervals {
     /// Creates the intervals and counts their windows.
     pub fn new(fps: FrameRate, n_frames: usize, intervals: Vec<Interval>) -> Self {
         let count = |stride| intervals.iter().map(|interval| interval.n_windows(64, stride)).sum();
-        let windows_64 = Windows64 { stride_5: count(5), apart: count(64) };
+        let windows_64 = Windows64 { stride_5: count(5), disjoint: count(64) };
         Self { fps, n_frames, intervals, windows_64, resting: Vec::new() }
     }
 
@@ -63,7 +64,7 @@ impl Intervals {
     }
 
     /// Intervals in which the hands rest, as (start, end) in seconds.
-    pub fn resting_stretches(&self) -> impl Iterator<Item = (f64, f64)> {
+    pub fn resting_intervals(&self) -> impl Iterator<Item = (f64, f64)> {
         self.resting.iter().map(|rest| (self.fps.secs(rest.start), self.fps.secs(rest.end)))
     }
 

@@ -13,7 +13,7 @@ pub const N_HAND: usize = 21;
 /// Minimum score of a visible keypoint.
 pub const SEEN_SCORE: f32 = 0.3;
 /// Minimum score of a visible hand keypoint for the hand lifter.
-pub const HAND_SEEN_SCORE: f32 = 0.2;
+pub const HAND_VISIBLE_SCORE: f32 = 0.2;
 
 /// Keypoint indices of COCO-17.
 pub mod coco {
@@ -70,12 +70,12 @@ pub struct Pose2d {
     /// as missing.
     pub other_hand: [bool; 2],
     /// The speaker's face, if it is large enough in the picture.
-    pub face: Option<FaceSeen>,
+    pub face: Option<DetectedFace>,
 }
 
 /// Measurements of a detected face.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct FaceSeen {
+pub struct DetectedFace {
     /// Confidence that the region contains a face, 0..1.
     pub score: f32,
     /// Distance between the lips in distances between the outer corners of the eyes.

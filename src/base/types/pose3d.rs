@@ -25,7 +25,7 @@ const FARTHEST_OF_ALL: f32 = 1e5;
 /// Error: implausibly distant joint.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[error(
-    "frame {frame}, joint {joint} ({}): {position:?} lies beyond all sense, {FARTHEST} m from the neck or more; joints must be in metres",
+    "frame {frame}, joint {joint} ({}): {position:?} is implausible: expected metres, under {FARTHEST} m from the neck",
     skeleton::name(*joint)
 )]
 pub struct FarJoint {
@@ -40,7 +40,7 @@ pub struct FarJoint {
 impl Motion {
     /// Creates motion from joints [T, 49, 3]; joints with a non-finite coordinate are masked as not visible.
     pub fn from_joints(fps: FrameRate, joints: Array3<f32>) -> Self {
-        let mask = joints.map_axis(ndarray::Axis(2), |place| place.iter().all(|v| v.is_finite()));
+        let mask = joints.map_axis(ndarray::Axis(2), |joint| joint.iter().all(|v| v.is_finite()));
         Self { fps, joints, mask }
     }
 

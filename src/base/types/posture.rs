@@ -40,7 +40,7 @@ impl PostureChannel {
 
 impl Posture {
     /// Creates a posture of `n_frames` in which nothing is visible.
-    pub fn unseen(n_frames: usize) -> Self {
+    pub fn missing(n_frames: usize) -> Self {
         let nothing = Array2::from_elem((n_frames, 3), f32::NAN);
         Self { head: nothing.clone(), trunk: nothing }
     }

@@ -36,7 +36,8 @@ impl Sound {
 pub struct AudioTracks {
     pub n_tracks: usize,
     /// Number of the selected track, from 1.
-    pub taken: usize,
+    #[serde(rename = "taken")]
+    pub selected: usize,
     /// Language of each track as named in the file; empty if not named.
     pub languages: Vec<String>,
 }
@@ -56,21 +57,21 @@ pub struct SoundOffset {
 
 impl SoundOffset {
     /// Returns whether the offset is reliable enough to shift the sound by it.
-    pub fn is_sure(&self) -> bool {
+    pub fn is_reliable(&self) -> bool {
         self.confidence >= SURE && self.secs.abs() < MAX_SECS
     }
 
     /// Returns whether to report the offset: it is reliable and not shorter than one frame at 25 fps.
     pub fn is_reportable(&self) -> bool {
-        self.is_sure() && self.secs.abs() >= MIN_REPORTED_SECS
+        self.is_reliable() && self.secs.abs() >= MIN_REPORTED_SECS
     }
 }
 
 impl fmt::Display for SoundOffset {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let late = if self.secs < 0.0 { "early" } else { "late" };
-        let sure = if self.is_sure() { "sure" } else { "not sure" };
-        write!(f, "sound is {:.0} ms {late} ({sure})", 1000.0 * self.secs.abs())
+        let certainty = if self.is_reliable() { "reliable" } else { "uncertain" };
+        write!(f, "audio is {:.0} ms {late} ({certainty})", 1000.0 * self.secs.abs())
     }
 }
 
@@ -106,9 +107,9 @@ mod tests {
     #[test]
     fn offset_prints_direction_and_reliability() {
         let offset = SoundOffset { secs: 0.12, correlation: 0.5, confidence: 0.999, compared_secs: 60.0 };
-        assert_eq!((offset.to_string().as_str(), offset.is_reportable()), ("sound is 120 ms late (sure)", true));
+        assert_eq!((offset.to_string().as_str(), offset.is_reportable()), ("audio is 120 ms late (reliable)", true));
         let offset = SoundOffset { secs: -0.02, confidence: 0.5, ..offset };
-        assert_eq!((offset.to_string().as_str(), offset.is_reportable()), ("sound is 20 ms early (not sure)", false));
-        assert!(!SoundOffset { secs: 0.73, confidence: 1.0, ..offset }.is_sure());
+        assert_eq!((offset.to_string().as_str(), offset.is_reportable()), ("audio is 20 ms early (uncertain)", false));
+        assert!(!SoundOffset { secs: 0.73, confidence: 1.0, ..offset }.is_reliable());
     }
 }

@@ -40,8 +40,8 @@ pub struct TimeBlock {
 }
 
 impl TimeBlock {
-    /// Creates a block from 0 that is longer than any video, for a video that belongs to `split` as a whole.
-    pub const fn whole(split: Split) -> Self {
+    /// Creates a block from 0 that is longer than any video, for a video that belongs entirely to `split`.
+    pub const fn entire(split: Split) -> Self {
         Self { split: Some(split), start_secs: 0.0, end_secs: f64::MAX }
     }
 

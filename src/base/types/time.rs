@@ -16,7 +16,7 @@ pub struct FrameRate {
 
 /// Error: frame rate outside the range of cameras and motion capture systems.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("{0} is no frame rate of motion: expected 1 to 1000 frames a second")]
+#[error("invalid frame rate {0}: expected 1 to 1000 fps")]
 pub struct ImplausibleRate(pub FrameRate);
 
 /// Frame rate as stored in a file, where a part may be 0.
@@ -109,9 +109,8 @@ impl FromStr for FrameRate {
             },
             None => number.parse().ok().and_then(Self::nearest),
         };
-        rate.filter(|rate| rate.is_plausible()).ok_or_else(|| {
-            format!("`{text}` is no frame rate: expected 1 to 1000 frames a second, like 15, 29.97 or 30000/1001")
-        })
+        rate.filter(|rate| rate.is_plausible())
+            .ok_or_else(|| format!("invalid frame rate `{text}`: expected 1 to 1000 fps, e.g. 15, 29.97 or 30000/1001"))
     }
 }
 

@@ -50,7 +50,7 @@ impl RetargetArgs {
         let rig = RetargetRig::open(path)?;
         let read = |path: &PathBuf| {
             let text =
-                input::read_text(path, input::MOST_TEXT).with_context(|| format!("cannot read {}", path.display()))?;
+                input::read_text(path, input::MAX_TEXT).with_context(|| format!("cannot read {}", path.display()))?;
             Ok::<_, anyhow::Error>((text, path.clone()))
         };
         let map = self.bone_map.as_ref().map(read).transpose()?;

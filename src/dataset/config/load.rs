@@ -45,7 +45,7 @@ impl fmt::Display for ConfigError {
 /// # Errors
 /// A file that cannot be read, or `ConfigError` with every problem at once.
 pub fn load(file: &Path, sets: &[String]) -> Result<Config> {
-    let text = input::read_text(file, input::MOST_TEXT).with_context(|| {
+    let text = input::read_text(file, input::MAX_TEXT).with_context(|| {
         format!(
             "cannot read the configuration {}: create it with `orator init DIR`, or give its path with -c FILE",
             file.display()

@@ -17,7 +17,7 @@ use anyhow::{Result, ensure};
 use orator_base::audio::fingerprint::Fingerprinter;
 use orator_base::motion::bones;
 use orator_base::stage::fingerprint::hash_file;
-use orator_base::stage::ledger::{Kept, Ledger, Refused, TranscriptAccount, WordCount};
+use orator_base::stage::ledger::{Kept, Ledger, Refused, TranscriptReport, WordCount};
 use orator_base::stage::refusal::{FrameRefusal, Refusal};
 use orator_base::text::number;
 use orator_formats::joints_description::path_of;
@@ -267,7 +267,7 @@ fn inspect_shard_video(video: &ShardVideo, plan: &ImportPlan) -> Result<Inspecte
         (Vec::<(f64, f64)>::new(), Vec::new(), Fingerprinter::default());
     let mut blocks: Vec<TimeBlock> = Vec::new();
     let mut content = String::new();
-    let mut words: Option<TranscriptAccount> = None;
+    let mut words: Option<TranscriptReport> = None;
     for shard_sample in &video.samples {
         let (sample, _) = shard_sample.read()?;
         let (key, own_fps) = (&sample.key, sample.motion.fps);

@@ -11,7 +11,7 @@ use ndarray::{Array3, s};
 use orator_base::math::order::Ordered;
 use orator_base::motion::{bones, resample};
 use orator_base::stage::fingerprint::hash_file;
-use orator_base::stage::ledger::TranscriptAccount;
+use orator_base::stage::ledger::TranscriptReport;
 use orator_base::stage::refusal::{FrameRefusal, Refusal};
 use orator_base::types::pose3d::Motion;
 use orator_base::types::skeleton::{L_HAND, N_BONES, N_HAND_JOINTS, N_JOINTS, R_HAND};
@@ -61,7 +61,7 @@ pub struct AcceptedTake {
     pub moved_mm: f64,
     pub sample: Sample,
     /// Word counts of the transcript, if there is one with word times.
-    pub words: Option<TranscriptAccount>,
+    pub words: Option<TranscriptReport>,
     /// Bone lengths, metres; 0: not measured.
     pub lengths: [f32; N_BONES],
 }

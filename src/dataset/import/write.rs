@@ -34,7 +34,7 @@ pub struct Imported {
 
 /// Frame rate of the first dataset folder among the sources, the default rate of an import.
 pub fn rate_of(sources: &[PathBuf]) -> Option<orator_base::types::time::FrameRate> {
-    let info = sources.iter().find_map(|source| input::read(source.join(INFO), input::MOST_TEXT).ok())?;
+    let info = sources.iter().find_map(|source| input::read(source.join(INFO), input::MAX_TEXT).ok())?;
     serde_json::from_slice::<DatasetInfo>(&info).ok().map(|info| info.fps)
 }
 

@@ -106,7 +106,7 @@ impl<'a> Assigner<'a> {
     fn record_assignment(&mut self, at: usize, assignment: Assignment) {
         let video = &self.videos[at];
         let blocks = match &assignment {
-            Assignment::In(split, _) => vec![TimeBlock::whole(*split)],
+            Assignment::In(split, _) => vec![TimeBlock::entire(*split)],
             Assignment::Blocks(blocks) => blocks.clone(),
             Assignment::Excluded(_) => Vec::new(),
         };
@@ -227,7 +227,7 @@ impl<'a> Assigner<'a> {
         let video = &self.videos[at];
         let own = match &assignment {
             Assignment::In(split, _) => {
-                vec![TimeBlock { end_secs: video.duration_secs, ..TimeBlock::whole(*split) }]
+                vec![TimeBlock { end_secs: video.duration_secs, ..TimeBlock::entire(*split) }]
             }
             Assignment::Blocks(blocks) => blocks.clone(),
             Assignment::Excluded(_) => return assignment,

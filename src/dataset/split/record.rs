@@ -81,7 +81,7 @@ impl SplitRecord {
         if !path.exists() {
             return Ok(None);
         }
-        let bytes = input::read(path, input::MOST_TEXT).with_context(|| format!("cannot read {}", path.display()))?;
+        let bytes = input::read(path, input::MAX_TEXT).with_context(|| format!("cannot read {}", path.display()))?;
         let damaged = || {
             format!(
                 "{} is damaged. It records the split of every video: restore it from a backup, or delete it to use the \

@@ -110,7 +110,7 @@ fn assemble_again(
         text.lines().filter_map(|line| line.split_once("  ")).map(|(hash, file)| (file.into(), hash.into())).collect();
     if present.contains_key(CHECKSUMS) {
         let stated =
-            input::read(dir.join(CHECKSUMS), input::MOST_TEXT).with_context(|| format!("cannot read {CHECKSUMS}"))?;
+            input::read(dir.join(CHECKSUMS), input::MAX_TEXT).with_context(|| format!("cannot read {CHECKSUMS}"))?;
         if stated != text.as_bytes() {
             let text_of = String::from_utf8_lossy(&stated).into_owned();
             let named = text_of.lines().filter_map(|line| line.split_once("  ")).map(|(_, file)| file);
@@ -131,7 +131,7 @@ fn assemble_again(
 /// Line of the dataset card in the stored checksums: the text of the card differs between program versions, so its
 /// stored hash is accepted.
 fn card_line(dir: &Path) -> Option<String> {
-    let stated = input::read_text(dir.join(CHECKSUMS), input::MOST_TEXT).ok()?;
+    let stated = input::read_text(dir.join(CHECKSUMS), input::MAX_TEXT).ok()?;
     let line = stated.lines().find(|line| is_card(line))?;
     let is_hash = line.split_once("  ").is_some_and(|(hash, _)| hash.len() == 64 && hash.is_ascii());
     is_hash.then(|| line.to_owned())
@@ -316,7 +316,7 @@ fn files_of(dir: &Path) -> Result<BTreeMap<String, u64>> {
 /// An unreadable or damaged `ledger.jsonl`.
 pub fn read_ledgers(dir: &Path) -> Result<Vec<LedgerLine>> {
     let path = dir.join(crate::LEDGER);
-    let text = input::read_text(&path, input::MOST_TEXT).with_context(|| format!("reading {}", path.display()))?;
+    let text = input::read_text(&path, input::MAX_TEXT).with_context(|| format!("reading {}", path.display()))?;
     let parse = |line: &str| serde_json::from_str(line).with_context(|| format!("{} is damaged", path.display()));
     text.lines().map(parse).collect()
 }

@@ -243,7 +243,7 @@ impl VideoEntry {
     /// Time blocks with their splits; for a video in one split, a single unbounded block.
     pub fn blocks_with_splits(&self) -> Vec<TimeBlock> {
         match self.split {
-            Some(split) => vec![TimeBlock::whole(split)],
+            Some(split) => vec![TimeBlock::entire(split)],
             None => self.blocks.clone(),
         }
     }
@@ -283,7 +283,7 @@ impl VideoEntry {
 
 /// Hashes by path from `checksums.b3` of the dataset in `dir`; empty where it cannot be read.
 pub fn stated_hashes(dir: &Path) -> BTreeMap<String, String> {
-    let text = input::read_text(dir.join(crate::CHECKSUMS), input::MOST_TEXT).unwrap_or_default();
+    let text = input::read_text(dir.join(crate::CHECKSUMS), input::MAX_TEXT).unwrap_or_default();
     text.lines().filter_map(|line| line.split_once("  ")).map(|(hash, file)| (file.into(), hash.into())).collect()
 }
 
@@ -322,7 +322,7 @@ pub fn write_sound(dir: &Path, name: &str, codes: &[u32]) -> Result<String> {
 /// Reads the sound codes of the video `name`.
 pub fn read_sound(dir: &Path, name: &str) -> Result<Vec<u32>> {
     let path = sound_path(dir, name);
-    let bytes = input::read(&path, input::MOST_TEXT).with_context(|| format!("cannot read {}", path.display()))?;
+    let bytes = input::read(&path, input::MAX_TEXT).with_context(|| format!("cannot read {}", path.display()))?;
     ensure!(bytes.len().is_multiple_of(4), "{} is truncated: run the dataset stage again with --force", path.display());
     Ok(bytes.as_chunks::<4>().0.iter().map(|code| u32::from_le_bytes(*code)).collect())
 }

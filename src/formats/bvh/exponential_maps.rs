@@ -55,7 +55,7 @@ impl JointMapping {
     pub fn parse(entries: &[String]) -> Result<Self> {
         let entry = |entry: &String| {
             let (joint, name) = entry.split_once('=').with_context(|| format!("`{entry}`: expected JOINT=NAME"))?;
-            ensure!(JOINTS.contains(&joint), "`{joint}` is none of the joints that are learnt: {}", JOINTS.join(", "));
+            ensure!(JOINTS.contains(&joint), "unknown joint `{joint}`: expected one of {}", JOINTS.join(", "));
             Ok((joint.to_owned(), name.to_owned()))
         };
         Ok(Self(entries.iter().map(entry).collect::<Result<_>>()?))
@@ -72,15 +72,15 @@ impl JointMapping {
             }
             let Some(at) = names().position(|other| other == name) else {
                 bail!(
-                    "there is no joint {name}; name another with `{joint}=NAME`, or `{joint}=` where the skeleton has none. \
+                    "the skeleton has no joint {name}; map it with `{joint}=NAME`, or omit it with `{joint}=`. \
                      Its joints: {}",
                     names().collect::<Vec<_>>().join(", ")
                 );
             };
-            ensure!(!found.contains(&at), "joint {name} stands for two joints");
+            ensure!(!found.contains(&at), "joint {name} is mapped to two joints");
             found.push(at);
         }
-        ensure!(!found.is_empty(), "no joint is left to learn");
+        ensure!(!found.is_empty(), "every joint is omitted: expected at least one");
         found.sort_unstable_by(|a, b| b.cmp(a));
         Ok(found)
     }
@@ -111,7 +111,7 @@ impl ExponentialMaps {
     /// or missing joints.
     pub fn of(files: impl IntoIterator<Item = Result<(String, Bvh)>>, mapping: &JointMapping) -> Result<Self> {
         let mut files = files.into_iter();
-        let (name, first) = files.next().context("there is no motion to learn from")??;
+        let (name, first) = files.next().context("no training motion was given")??;
         let mut maps = Self::from_first_file(&first, mapping).with_context(|| name.clone())?;
         let mut all = vec![maps.exponential_maps(&first).context(name)?];
         for file in files {
@@ -119,7 +119,7 @@ impl ExponentialMaps {
             all.push(maps.exponential_maps(&bvh).context(name)?);
         }
         maps.columns = (0..all[0].ncols()).filter(|&column| all[0].column(column).std(0.0) >= MIN_STD).collect();
-        ensure!(!maps.columns.is_empty(), "no joint of the first file moves");
+        ensure!(!maps.columns.is_empty(), "no joint of the training motion moves");
         let n_frames: usize = all.iter().map(Array2::nrows).sum();
         for &column in &maps.columns {
             let values = || all.iter().flat_map(move |file| file.column(column).to_vec());
@@ -134,7 +134,7 @@ impl ExponentialMaps {
         let skeleton = BvhSkeleton::of(first);
         skeleton.check()?;
         let joints = mapping.find(&skeleton)?;
-        let mut rest = first.frames().next().context("it has no frame")?.to_vec();
+        let mut rest = first.frames().next().context("the file has no frames")?.to_vec();
         let n_root = skeleton.joints[0].channels.len();
         rest[..n_root].fill(0.0);
         Ok(Self { skeleton, rest, joints, columns: Vec::new(), mean: Vec::new(), largest: Vec::new() })
@@ -149,16 +149,21 @@ impl ExponentialMaps {
     pub fn check(&self) -> Result<()> {
         self.skeleton.check()?;
         let n = self.columns.len();
-        ensure!(self.mean.len() == n && self.largest.len() == n && n > 0, "its tables of columns differ in length");
-        ensure!(self.rest.len() == self.skeleton.n_channels(), "its rest pose has {} numbers", self.rest.len());
-        ensure!(self.columns.iter().all(|&column| column < 3 * self.joints.len()), "it has a column of no joint");
+        ensure!(self.mean.len() == n && self.largest.len() == n && n > 0, "the column tables differ in length");
+        ensure!(
+            self.rest.len() == self.skeleton.n_channels(),
+            "the rest pose has {} values, expected {}",
+            self.rest.len(),
+            self.skeleton.n_channels()
+        );
+        ensure!(self.columns.iter().all(|&column| column < 3 * self.joints.len()), "a column index is out of range");
         for &joint in &self.joints {
             let order = self.skeleton.joints.get(joint).and_then(|joint| joint.rotation_order());
-            ensure!(order.is_some(), "joint {joint} has no three rotations");
+            ensure!(order.is_some(), "joint {joint} does not have three rotation channels");
         }
         let mut numbers = self.mean.iter().chain(&self.largest).chain(&self.rest);
-        ensure!(numbers.all(|v| v.is_finite()), "it holds a number that is not finite");
-        ensure!(self.largest.iter().all(|v| *v > 0.0), "its `largest` has a number that is not above 0");
+        ensure!(numbers.all(|v| v.is_finite()), "a value is not finite");
+        ensure!(self.largest.iter().all(|v| *v > 0.0), "a value of `largest` is not positive");
         Ok(())
     }
 
@@ -206,15 +211,15 @@ impl ExponentialMaps {
         let are_same = skeleton.joints.iter().zip(&self.skeleton.joints).all(is_same);
         ensure!(
             are_same && skeleton.joints.len() == self.skeleton.joints.len(),
-            "its skeleton has other joints or channels than the first file's ({} joints, expected {})",
+            "the skeleton has other joints or channels than that of the first file ({} joints, expected {})",
             skeleton.joints.len(),
             self.skeleton.joints.len()
         );
         let per_frame = 1.0 / (bvh.frame_secs * FPS.per_sec());
-        ensure!(per_frame > 0.99, "it has {:.2} frames a second, fewer than {FPS}", 1.0 / bvh.frame_secs);
+        ensure!(per_frame > 0.99, "the frame rate is {:.2} fps, expected {FPS} or more", 1.0 / bvh.frame_secs);
         let frames: Vec<&[f64]> = bvh.frames().collect();
         if let Some(t) = frames.iter().position(|frame| frame.iter().any(|value| !value.is_finite())) {
-            bail!("frame {t} has a number that is not finite");
+            bail!("frame {t} has a non-finite value");
         }
         // Up to the frame before the last one.
         let n = (0..).take_while(|t| (f64::from(*t) * per_frame).round() < frames.len() as f64 - 1.0).count();
@@ -224,7 +229,7 @@ impl ExponentialMaps {
             let name = &self.skeleton.joints[joint].name;
             ensure!(
                 self.skeleton.joints[joint].rotation_order().is_some(),
-                "joint {name} has no rotations about three axes"
+                "joint {name} does not have three rotation channels"
             );
             let rotation = |t: usize| self.rotation(joint, frames[t.min(frames.len() - 1)]);
             let at = |t: usize| {
@@ -363,7 +368,7 @@ mod tests {
             text.contains("no joint Chest") && text.contains("Spine3=NAME") && text.contains("LeftUpLeg"),
             "{text}"
         );
-        assert!(error_of(&parse(&["Spine3=Spine2"]).unwrap()).contains("two joints"));
+        assert!(error_of(&parse(&["Spine3=Spine2"]).unwrap()).contains("mapped to two joints"));
         assert!(parse(&["Spine3"]).is_err() && parse(&["Tail=Tail"]).is_err());
         let mut other = bvh.clone();
         other.joints[2].name = "Knee".into();

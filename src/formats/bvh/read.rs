@@ -5,6 +5,7 @@ use super::skeleton::{JointChannels, joint_positions};
 use anyhow::{Context, Result, anyhow, bail, ensure};
 use orator_base::input;
 use orator_base::math::vec3::Vec3;
+use orator_base::text::counted;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
@@ -59,8 +60,8 @@ impl Bvh {
     /// The file is unreadable or not BVH; the message names what was expected.
     pub fn read(path: &Path) -> Result<Self> {
         let text =
-            input::read_text(path, input::MOST_DATA).with_context(|| format!("cannot read {}", path.display()))?;
-        Self::parse(&text).with_context(|| format!("{} is no readable BVH", path.display()))
+            input::read_text(path, input::MAX_DATA).with_context(|| format!("cannot read {}", path.display()))?;
+        Self::parse(&text).with_context(|| format!("{} is not a valid BVH file", path.display()))
     }
 
     /// Parses the text of a file.
@@ -77,9 +78,17 @@ impl Bvh {
                 "OFFSET" => joints[current].offset = [words.number()?, words.number()?, words.number()?],
                 "CHANNELS" => {
                     let is_first = current + 1 == joints.len() && joints[current].channels.is_empty();
-                    ensure!(is_first, "joint {}: CHANNELS must stand once, before its children", joints[current].name);
+                    ensure!(
+                        is_first,
+                        "joint {}: expected CHANNELS once, before the child joints",
+                        joints[current].name
+                    );
                     let count = words.number()?;
-                    ensure!((0.0..=6.0).contains(&count), "a joint with {count} channels");
+                    ensure!(
+                        (0.0..=6.0).contains(&count),
+                        "joint {}: {count} channels, expected 0 to 6",
+                        joints[current].name
+                    );
                     joints[current].channels =
                         (0..count as usize).map(|_| channel(words.next("a channel")?)).collect::<Result<_>>()?;
                     n_channels += joints[current].channels.len();
@@ -91,36 +100,40 @@ impl Bvh {
                     push(&mut joints, &mut open, name, &mut words)?;
                 }
                 "}" => drop(open.pop()),
-                other => bail!("`{other}` inside joint {}", joints[current].name),
+                other => bail!("unexpected `{other}` in joint {}", joints[current].name),
             }
         }
         words.expect("MOTION")?;
         words.expect("Frames:")?;
         let n_frames = words.number()?;
-        ensure!(n_frames >= 0.0 && n_frames.fract() == 0.0 && n_frames < 1e8, "Frames: {n_frames}");
+        ensure!(
+            n_frames >= 0.0 && n_frames.fract() == 0.0 && n_frames < 1e8,
+            "invalid number of frames {n_frames}: expected 0 to 99999999"
+        );
         words.expect("Frame")?;
         words.expect("Time:")?;
         let frame_secs = words.number()?;
         // The bounds allow for the rounding of frame times.
         ensure!(
             (0.000_99..=1.01).contains(&frame_secs),
-            "Frame Time: {frame_secs:?} seconds, expected 0.001 to 1 (1000 to 1 frames a second)"
+            "invalid frame time {frame_secs:?} s: expected 0.001 to 1 (1000 to 1 fps)"
         );
-        ensure!(n_frames == 0.0 || n_channels > 0, "{n_frames} frames of no channel");
+        ensure!(n_frames == 0.0 || n_channels > 0, "{n_frames} frames without channels");
         let values: Vec<f64> =
-            words.0.map(|w| w.parse().map_err(|_| anyhow!("`{w}` is no number"))).collect::<Result<_>>()?;
+            words.0.map(|w| w.parse().map_err(|_| anyhow!("`{w}` is not a number"))).collect::<Result<_>>()?;
         let expected = n_frames as usize * n_channels;
         ensure!(
             values.len() == expected,
-            "{} numbers after Frame Time, expected {n_frames} frames x {n_channels}",
+            "{} values after Frame Time, expected {n_frames} frames x {n_channels} channels",
             values.len()
         );
         // The positions of all joints are held in memory, so their number is limited by the size of the file.
         let n_positions = n_frames as usize * joints.len();
         ensure!(
             n_positions <= MIN_POSITION_LIMIT.max(MAX_POSITIONS_PER_BYTE * text.len()),
-            "{n_frames} frames of {} joints with {n_channels} channels together: too few numbers for so many positions",
-            joints.len()
+            "{n_frames} frames of {} joints with only {}: too many positions for the size of the file",
+            joints.len(),
+            counted(n_channels, "channel")
         );
         Ok(Self { joints, frame_secs, n_frames: n_frames as usize, values, n_channels })
     }
@@ -163,9 +176,14 @@ impl Bvh {
 
 /// Adds a joint as a child of the innermost open joint and opens it.
 fn push(joints: &mut Vec<JointChannels>, open: &mut Vec<usize>, name: String, words: &mut Words) -> Result<()> {
-    ensure!(joints.len() < MAX_JOINTS, "it has more than {MAX_JOINTS} joints: give the file of one figure");
-    ensure!(open.len() < MAX_DEPTH, "more than {MAX_DEPTH} joints hang on each other");
-    ensure!(name.len() <= MAX_NAME_BYTES, "joint {}: a name of {} bytes", joints.len() + 1, name.len());
+    ensure!(joints.len() < MAX_JOINTS, "more than {MAX_JOINTS} joints: expected the skeleton of one figure");
+    ensure!(open.len() < MAX_DEPTH, "the joints are nested deeper than {MAX_DEPTH} levels");
+    ensure!(
+        name.len() <= MAX_NAME_BYTES,
+        "joint {}: the name has {} bytes, expected {MAX_NAME_BYTES} or fewer",
+        joints.len() + 1,
+        name.len()
+    );
     words.expect("{")?;
     joints.push(JointChannels { name, parent: open.last().copied(), offset: [0.0; 3], channels: Vec::new() });
     open.push(joints.len() - 1);
@@ -180,7 +198,7 @@ fn channel(word: &str) -> Result<Channel> {
         "xrotation" => Channel::Rotation(0),
         "yrotation" => Channel::Rotation(1),
         "zrotation" => Channel::Rotation(2),
-        _ => bail!("`{word}` is no channel"),
+        _ => bail!("unknown channel `{word}`"),
     })
 }
 
@@ -188,18 +206,18 @@ struct Words<'a>(std::str::SplitAsciiWhitespace<'a>);
 
 impl<'a> Words<'a> {
     fn next(&mut self, what: &str) -> Result<&'a str> {
-        self.0.next().with_context(|| format!("the file ends before {what}"))
+        self.0.next().with_context(|| format!("unexpected end of file: expected {what}"))
     }
 
     fn expect(&mut self, word: &str) -> Result<()> {
         let found = self.next(&format!("`{word}`"))?;
-        ensure!(found.eq_ignore_ascii_case(word), "`{found}` where `{word}` was expected");
+        ensure!(found.eq_ignore_ascii_case(word), "found `{found}`, expected `{word}`");
         Ok(())
     }
 
     fn number(&mut self) -> Result<f64> {
         let word = self.next("a number")?;
-        word.parse().map_err(|_| anyhow!("`{word}` where a number was expected"))
+        word.parse().map_err(|_| anyhow!("found `{word}`, expected a number"))
     }
 }
 
@@ -252,10 +270,10 @@ mod tests {
     fn errors_name_the_position_in_the_file() {
         let good = arm("3 Zrotation Yrotation Xrotation", "0 0 0 0 0 0 0 0 0");
         for (broken, expected) in [
-            (String::new(), "ends before"),
+            (String::new(), "unexpected end of file"),
             (good.replace("ROOT", "LEAF"), "`LEAF`"),
             (good.replace("Yrotation", "Wrotation"), "Wrotation"),
-            (good.replace("Frames: 1", "Frames: 2"), "9 numbers"),
+            (good.replace("Frames: 1", "Frames: 2"), "9 values"),
             (good.replace("Frames: 1", "Frames: -1"), "Frames: -1"),
             (good.replace("0.04", "0"), "Frame Time"),
             (good.replace("0.04", "1e-300"), "Frame Time: 1"),
@@ -279,9 +297,9 @@ mod tests {
             )
         };
         let error_of = |text: &str| format!("{:#}", Bvh::parse(text).unwrap_err());
-        assert!(error_of(&file("0", 99_999_999, "")).contains("99999999 frames of no channel"));
+        assert!(error_of(&file("0", 99_999_999, "")).contains("99999999 frames without channels"));
         let many = error_of(&file("1 Xposition", 20_000, &"0 ".repeat(20_000)));
-        assert!(many.contains("20000 frames of 201 joints with 1 channels"), "{many}");
+        assert!(many.contains("20000 frames of 201 joints with only 1 channel:"), "{many}");
         assert_eq!(Bvh::parse(&file("1 Xposition", 100, &"0 ".repeat(100))).unwrap().n_frames, 100);
     }
 
@@ -291,9 +309,11 @@ mod tests {
         let head = "HIERARCHY ROOT a { OFFSET 0 0 0 CHANNELS 1 Xposition ";
         let joint = "JOINT b { OFFSET 0 0 0 } ";
         assert!(error_of(format!("{head}{}", joint.repeat(MAX_JOINTS))).contains("more than 10000 joints"));
-        assert!(error_of(format!("{head}{}", "JOINT b { ".repeat(MAX_DEPTH))).contains("more than 512 joints"));
+        assert!(
+            error_of(format!("{head}{}", "JOINT b { ".repeat(MAX_DEPTH))).contains("nested deeper than 512 levels")
+        );
         // Each nested end site would extend the name of its parent.
-        assert!(error_of(format!("{head}{}", "End Site { ".repeat(300))).contains("a name of"));
+        assert!(error_of(format!("{head}{}", "End Site { ".repeat(300))).contains("the name has"));
         let valid = format!("{head}{}}} MOTION Frames: 1 Frame Time: 0.04 0", joint.repeat(MAX_JOINTS - 1));
         assert_eq!(Bvh::parse(&valid).unwrap().joints.len(), MAX_JOINTS);
     }

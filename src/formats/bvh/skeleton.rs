@@ -84,14 +84,22 @@ impl BvhSkeleton {
     /// BVH file has.
     pub fn check(&self) -> Result<()> {
         for (at, joint) in self.joints.iter().enumerate() {
-            ensure!(joint.parent.is_none() == (at == 0), "joint {} has no place in the skeleton", joint.name);
-            ensure!(joint.parent.is_none_or(|parent| parent < at), "the parent of joint {} comes after it", joint.name);
-            ensure!(joint.offset.iter().all(|v| v.is_finite()), "the offset of joint {} is not finite", joint.name);
+            ensure!(
+                joint.parent.is_none() == (at == 0),
+                "joint {}: expected exactly one root, as the first joint",
+                joint.name
+            );
+            ensure!(joint.parent.is_none_or(|parent| parent < at), "joint {}: the parent comes after it", joint.name);
+            ensure!(joint.offset.iter().all(|v| v.is_finite()), "joint {}: the offset is not finite", joint.name);
             let axis = |channel: &Channel| match channel {
                 Channel::Position(axis) | Channel::Rotation(axis) => *axis,
             };
-            ensure!(joint.channels.iter().all(|channel| axis(channel) < 3), "joint {} has a fourth axis", joint.name);
-            ensure!(!joint.name.contains(char::is_whitespace), "joint {:?} has a space in its name", joint.name);
+            ensure!(
+                joint.channels.iter().all(|channel| axis(channel) < 3),
+                "joint {}: a channel has an axis other than x, y and z",
+                joint.name
+            );
+            ensure!(!joint.name.contains(char::is_whitespace), "joint {:?}: the name contains a space", joint.name);
         }
         Ok(())
     }

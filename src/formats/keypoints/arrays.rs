@@ -15,7 +15,7 @@ use std::path::Path;
 /// Reads the array of a `.npy` file.
 pub fn read_npy(path: &Path, bytes: &[u8]) -> Result<FoundKeypoints> {
     let expected =
-        || format!("{} is no .npy file of numbers (float32, float64 or integers; no objects)", path.display());
+        || format!("{} is not a .npy file of numbers: expected float32, float64 or integers", path.display());
     let array = npy::numbers(bytes).with_context(expected)?.with_context(expected)?;
     from_arrays(path, vec![(String::new(), array.mapv(|v| v as f32))])
 }
@@ -49,8 +49,8 @@ fn from_arrays(path: &Path, arrays: NamedArrays) -> Result<FoundKeypoints> {
     match read.with_context(|| path.display().to_string())? {
         Some(found) => Ok(found),
         None => bail!(
-            "{} has no array `body` [T, 17, 3], nor MediaPipe's landmarks ([T, 33, 3..5] with hands [T, 21, 3] beside it, \
-             [T, 75, 3..4], [T, 543, 3], [T, 1662]), nor PATS ([T, 2, 52], [T, 104]); it has: {}",
+            "{}: expected an array `body` [T, 17, 3], MediaPipe landmarks ([T, 33, 3..5], or with hands [T, 21, 3]; \
+             [T, 75, 3..4], [T, 543, 3], [T, 1662]) or PATS ([T, 2, 52], [T, 104]); found: {}",
             path.display(),
             shapes.iter().map(|shape| shape.trim()).collect::<Vec<_>>().join(", ")
         ),

@@ -35,15 +35,15 @@ struct AnnotatedImage {
 }
 
 /// Persons found in a file.
-pub struct JsonPeople {
+pub struct JsonPersons {
     /// Name of the program: `OpenPose`.
     pub program: &'static str,
     image_size: Option<[u32; 2]>,
-    pub people: FramePeople,
+    pub persons: FramePersons,
 }
 
 /// Persons, with or without frame numbers.
-pub enum FramePeople {
+pub enum FramePersons {
     /// All persons in the single image of the file.
     Picture(Vec<JsonEntry>),
     /// All persons in each frame, by frame number.
@@ -53,10 +53,10 @@ pub enum FramePeople {
 /// Parses the keypoints of a complete video from the bytes of a JSON file. Errors name line and column, or frame and
 /// person.
 pub fn parse(bytes: &[u8]) -> Result<FoundKeypoints> {
-    let JsonPeople { program, image_size, people } = people(bytes)?;
-    let frames = match people {
-        FramePeople::Frames(frames) => frames,
-        FramePeople::Picture(people) => BTreeMap::from([(0, people)]),
+    let JsonPersons { program, image_size, persons } = read_persons(bytes)?;
+    let frames = match persons {
+        FramePersons::Frames(frames) => frames,
+        FramePersons::Picture(entries) => BTreeMap::from([(0, entries)]),
     };
     let mut found = from_frames(program, frames)?;
     found.image_size = image_size;
@@ -78,7 +78,7 @@ fn from_frames(program: &str, frames: BTreeMap<u64, Vec<JsonEntry>>) -> Result<F
 /// An entry is not a valid person, or there are more than 1000 persons.
 pub fn persons(number: u64, entries: &[JsonEntry], counts: &mut BTreeSet<usize>) -> Result<Vec<FoundPerson>> {
     let n = entries.len();
-    ensure!(n <= MAX_PERSONS, "frame {number} holds {n} people, expected {MAX_PERSONS} at most");
+    ensure!(n <= MAX_PERSONS, "frame {number} has {n} persons, expected at most {MAX_PERSONS}");
     let mut persons = Vec::with_capacity(n);
     for (at, entry) in entries.iter().enumerate() {
         let person = entry.person().map_err(|message| anyhow::anyhow!("frame {number}, person {at}: {message}"))?;
@@ -102,7 +102,7 @@ pub fn of_persons(
 }
 
 /// Parses the persons in the bytes of a JSON file.
-pub fn people(bytes: &[u8]) -> Result<JsonPeople> {
+pub fn read_persons(bytes: &[u8]) -> Result<JsonPersons> {
     let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
     let bytes = without_nan(bytes);
     let mut first_bytes = bytes.iter().filter(|byte| !byte.is_ascii_whitespace());
@@ -110,35 +110,35 @@ pub fn people(bytes: &[u8]) -> Result<JsonPeople> {
         (Some(b'{'), _) => from_object(read(&bytes)?),
         (Some(b'['), Some(b'[')) => {
             let frames: Vec<Vec<JsonEntry>> = read(&bytes)?;
-            Ok(JsonPeople::new("MMPose", FramePeople::Frames((0..).zip(frames).collect())))
+            Ok(JsonPersons::new("MMPose", FramePersons::Frames((0..).zip(frames).collect())))
         }
         (Some(b'['), _) => from_list(read(&bytes)?),
-        _ => bail!("no JSON: it begins neither with {{ nor with ["),
+        _ => bail!("not JSON: expected {{ or [ at the start"),
     }
 }
 
-impl JsonPeople {
-    fn new(program: &'static str, people: FramePeople) -> Self {
-        Self { program, image_size: None, people }
+impl JsonPersons {
+    fn new(program: &'static str, persons: FramePersons) -> Self {
+        Self { program, image_size: None, persons }
     }
 }
 
 fn read<'de, T: Deserialize<'de>>(bytes: &'de [u8]) -> Result<T> {
-    serde_json::from_slice(bytes).context("the JSON is cut off, damaged or of another kind")
+    serde_json::from_slice(bytes).context("the JSON is truncated, damaged or of another format")
 }
 
-fn from_object(object: KeypointDocument) -> Result<JsonPeople> {
+fn from_object(object: KeypointDocument) -> Result<JsonPersons> {
     let KeypointDocument { people, instance_info, annotations, images } = object;
     if let Some(people) = people {
-        return Ok(JsonPeople::new("OpenPose", FramePeople::Picture(people)));
+        return Ok(JsonPersons::new("OpenPose", FramePersons::Picture(people)));
     }
     if let Some(instances) = instance_info {
-        return Ok(JsonPeople { program: "MMPose", ..from_list(instances)? });
+        return Ok(JsonPersons { program: "MMPose", ..from_list(instances)? });
     }
     let Some(annotations) = annotations else {
         bail!(
-            "no keypoints are known in it: expected `people` (OpenPose), `instance_info` (MMPose), `annotations` and \
-             `images` (COCO-WholeBody) or a list of people (AlphaPose, MMPose)"
+            "expected `people` (OpenPose), `instance_info` (MMPose), `annotations` and \
+             `images` (COCO-WholeBody) or a list of persons (AlphaPose, MMPose)"
         );
     };
     let numbers = annotated_numbers(&images);
@@ -148,13 +148,13 @@ fn from_object(object: KeypointDocument) -> Result<JsonPeople> {
             Some(name) if images.is_empty() => number_of_image(name)?,
             Some(name) => *numbers
                 .get(name)
-                .with_context(|| format!("annotation {at}: `images` has no picture {}", format_name(name)))?,
+                .with_context(|| format!("annotation {at}: `images` has no image {}", format_name(name)))?,
             None => bail!("annotation {at}: the key image_id is missing"),
         };
         frames.entry(number).or_default().push(entry);
     }
     let size = images.iter().map(|image| [image.width, image.height]).find(|size| size.iter().all(|px| *px > 0));
-    Ok(JsonPeople { program: "COCO-WholeBody", image_size: size, people: FramePeople::Frames(frames) })
+    Ok(JsonPersons { program: "COCO-WholeBody", image_size: size, persons: FramePersons::Frames(frames) })
 }
 
 /// Frame number of each image: the digits of its file name if these are unique, otherwise its index in the list.
@@ -165,32 +165,32 @@ fn annotated_numbers(images: &[AnnotatedImage]) -> BTreeMap<&ImageName, u64> {
     images.iter().map(|image| &image.id).zip(numbers).collect()
 }
 
-fn from_list(entries: Vec<JsonEntry>) -> Result<JsonPeople> {
+fn from_list(entries: Vec<JsonEntry>) -> Result<JsonPersons> {
     if entries.iter().any(|entry| entry.instances.is_some()) {
         let mut frames = BTreeMap::new();
         for (at, entry) in (0..).zip(entries) {
             let number = entry.frame_id.unwrap_or(at);
             let before = frames.insert(number, entry.instances.unwrap_or_default());
-            ensure!(before.is_none(), "two frames have the frame_id {number}; expected the frames of one video");
+            ensure!(before.is_none(), "duplicate frame_id {number}: expected the frames of one video");
         }
-        return Ok(JsonPeople::new("MMPose", FramePeople::Frames(frames)));
+        return Ok(JsonPersons::new("MMPose", FramePersons::Frames(frames)));
     }
     if entries.iter().all(|entry| entry.image_id.is_none()) {
-        return Ok(JsonPeople::new("MMPose", FramePeople::Picture(entries)));
+        return Ok(JsonPersons::new("MMPose", FramePersons::Picture(entries)));
     }
     let mut frames: BTreeMap<u64, Vec<JsonEntry>> = BTreeMap::new();
     for (at, entry) in entries.into_iter().enumerate() {
         let Some(name) = &entry.image_id else { bail!("person {at} of the list: the key image_id is missing") };
         frames.entry(number_of_image(name)?).or_default().push(entry);
     }
-    Ok(JsonPeople::new("AlphaPose", FramePeople::Frames(frames)))
+    Ok(JsonPersons::new("AlphaPose", FramePersons::Frames(frames)))
 }
 
 fn number_of_image(name: &ImageName) -> Result<u64> {
     match name {
         ImageName::Number(number) => Ok(*number),
         ImageName::Name(text) => {
-            number_of(text).with_context(|| format!("image_id {text:?} holds no digits: which frame is it?"))
+            number_of(text).with_context(|| format!("image_id {text:?} has no digits: expected the frame number in it"))
         }
     }
 }

@@ -3,6 +3,7 @@
 
 use super::found::FoundPerson;
 use super::layout::PointLayout;
+use orator_base::text::counted;
 use orator_base::types::pose2d::{Keypoint, N_HAND};
 use orator_base::types::skeleton::Side;
 use serde::Deserialize;
@@ -67,7 +68,7 @@ impl JsonEntry {
             let points = triples(key, &numbers.0)?;
             let hand = if side == Side::Left { &mut person.left_hand } else { &mut person.right_hand };
             *hand = points.try_into().map_err(|points: Vec<Keypoint>| {
-                format!("`{key}` holds {} points, expected {N_HAND} of a hand", points.len())
+                format!("`{key}` has {}, expected {N_HAND}", counted(points.len(), "point"))
             })?;
         }
         Ok(Some((person, points.len())))
@@ -84,7 +85,7 @@ pub fn point(x: f32, y: f32, score: f32) -> Keypoint {
 fn triples(key: &str, numbers: &[f32]) -> Result<Vec<Keypoint>, String> {
     let (triples, rest) = numbers.as_chunks::<3>();
     if !rest.is_empty() {
-        return Err(format!("`{key}` holds {} numbers, expected x, y and score of each point", numbers.len()));
+        return Err(format!("`{key}` has {} numbers, expected x, y and score for each point", numbers.len()));
     }
     Ok(triples.iter().map(|&[x, y, score]| point(x, y, score)).collect())
 }
@@ -93,7 +94,7 @@ fn scored(numbers: &[f32], scores: &[f32]) -> Result<Vec<Keypoint>, String> {
     let (pairs, rest) = numbers.as_chunks::<2>();
     if pairs.len() != scores.len() || !rest.is_empty() {
         let (n, n_scores) = (numbers.len(), scores.len());
-        return Err(format!("`keypoints` holds {n} numbers for {n_scores} scores, expected x and y for each (2D)"));
+        return Err(format!("`keypoints` has {n} numbers for {n_scores} scores, expected x and y for each score (2D)"));
     }
     Ok(pairs.iter().zip(scores).map(|(&[x, y], &score)| point(x, y, score)).collect())
 }

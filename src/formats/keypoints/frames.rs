@@ -2,6 +2,7 @@
 
 use super::found::FoundPerson;
 use anyhow::{Result, bail};
+use orator_base::text::counted;
 use std::collections::BTreeMap;
 
 /// Maximum ratio of the length of the sequence to the number of frames present; sequences of up to `SHORT_SEQUENCE`
@@ -21,22 +22,24 @@ pub fn in_order(numbered: BTreeMap<u64, Vec<FoundPerson>>) -> Result<(Vec<Vec<Fo
     let base = first.min(1);
     let (n_present, n_frames) = (numbered.len() as u64, (last - base).saturating_add(1));
     if n_frames > SHORT_SEQUENCE && n_frames / MAX_LENGTH_RATIO > n_present {
-        bail!(
-            "{n_present} frames with numbers from {first} to {last}; expected the frames of one video, one after the other"
-        );
+        bail!("{n_present} frames numbered from {first} to {last}: expected consecutive frames of one video");
     }
     let mut notes = Vec::new();
     if first > base {
-        notes.push(format!("the first frame has the number {first}: {} before it count as not seen", first - base));
+        let before = counted((first - base) as usize, "frame");
+        notes.push(format!("the first frame has number {first}: {before} before it marked as not detected"));
     }
     let n_gaps = n_frames - n_present - (first - base);
     if n_gaps > 0 {
         let missing = (first..last).find(|number| !numbered.contains_key(number)).unwrap_or(first);
-        notes.push(format!("{n_gaps} frames are missing, the first has the number {missing}: taken as not seen"));
+        notes.push(format!(
+            "{} (the first is number {missing}): marked as not detected",
+            counted(n_gaps as usize, "missing frame")
+        ));
     }
     let mut frames = vec![Vec::new(); n_frames as usize];
-    for (number, people) in numbered {
-        frames[(number - base) as usize] = people;
+    for (number, persons) in numbered {
+        frames[(number - base) as usize] = persons;
     }
     Ok((frames, notes))
 }
@@ -82,12 +85,12 @@ mod tests {
         assert_eq!(
             notes,
             [
-                "the first frame has the number 2: 1 before it count as not seen",
-                "2 frames are missing, the first has the number 3: taken as not seen"
+                "the first frame has number 2: 1 frame before it marked as not detected",
+                "2 missing frames (the first is number 3): marked as not detected"
             ]
         );
         assert!(frames(&[]).is_err());
         let text = frames(&[3, u64::MAX]).unwrap_err().to_string();
-        assert!(text.contains("2 frames with numbers from 3 to"), "{text}");
+        assert!(text.contains("2 frames numbered from 3 to"), "{text}");
     }
 }

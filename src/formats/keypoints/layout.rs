@@ -46,7 +46,7 @@ impl PointLayout {
     pub fn for_json(n_points: usize) -> Result<&'static Self, String> {
         JSON_LAYOUTS.iter().find(|layout| layout.n_points == n_points).ok_or_else(|| {
             let known = JSON_LAYOUTS.map(|layout| layout.n_points.to_string()).join(", ");
-            format!("{n_points} points a person; orders of {known} points are known")
+            format!("{n_points} points per person: expected one of {known}")
         })
     }
 

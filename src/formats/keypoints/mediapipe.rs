@@ -49,7 +49,7 @@ pub fn read(arrays: &NamedArrays) -> Result<Option<FoundKeypoints>> {
     };
     let frames = (0..n_frames).map(frame).collect();
     let hands = if landmarks.hands.iter().any(Option::is_some) { " and hands" } else { "" };
-    let no_hands = hands.is_empty().then(|| "no arrays of hands: taken as not seen".to_owned());
+    let no_hands = hands.is_empty().then(|| "no hand arrays: hands are marked as not detected".to_owned());
     Ok(Some(FoundKeypoints::new(format!("MediaPipe, pose{hands}"), frames, no_hands.into_iter().collect())))
 }
 

@@ -24,7 +24,7 @@ pub fn read(arrays: &NamedArrays) -> Result<Option<FoundKeypoints>> {
     let n_frames = array.shape()[0];
     if let Some((name, scores)) = confidence {
         let shape = scores.shape();
-        ensure!(shape == [n_frames, N], "`{name}` has the shape {shape:?}, expected [{n_frames}, {N}]");
+        ensure!(shape == [n_frames, N], "`{name}` has shape {shape:?}, expected [{n_frames}, {N}]");
     }
     let score = |t: usize, j: usize| confidence.map_or(1.0, |(_, scores)| scores[[t, j]]);
     let xy = |t: usize, j: usize| match array.shape() {
@@ -41,8 +41,8 @@ pub fn read(arrays: &NamedArrays) -> Result<Option<FoundKeypoints>> {
     let from_neck = (0..n_frames).all(|t| xy(t, 0) == [0.0; 2]);
     ensure!(
         !from_neck || found.unit == CoordinateUnit::Pixels,
-        "its points lie less than 2 from the neck at 0, 0: no pixels; write them in pixels of the video's picture, in which \
-         shoulders are some hundred apart"
+        "its points are less than 2 from the neck at 0, 0: expected pixels of the video, in which the shoulders are \
+         hundreds of pixels apart"
     );
     let unit = if from_neck { CoordinateUnit::FromNeck } else { found.unit };
     Ok(Some(FoundKeypoints { fps: Some(RATE), unit, ..found }))

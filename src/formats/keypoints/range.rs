@@ -37,15 +37,15 @@ pub fn check_pixels(coordinates: impl Iterator<Item = [f32; 2]>) -> Result<()> {
     let median = median_size(coordinates.iter().copied()).unwrap_or(0.0);
     ensure!(
         median <= MAX_IMAGE_SIDE,
-        "its points lie about {median:.0} px from the picture's corner, which no picture has room for: expected pixels, \
-         or shares of the picture from 0 to 1"
+        "implausible coordinates (median {median:.0} px): expected pixels, \
+         or fractions of the image size from 0 to 1"
     );
     for (axis, name, end) in [(0, "x", "left"), (1, "y", "upper")] {
         let n_outside = coordinates.iter().filter(|xy| xy[axis] < 0.0).count();
         ensure!(
             coordinates.is_empty() || (n_outside as f64) < MAX_OUTSIDE * coordinates.len() as f64,
-            "{n_outside} of {} points have a negative {name}: expected pixels counted from the picture's {end} edge; add \
-             half its size where they count from its middle, and turn y round where it points up",
+            "{n_outside} of {} points have a negative {name}: expected pixels from the {end} edge of the image; add \
+             half the image size if they are relative to its centre, and negate y if it points up",
             coordinates.len()
         );
     }

@@ -1,7 +1,7 @@
 //! Reads keypoints in the format detected from the content of the file, or from a folder with one JSON file per
 //! frame, as written by OpenPose (`NAME_000000000012_keypoints.json`).
 
-use super::document::FramePeople;
+use super::document::FramePersons;
 use super::found::{CoordinateUnit, FoundKeypoints, FoundPerson};
 use super::frames::number_of;
 use super::range::check_pixels;
@@ -25,12 +25,12 @@ pub fn read(path: &Path) -> Result<FoundKeypoints> {
     ensure!(!found.frames.is_empty(), "{shown} has no frames");
     ensure!(
         found.frames.iter().flatten().any(|person| person.area().is_some()),
-        "{shown}: nobody is seen in any frame"
+        "{shown}: no person is visible in any frame"
     );
     ensure!(
         found.unit != CoordinateUnit::Fraction || found.negative_fraction() < MAX_NEGATIVE,
-        "{shown}: its coordinates lie between -1 and 1; write them in pixels (OpenPose: --keypoint_scale 0) or as shares \
-         of the picture from 0 to 1 (--keypoint_scale 3)"
+        "{shown}: coordinates are between -1 and 1: expected pixels (OpenPose: --keypoint_scale 0) or fractions \
+         of the image size from 0 to 1 (--keypoint_scale 3)"
     );
     if found.unit == CoordinateUnit::Pixels {
         check_pixels(found.coordinates()).with_context(|| shown.to_string())?;
@@ -39,16 +39,16 @@ pub fn read(path: &Path) -> Result<FoundKeypoints> {
 }
 
 fn read_file(path: &Path) -> Result<FoundKeypoints> {
-    let bytes = input::read(path, input::MOST_DATA).with_context(|| format!("cannot read {}", path.display()))?;
+    let bytes = input::read(path, input::MAX_DATA).with_context(|| format!("cannot read {}", path.display()))?;
     match bytes.get(..4) {
         _ if path.extension().is_some_and(|end| end == "npz") => arrays::read_npz(path),
         Some(b"PK\x03\x04") => arrays::read_npz(path),
         Some(b"\x93NUM") => arrays::read_npy(path, &bytes),
         Some(b"\x89HDF") => bail!(
-            "{} is HDF5, which is not read; save its arrays with numpy.savez, for PATS `pose/data` and `pose/confidence`",
+            "{} is HDF5 (not supported); save its arrays with numpy.savez (PATS: `pose/data` and `pose/confidence`)",
             path.display()
         ),
-        _ => document::parse(&bytes).with_context(|| format!("{}: no keypoints can be read", path.display())),
+        _ => document::parse(&bytes).with_context(|| format!("{} has no readable keypoints", path.display())),
     }
 }
 
@@ -60,30 +60,30 @@ fn read_folder(folder: &Path) -> Result<FoundKeypoints> {
         |path: &PathBuf| path.extension().is_some_and(|end| end.eq_ignore_ascii_case("json")) && !is_description(path);
     let mut files: Vec<PathBuf> = paths.filter(is_frame).collect();
     files.sort();
-    ensure!(!files.is_empty(), "{} holds no .json file of a frame", folder.display());
+    ensure!(!files.is_empty(), "{} contains no .json files of frames", folder.display());
     let mut program = "";
     let mut counts = BTreeSet::new();
     let mut frames: BTreeMap<u64, (&PathBuf, Vec<FoundPerson>)> = BTreeMap::new();
     for file in &files {
         let name = file.file_name().unwrap_or_default().to_string_lossy();
         let number = number_of(&name)
-            .with_context(|| format!("{}: no digits in its name say which frame it is", file.display()))?;
+            .with_context(|| format!("{}: expected the frame number in the file name", file.display()))?;
         let bytes = input::read(file, MAX_FRAME_BYTES).with_context(|| format!("cannot read {}", file.display()))?;
-        let read = document::people(&bytes).with_context(|| file.display().to_string())?;
+        let read = document::read_persons(&bytes).with_context(|| file.display().to_string())?;
         program = read.program;
-        let people = match read.people {
-            FramePeople::Picture(people) => people,
-            FramePeople::Frames(frames) => bail!(
-                "{} holds {} frames, expected one a file in a folder; name the file itself",
+        let entries = match read.persons {
+            FramePersons::Picture(entries) => entries,
+            FramePersons::Frames(frames) => bail!(
+                "{} has {} frames: expected one frame per file in a folder; give the path of the file instead",
                 file.display(),
                 frames.len()
             ),
         };
         // Entries are converted at once: their lists of numbers take more memory than persons.
-        let persons = document::persons(number, &people, &mut counts).with_context(|| folder.display().to_string())?;
+        let persons = document::persons(number, &entries, &mut counts).with_context(|| folder.display().to_string())?;
         if let Some((other, _)) = frames.insert(number, (file, persons)) {
             bail!(
-                "{} and {} are both frame {number}; each video needs a folder of its own",
+                "{} and {} are both frame {number}; use a separate folder for each video",
                 other.display(),
                 file.display()
             );

@@ -45,12 +45,12 @@ pub fn from_text(text: &str) -> Result<CapturedMotion> {
 /// Note on the unit of a take according to its facts; `None` for centimetres, the usual unit of BVH.
 pub fn unit_note(facts: &Map<String, Value>) -> Option<String> {
     let unit = facts.get("source_unit").and_then(Value::as_str).filter(|unit| *unit != "centimetre")?;
-    Some(format!("by the length of its arms its unit is the {unit}: brought to metres"))
+    Some(format!("judging by the arm length, the unit is the {unit}: converted to metres"))
 }
 
 fn read_take(path: &Path, align: impl Fn(AxisAlignment) -> AxisAlignment) -> Result<CapturedMotion> {
     let bvh = Bvh::read(path)?;
-    from_bvh(&bvh, align).with_context(|| format!("{} is no speaker's motion", path.display()))
+    from_bvh(&bvh, align).with_context(|| format!("{} has no usable upper-body motion", path.display()))
 }
 
 fn from_bvh(bvh: &Bvh, align: impl Fn(AxisAlignment) -> AxisAlignment) -> Result<CapturedMotion> {
@@ -86,7 +86,7 @@ fn joint_map(bvh: &Bvh, names: &[&str], roles: [Option<usize>; 10]) -> Result<[O
         [0, 2, 5].into_iter().filter(|&role| roles[role].is_none()).map(|role| joint_names::ROLES[role]).collect();
     ensure!(
         needed.is_empty(),
-        "no joint is named like a {}; its joints are: {}",
+        "no joint has a name of a {}; the joints are: {}",
         needed.join(", "),
         names.iter().copied().take(40).collect::<Vec<_>>().join(" ")
     );

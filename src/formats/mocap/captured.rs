@@ -61,7 +61,7 @@ pub fn read(kind: MotionKind, path: &Path) -> Result<CapturedMotion> {
         }
         MotionKind::Ted => ted::read(path)?,
         MotionKind::Bvh => bvh::read(path)?,
-        MotionKind::Shards => bail!("{} holds samples, no captured motion", path.display()),
+        MotionKind::Shards => bail!("{} contains dataset samples, expected captured motion", path.display()),
     };
     captured.motion.fps.checked().with_context(|| path.display().to_string())?;
     units::check(&captured.motion).with_context(|| path.display().to_string())?;

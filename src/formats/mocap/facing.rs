@@ -62,10 +62,10 @@ impl AxisAlignment {
             |f: &TorsoLandmarks| vec3::unit(vec3::across(vec3::sub(f.left_shoulder, f.right_shoulder), up), 1e-9);
         let side = sum(&|f| level(f).unwrap_or_default());
         let steadiness = vec3::norm(side) / frames.len() as f64;
-        let x = vec3::unit(side, 1e-9).context("the shoulders lie above each other")?;
+        let x = vec3::unit(side, 1e-9).context("the shoulders are vertically above each other")?;
         ensure!(
             steadiness > 0.05,
-            "the speaker turns round so much that the take has no front (steadiness {steadiness:.2} of 1): cut it"
+            "the speaker turns too much to determine the front (steadiness {steadiness:.2} of 1): cut the take"
         );
         let y = vec3::scale(up, -1.0);
         // Facing -z: x points to the speaker's left, and the axes are right-handed.
@@ -98,12 +98,12 @@ impl TorsoLandmarks {
 
 /// Name and metres of the unit in which the median arm length is closest to an adult's.
 fn unit(arms: Vec<f64>) -> Result<(&'static str, f64)> {
-    let arm = upper_median(arms).context("no frame has an arm whose length would tell the unit")?;
+    let arm = upper_median(arms).context("no frame has an arm from which to derive the unit")?;
     let deviation = |metres: f64| (arm * metres / ARM_METRES).ln().abs();
     let is_plausible = |metres: f64| ARM_RANGE.contains(&(arm * metres));
     let best = UNITS.into_iter().filter(|u| is_plausible(u.1)).min_by(|a, b| deviation(a.1).total_cmp(&deviation(b.1)));
     let Some(unit) = best else {
-        bail!("its arms are {arm:.4} long, which is a person's in none of: {}", UNITS.map(|u| u.0).join(", "))
+        bail!("the arms are {arm:.4} long, which is implausible in every known unit: {}", UNITS.map(|u| u.0).join(", "))
     };
     Ok(unit)
 }
@@ -115,7 +115,7 @@ fn vertical_axis(spine: Vec3) -> Result<(&'static str, Vec3)> {
     let length = vec3::norm(spine);
     ensure!(
         spine[axis].abs() > 0.8 * length && length > 0.0,
-        "the spine follows none of the axes ({spine:.1?} from hips to neck over the take): the speaker does not stand or sit"
+        "the spine is not along any axis ({spine:.1?} from hips to neck over the take): the speaker must stand or sit"
     );
     let up = spine[axis] > 0.0;
     let mut direction = [0.0; 3];

@@ -43,8 +43,8 @@ pub fn has_ending(path: &Path) -> bool {
 pub fn read(path: &Path, fps: Option<FrameRate>) -> Result<MotionFile> {
     let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
     let meta = input::open(path).and_then(|file| file.metadata());
-    let size = meta.with_context(|| format!("{} cannot be read", path.display()))?.len();
-    ensure!(size > 0, "{} is empty (0 bytes): expected a motion", path.display());
+    let size = meta.with_context(|| format!("cannot read {}", path.display()))?.len();
+    ensure!(size > 0, "{} is empty (0 bytes): expected motion", path.display());
     let (mut notes, mut has_rate, assumed) = (Vec::new(), true, fps.unwrap_or(DEFAULT_FPS));
     let ending = path.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
     let motion = match ending.as_str() {
@@ -67,18 +67,18 @@ pub fn read(path: &Path, fps: Option<FrameRate>) -> Result<MotionFile> {
                 captured.facts.get("turned_degrees").and_then(serde_json::Value::as_f64).unwrap_or(0.0);
             if rotated_degrees.abs() > 0.0 {
                 notes.push(format!(
-                    "{name} does not face +z: turned by {rotated_degrees:.0} degrees to face the camera"
+                    "{name} does not face +z: rotated by {rotated_degrees:.0} degrees to face the camera"
                 ));
             }
             captured.motion
         }
-        _ => bail!("{} is no motion file: expected .npy, .npz, .txt (the authors' layout) or .bvh", path.display()),
+        _ => bail!("{} is not a motion file: expected .npy, .npz, .txt (the authors' layout) or .bvh", path.display()),
     };
     // The authors' clips always have 15 frames per second, which needs no note.
     if !has_rate && fps.is_none() && ending != "txt" {
-        notes.push(format!("{name} does not say its rate: taken for {DEFAULT_FPS}; --fps says otherwise"));
+        notes.push(format!("{name} has no frame rate: assuming {DEFAULT_FPS}; set it with --fps"));
     }
-    ensure!(motion.n_frames() > 0, "{} has no frame", path.display());
+    ensure!(motion.n_frames() > 0, "{} has no frames", path.display());
     ensure!(
         motion.mask.iter().any(|is_visible| *is_visible),
         "{}: all joints of all {} frames are missing (NaN, or false in the mask)",
@@ -89,8 +89,8 @@ pub fn read(path: &Path, fps: Option<FrameRate>) -> Result<MotionFile> {
     let motion = motion.in_range().with_context(|| path.display().to_string())?;
     if ending != "bvh" && units::is_upside_down(&motion) {
         notes.push(format!(
-            "{name}: elbows and wrists lie above the neck throughout, as where y points up; expected x image right, y down, \
-             z away"
+            "{name}: elbows and wrists are always above the neck, so y seems to point up: expected x image right, \
+             y down, z away"
         ));
     }
     Ok(MotionFile { motion, has_rate, notes })
@@ -106,7 +106,7 @@ pub fn read_at(path: &Path, fps: Option<FrameRate>) -> Result<MotionFile> {
     let read = read(path, Some(fps.unwrap_or(DEFAULT_FPS)))?;
     if let Some(fps) = fps.filter(|fps| read.has_rate && *fps != read.motion.fps) {
         let own = read.motion.fps;
-        bail!("{} says {own}, and {fps} is given (--in-fps): leave that away, or correct the file", path.display());
+        bail!("{} has a frame rate of {own}, but --in-fps is {fps}: omit --in-fps or correct the file", path.display());
     }
     Ok(read)
 }
@@ -170,7 +170,7 @@ mod tests {
         };
         let (integers, flat) = (Array2::<i32>::zeros((4, 147)), Array::<f32, _>::zeros(147));
         let cases = [
-            (error_of("gone.npy", &|_| ()), "cannot be read"),
+            (error_of("gone.npy", &|_| ()), "cannot read"),
             (error_of("empty.npy", &|path| std::fs::write(path, "").unwrap()), "is empty"),
             (error_of("joints.npy", &npy((4, 43, 3), 0.0)), "[4, 43, 3]"),
             (error_of("none.npy", &npy((0, 49, 3), 0.0)), "no frame"),

@@ -22,23 +22,23 @@ fn utf8(bytes: &[u8]) -> Result<String> {
         Err(error) => {
             let at = error.valid_up_to();
             let line = bytes[..at].split(|byte| *byte == b'\n').count();
-            bail!("line {line}: the byte {:#04x} is no UTF-8; save the file as UTF-8", bytes[at]);
+            bail!("line {line}: byte {:#04x} is not valid UTF-8; save the file as UTF-8", bytes[at]);
         }
     };
     if let Some(at) = text.find('\0') {
         let line = 1 + text[..at].matches('\n').count();
-        bail!("line {line}: a zero byte; it is no text, or UTF-16 without its mark: save the file as UTF-8");
+        bail!("line {line}: found a zero byte: not text, or UTF-16 without a byte order mark; save the file as UTF-8");
     }
     Ok(text.to_owned())
 }
 
 fn utf16(bytes: &[u8], unit: fn([u8; 2]) -> u16) -> Result<String> {
     let (pairs, rest) = bytes.as_chunks::<2>();
-    ensure!(rest.is_empty(), "it is UTF-16, and ends in the middle of a letter");
+    ensure!(rest.is_empty(), "the UTF-16 text ends in the middle of a character");
     let mut text = String::new();
     for character in char::decode_utf16(pairs.iter().map(|pair| unit(*pair))) {
         let Ok(character) = character else {
-            bail!("line {}: half a letter of UTF-16; save the file as UTF-8", 1 + text.matches('\n').count())
+            bail!("line {}: incomplete UTF-16 character; save the file as UTF-8", 1 + text.matches('\n').count())
         };
         text.push(character);
     }

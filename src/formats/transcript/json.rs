@@ -36,7 +36,7 @@ pub fn read(text: &str) -> Result<JsonTranscript> {
     }
     if words.is_empty() {
         let text = ["text", "transcript", "sentence"].iter().find_map(|key| value.get(key)?.as_str());
-        let text = text.context("it has neither `words` with times nor a `text`")?;
+        let text = text.context("expected `words` with times, or a `text`")?;
         return Ok(JsonTranscript::Text(text.to_owned()));
     }
     Ok(JsonTranscript::Words(words))

@@ -22,7 +22,7 @@ pub fn read(text: &str) -> Result<Vec<Word>> {
         let end = rest.split_whitespace().next().unwrap_or_default();
         let [start, end] = [start.trim(), end].map(|time| seconds(time).with_context(|| format!("line {n}")));
         let (start, end) = (start?, end?);
-        ensure!(end >= start, "line {n}: the cue ends before it begins");
+        ensure!(end >= start, "line {n}: the cue ends before it starts");
         n_cues += 1;
         let mut cue: Vec<&str> = Vec::new();
         while let Some((line, _)) = lines.next_if(|(line, _)| !line.is_empty() && !line.contains("-->")) {
@@ -37,7 +37,7 @@ pub fn read(text: &str) -> Result<Vec<Word>> {
     }
     ensure!(
         n_cues > 0 || text.trim().is_empty() || text.starts_with("WEBVTT"),
-        "it has no cue, as `00:00:01,000 --> 00:00:02,000`"
+        "no cues: expected lines such as `00:00:01,000 --> 00:00:02,000`"
     );
     Ok(words)
 }
@@ -78,7 +78,7 @@ fn seconds(time: &str) -> Result<f64> {
     for part in time.replace(',', ".").splitn(3, ':') {
         match part.parse::<f64>() {
             Ok(number) if (0.0..1e9).contains(&number) => secs = secs * 60.0 + number,
-            _ => bail!("`{time}` is no time; expected 00:01:02,345"),
+            _ => bail!("invalid time `{time}`: expected the form 00:01:02,345"),
         }
     }
     Ok(secs)

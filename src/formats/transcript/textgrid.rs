@@ -20,7 +20,7 @@ pub fn read(text: &str) -> Result<Vec<Word>> {
         }
     }
     let word_tier = tiers.iter().position(|(name, _)| name.to_lowercase().contains("word")).unwrap_or(0);
-    ensure!(!tiers.is_empty(), "it has no tier of intervals");
+    ensure!(!tiers.is_empty(), "the file has no interval tier");
     Ok(tiers.swap_remove(word_tier).1)
 }
 
@@ -50,7 +50,7 @@ fn values(text: &str) -> Vec<TextGridValue> {
 fn tier(values: &[TextGridValue], at: &mut usize) -> Result<(String, Vec<Word>)> {
     let mut next = || {
         *at += 1;
-        values.get(*at - 1).context("it ends in the middle of a tier")
+        values.get(*at - 1).context("the file ends in the middle of a tier")
     };
     let name = match next()? {
         TextGridValue::Text(name) => name.clone(),
@@ -58,14 +58,14 @@ fn tier(values: &[TextGridValue], at: &mut usize) -> Result<(String, Vec<Word>)>
     };
     let mut number = |what: &str| match next()? {
         TextGridValue::Number(number) => Ok(*number),
-        TextGridValue::Text(text) => Err(anyhow::anyhow!("tier {name}: {what} expected, found `{text}`")),
+        TextGridValue::Text(text) => Err(anyhow::anyhow!("tier {name}: expected {what}, found `{text}`")),
     };
-    let n_intervals = (number("its beginning")?, number("its end")?, number("a number of intervals")?).2;
+    let n_intervals = (number("its start")?, number("its end")?, number("the number of intervals")?).2;
     let mut words = Vec::new();
     for n in 1..=n_intervals as u64 {
         let interval = (next()?, next()?, next()?);
         let (TextGridValue::Number(start), TextGridValue::Number(end), TextGridValue::Text(word)) = interval else {
-            anyhow::bail!("tier {name}: interval {n} needs two times and a text");
+            anyhow::bail!("tier {name}: interval {n}: expected two times and a text");
         };
         word::push(&mut words, word, (*start, *end), None).with_context(|| format!("tier {name}: interval {n}"))?;
     }

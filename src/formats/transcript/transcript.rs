@@ -68,7 +68,7 @@ impl Transcript {
         let ending = path.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
         let stem = path.file_stem().unwrap_or_default().to_string_lossy();
         let read = encoding::text_of(&bytes).and_then(|text| Self::parse(&text, &ending, &stem));
-        read.with_context(|| format!("{} is no transcript", path.display()))
+        read.with_context(|| format!("{} is not a valid transcript", path.display()))
     }
 
     /// Parses text in the format of a lower-case file extension; `stem` selects the recording in a file of several.
@@ -108,14 +108,14 @@ fn tsv(text: &str) -> Result<Vec<Word>> {
     for (line, n) in text.lines().zip(1..).filter(|(line, _)| !line.trim().is_empty()) {
         let mut parts = line.splitn(3, '\t').map(str::trim);
         let (Some(start), Some(end), Some(text)) = (parts.next(), parts.next(), parts.next()) else {
-            bail!("line {n}: expected start, end and word with tabs between, found `{line}`");
+            bail!("line {n}: expected start, end and word separated by tabs, found `{line}`");
         };
         match (start.parse::<f64>(), end.parse::<f64>()) {
             (Ok(start), Ok(end)) => word::push(&mut words, text, (start / per_sec, end / per_sec), None)
                 .with_context(|| format!("line {n}"))?,
             // Header line.
             _ if n == 1 => per_sec = if (start, end, text) == ("start", "end", "text") { 1000.0 } else { 1.0 },
-            _ => bail!("line {n}: `{start}` and `{end}` are no seconds"),
+            _ => bail!("line {n}: expected seconds, found `{start}` and `{end}`"),
         }
     }
     Ok(words)
@@ -130,7 +130,7 @@ fn ctm(text: &str, name: &str) -> Result<Vec<Word>> {
         rows.clone().filter_map(|(line, _)| line.split_whitespace().next()).take(1 << 20).collect();
     ensure!(
         recordings.len() <= 1 || recordings.contains(name),
-        "{} recordings ({}, ...), none named {name}",
+        "no recording is named {name}: found {} recordings ({}, ...)",
         recordings.len(),
         recordings.first().copied().unwrap_or_default()
     );
@@ -250,9 +250,9 @@ mod tests {
         assert!(error_of("0 1 so\n", "tsv").contains("line 1"));
         assert!(error_of("0\t1\tso\n2\tx\twell", "tsv").contains("line 2"));
         assert!(error_of("2\t1\tso\n", "tsv").contains("from 2 to 1"));
-        assert!(error_of("-1\t1\tso\n", "tsv").contains("line 1: `so` is said from -1"));
+        assert!(error_of("-1\t1\tso\n", "tsv").contains("line 1: invalid times -1.00"));
         assert!(error_of("a 1 0.5 0.2\n", "ctm").contains("line 1"));
-        assert!(error_of("b 1 0 1 so\nc 1 0 1 so\n", "ctm").contains("none named a"));
+        assert!(error_of("b 1 0 1 so\nc 1 0 1 so\n", "ctm").contains("no recording is named a"));
         assert!(parse("{", "json").is_err() && parse("{}", "json").is_err());
         assert!(error_of(r#"{"words": [{"word": "so"}]}"#, "json").contains("word 1"));
         let transcript = parse("0.5\t0.7\tso\n1.0\t1.25\twell\n", "tsv").unwrap();

@@ -45,7 +45,7 @@ pub fn push(
     let text = text.trim();
     ensure!(
         start_secs.is_finite() && end_secs.is_finite() && start_secs >= 0.0 && end_secs >= start_secs,
-        "`{}` is said from {start_secs} to {end_secs} s",
+        "invalid times {start_secs:.2} to {end_secs:.2} s of `{}`: expected 0 <= start <= end",
         text.chars().take(40).collect::<String>()
     );
     let confidence = confidence.filter(|confidence| (0.0..=1.0).contains(confidence));

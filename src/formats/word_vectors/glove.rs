@@ -24,14 +24,18 @@ pub fn convert(mut text: impl BufRead, path: &Path) -> Result<usize> {
             break;
         }
         let position = || format!("line {n}");
-        ensure!(line.ends_with(b"\n"), "line {n} has no end: the file is cut off, or is no text of vectors");
+        ensure!(
+            line.ends_with(b"\n"),
+            "line {n} has no line end: the file is truncated, or not a text file of vectors"
+        );
         let line =
-            std::str::from_utf8(&line).with_context(position).context("it is no text (UTF-8) of GloVe or word2vec")?;
+            std::str::from_utf8(&line).with_context(position).context("expected UTF-8 text of GloVe or word2vec")?;
         let line = line.trim_end_matches(['\n', '\r', ' ']);
         let parts: Vec<&str> = line.split(' ').collect();
         if let (1, [words, dim]) = (n, parts.as_slice()) {
             let numbers = words.parse::<u64>().ok().zip(dim.parse::<usize>().ok());
-            let (words, dim) = numbers.with_context(|| format!("line 1: `{line}` is neither a vector nor a size"))?;
+            let (words, dim) =
+                numbers.with_context(|| format!("line 1: expected a vector or two sizes, found `{line}`"))?;
             declared = Some(words);
             writer = Some(TableWriter::new(path, dim)?);
             continue;
@@ -42,19 +46,19 @@ pub fn convert(mut text: impl BufRead, path: &Path) -> Result<usize> {
         };
         let Some(at) = parts.len().checked_sub(writer.dim()).filter(|at| *at > 0) else {
             bail!(
-                "line {n}: a word and {} numbers are expected, it has {} parts: the file is cut off, or its vectors \
+                "line {n}: expected a word and {} numbers, found {} fields: the file is truncated, or its vectors \
                    differ in length",
                 writer.dim(),
                 parts.len()
             );
         };
-        let number = |part: &&str| part.parse::<f32>().with_context(|| format!("line {n}: `{part}` is no number"));
+        let number = |part: &&str| part.parse::<f32>().with_context(|| format!("line {n}: `{part}` is not a number"));
         let vector = parts[at..].iter().map(number).collect::<Result<Vec<f32>>>()?;
         // Some words of GloVe contain spaces.
         let word = parts[..at].join(" ");
         ensure!(
             at == 1 || parts[1..at].iter().any(|part| part.parse::<f32>().is_err()),
-            "line {n}: `{}` has {} numbers, {} are expected",
+            "line {n}: `{}` has {} numbers, expected {}",
             parts[0],
             parts.len() - 1,
             writer.dim()
@@ -63,9 +67,12 @@ pub fn convert(mut text: impl BufRead, path: &Path) -> Result<usize> {
         n_lines += 1;
     }
     if let Some(declared) = declared {
-        ensure!(n_lines == declared, "its first line promises {declared} words, it has {n_lines}: it is cut off");
+        ensure!(
+            n_lines == declared,
+            "its first line states {declared} words, but it has {n_lines}: the file is truncated"
+        );
     }
-    writer.context("it is empty")?.finish()
+    writer.context("the file is empty")?.finish()
 }
 
 #[cfg(test)]
@@ -84,10 +91,10 @@ mod tests {
         assert_eq!(convert(&b"2 3\nthe 1 2 3 \n. . . 4 5 6\n"[..], &path).unwrap(), 2);
         assert!(error_of(b"the 1 2 3\nso 1 2\n").contains("line 2: a word and 3 numbers"));
         assert!(error_of(b"the 1 2 3\nso 1 2 3 4\n").contains("line 2: `so` has 4 numbers, 3"));
-        assert!(error_of(b"the 1 2 3\nso 1 2 x\n").contains("line 2: `x` is no number"));
+        assert!(error_of(b"the 1 2 3\nso 1 2 x\n").contains("line 2: `x` is not a number"));
         assert!(error_of(b"the 1 2 3\nso 1 2 nan\n").contains("not finite"));
-        assert!(error_of(b"the 1 2 3\nso 1 2 3").contains("line 2 has no end"));
-        assert!(error_of(b"3 2\nthe 1 2\nso 1 2\n").contains("promises 3 words, it has 2"));
+        assert!(error_of(b"the 1 2 3\nso 1 2 3").contains("line 2 has no line end"));
+        assert!(error_of(b"3 2\nthe 1 2\nso 1 2\n").contains("states 3 words, but it has 2"));
         assert!(error_of(b"").contains("empty") && error_of(b"the\n").contains("1 to 10000"));
         assert!(error_of(b"\xff\xfe\n").contains("no text"));
     }

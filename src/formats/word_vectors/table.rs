@@ -40,36 +40,38 @@ impl WordVectors {
     ///
     /// The file is not a table of word vectors, or is truncated or damaged.
     pub fn open(path: &Path) -> Result<Self> {
-        Self::read(path).with_context(|| format!("{} is no table of word vectors", path.display()))
+        Self::read(path).with_context(|| format!("{} is not a valid table of word vectors", path.display()))
     }
 
     fn read(path: &Path) -> Result<Self> {
         let file = input::open(path)?;
         let bytes = file.metadata()?.len();
         let part = |at: u64, size: u64| -> Result<Vec<u8>> {
-            ensure!(at.checked_add(size).is_some_and(|end| end <= bytes), "it has only {bytes} bytes: it is cut off");
+            ensure!(at.checked_add(size).is_some_and(|end| end <= bytes), "it is truncated after {bytes} bytes");
             let mut part = vec![0; usize::try_from(size)?];
             file.read_exact_at(&mut part, at)?;
             Ok(part)
         };
         let length = u64::from_le_bytes(part(0, 8)?.try_into().unwrap_or_default());
-        ensure!(length <= MAX_HEADER_BYTES, "it has no header (`orator words add FILE` makes one from GloVe's text)");
+        ensure!(length <= MAX_HEADER_BYTES, "it has no header; convert GloVe text files with `orator words add FILE`");
         let metadata: Metadata = serde_json::from_slice(&part(8, length)?).context("its header is damaged")?;
         let tensor = |name: &str| metadata.info(name).with_context(|| format!("it has no tensor `{name}`"));
         let (vectors, words) = (tensor(VECTORS)?, tensor(WORDS)?);
-        ensure!(vectors.dtype == Dtype::F32 && words.dtype == Dtype::U8, "its tensors are not F32 and U8");
-        let [n_words, dim] = vectors.shape[..] else { anyhow::bail!("`{VECTORS}` is not [words, numbers]") };
-        ensure!(dim > 0, "its vectors have no numbers");
+        ensure!(vectors.dtype == Dtype::F32 && words.dtype == Dtype::U8, "expected tensors of type F32 and U8");
+        let [n_words, dim] = vectors.shape[..] else {
+            anyhow::bail!("tensor `{VECTORS}`: expected shape [words, numbers]")
+        };
+        ensure!(dim > 0, "its vectors are empty");
         let data = 8 + length;
         let end = data + vectors.data_offsets.1.max(words.data_offsets.1) as u64;
-        ensure!(end == bytes, "it has {bytes} bytes, its header says {end}: it is cut off or damaged");
+        ensure!(end == bytes, "it has {bytes} bytes, but its header states {end}: it is truncated or damaged");
         let word_list = part(data + words.data_offsets.0 as u64, (words.data_offsets.1 - words.data_offsets.0) as u64)?;
-        let word_list = String::from_utf8(word_list).context("its words are no UTF-8")?;
+        let word_list = String::from_utf8(word_list).context("its words are not valid UTF-8")?;
         let mut rows = HashMap::with_capacity(word_list.lines().count());
         for (word, row) in word_list.lines().zip(0_u32..) {
             rows.entry(word.to_owned()).or_insert(row);
         }
-        ensure!(rows.len() == n_words, "it has {} words and {n_words} vectors", rows.len());
+        ensure!(rows.len() == n_words, "it has {} words, but {n_words} vectors", rows.len());
         let at = data + vectors.data_offsets.0 as u64;
         Ok(Self { path: path.to_owned(), file, at, dim, rows })
     }
@@ -105,7 +107,7 @@ impl WordVectors {
             UNKNOWN => return Ok(vec![1.0; self.dim]),
             _ => index - N_SPECIAL,
         };
-        ensure!(row < self.n_words(), "{} has no index {index}", self.path.display());
+        ensure!(row < self.n_words(), "{} has no word with index {index}", self.path.display());
         let mut bytes = vec![0; 4 * self.dim];
         let read = self.file.read_exact_at(&mut bytes, self.at + (4 * row * self.dim) as u64);
         read.with_context(|| format!("cannot read {}", self.path.display()))?;

@@ -15,9 +15,9 @@ use std::path::Path;
 pub fn convert(json: impl Read, path: &Path) -> Result<usize> {
     let mut writer = None;
     let mut json = serde_json::Deserializer::from_reader(json);
-    json.deserialize_map(Package { path, writer: &mut writer }).context("it is not the JSON of wink-embeddings")?;
+    json.deserialize_map(Package { path, writer: &mut writer }).context("it is not wink-embeddings JSON")?;
     json.end()?;
-    writer.context("it holds no `dimensions` with `vectors` behind them")?.finish()
+    writer.context("expected `dimensions`, then `vectors`")?.finish()
 }
 
 struct Package<'a> {
@@ -90,6 +90,8 @@ mod tests {
             assert!(convert(&json.as_bytes()[..end], &path).is_err(), "{end}");
         }
         let short = json.replace("[0.5, -1, 1.118, 0]", "[0.5]");
-        assert!(format!("{:#}", convert(short.as_bytes(), &path).unwrap_err()).contains("`the` has 1 numbers"));
+        assert!(
+            format!("{:#}", convert(short.as_bytes(), &path).unwrap_err()).contains("`the` has 1 number, expected 2")
+        );
     }
 }

@@ -1,6 +1,7 @@
 //! Writer of a table of word vectors. Only the words are held in memory.
 
 use anyhow::{Context, Result, ensure};
+use orator_base::text::counted;
 use std::collections::BTreeSet;
 use std::fs::File;
 use std::io::{BufWriter, Seek, SeekFrom, Write};
@@ -23,7 +24,7 @@ pub struct TableWriter {
 impl TableWriter {
     /// Creates the file `path`.
     pub fn new(path: &Path, dim: usize) -> Result<Self> {
-        ensure!((1..=10_000).contains(&dim), "vectors of {dim} numbers: expected 1 to 10000");
+        ensure!((1..=10_000).contains(&dim), "invalid vector length {dim}: expected 1 to 10000");
         let file = File::create(path).with_context(|| format!("cannot write {}", path.display()))?;
         let mut file = BufWriter::with_capacity(1 << 20, file);
         file.write_all(&[b' '; HEADER_BYTES])?;
@@ -41,9 +42,13 @@ impl TableWriter {
     ///
     /// The vector has another length or a non-finite number; the word is empty or contains a line break.
     pub fn push(&mut self, word: &str, vector: &[f32]) -> Result<()> {
-        ensure!(vector.len() == self.dim, "`{word}` has {} numbers, the vectors have {}", vector.len(), self.dim);
-        ensure!(vector.iter().all(|number| number.is_finite()), "`{word}` has a number that is not finite");
-        ensure!(!word.is_empty() && !word.contains('\n'), "`{}` is no word", word.escape_debug());
+        ensure!(vector.len() == self.dim, "`{word}` has {}, expected {}", counted(vector.len(), "number"), self.dim);
+        ensure!(vector.iter().all(|number| number.is_finite()), "`{word}` has a value that is not finite");
+        ensure!(
+            !word.is_empty() && !word.contains('\n'),
+            "invalid word `{}`: it is empty or contains a line break",
+            word.escape_debug()
+        );
         if self.known.insert(word.to_owned()) {
             self.words += word;
             self.words.push('\n');
@@ -59,7 +64,7 @@ impl TableWriter {
     /// No word was added.
     pub fn finish(mut self) -> Result<usize> {
         let (n_words, dim) = (self.known.len(), self.dim);
-        ensure!(n_words > 0, "it holds no word");
+        ensure!(n_words > 0, "it contains no words");
         self.file.write_all(self.words.as_bytes())?;
         let end = 4 * n_words * dim;
         let header = serde_json::json!({
@@ -67,7 +72,7 @@ impl TableWriter {
             WORDS: { "dtype": "U8", "shape": [self.words.len()], "data_offsets": [end, end + self.words.len()] },
         });
         let json = format!("{:<1$}", header.to_string(), HEADER_BYTES - 8);
-        ensure!(json.len() == HEADER_BYTES - 8, "its header does not fit");
+        ensure!(json.len() == HEADER_BYTES - 8, "the header is too long");
         self.file.seek(SeekFrom::Start(0))?;
         self.file.write_all(&(json.len() as u64).to_le_bytes())?;
         self.file.write_all(json.as_bytes())?;

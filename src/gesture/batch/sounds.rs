@@ -62,7 +62,7 @@ pub fn of_folder(folder: &Path, out: &Path) -> Result<Vec<BatchSound>> {
 /// Sounds of the table `path` with the column `audio`, and optionally `out`, `checkpoint` (or `speaker`) and
 /// `transcript`. Paths are relative to the folder of the table. Errors name the line.
 pub fn of_table(path: &Path) -> Result<Vec<BatchSound>> {
-    let bytes = input::read(path, input::MOST_TEXT).with_context(|| format!("cannot read {}", path.display()))?;
+    let bytes = input::read(path, input::MAX_TEXT).with_context(|| format!("cannot read {}", path.display()))?;
     let text = std::str::from_utf8(&bytes).with_context(|| format!("{} is not UTF-8 text", path.display()))?;
     let folder = path.parent().unwrap_or(Path::new(""));
     parse(text, folder).and_then(distinct).with_context(|| format!("invalid table {}", path.display()))

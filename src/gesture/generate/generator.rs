@@ -79,7 +79,7 @@ impl GestureGenerator {
         let n_frames = self.n_frames(n_samples)?;
         let mut joints = Array3::zeros((n_frames, N_JOINTS, 3));
         let normal = &self.metadata.normalisation;
-        let mut posture = (!normal.channels.is_empty()).then(|| Posture::unseen(n_frames));
+        let mut posture = (!normal.channels.is_empty()).then(|| Posture::missing(n_frames));
         let mut first = 0;
         for poses in self.features(pieces, n_samples, chunk)? {
             let poses = poses?;

@@ -129,7 +129,7 @@ impl Normalisation {
         if self.channels.is_empty() {
             return None;
         }
-        let mut posture = Posture::unseen(features.ncols());
+        let mut posture = Posture::missing(features.ncols());
         for (of, n) in self.channels.iter().zip((N_FEATURES..).step_by(3)) {
             let angle = |(t, k): (usize, usize)| match of.std[k] {
                 0.0 => f32::NAN,
@@ -203,7 +203,7 @@ mod tests {
         let table = |value| Array2::from_elem((N_JOINTS, 3), value);
         let mut normal = Normalisation::new(&table(0.1), &table(0.2), vec![0.0; N_BONES]);
         let motion = Motion::from_joints(FrameRate::new(15, 1), Array3::from_elem((5, N_JOINTS, 3), 0.1));
-        let mut posture = Posture::unseen(5);
+        let mut posture = Posture::missing(5);
         posture.trunk = Array2::from_shape_fn((5, 3), |(t, k)| 0.1 * t as f32 - 0.2 * k as f32);
         posture.trunk[[2, 1]] = f32::NAN;
         assert_eq!(normal.features_with_channels(&motion, Some(&posture)), normal.features(&motion));

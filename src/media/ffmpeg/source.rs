@@ -168,7 +168,7 @@ pub(crate) fn audio_track(input: &Input, track: usize) -> Result<Option<(Stream<
         track => bail!("no audio track {track}, the file has {n_tracks}: change extract.audio_track"),
     };
     let stream = streams.into_iter().nth(chosen);
-    Ok(stream.map(|stream| (stream, AudioTracks { n_tracks, taken: chosen + 1, languages })))
+    Ok(stream.map(|stream| (stream, AudioTracks { n_tracks, selected: chosen + 1, languages })))
 }
 
 /// Length in seconds as stated by the container for this stream, or else for the file.

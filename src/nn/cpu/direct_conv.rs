@@ -7,13 +7,13 @@
 use super::axis::{AxisWindows, ConvAxis};
 use super::kernel::{MAX_ROWS, TileSteps};
 use super::packed_weights::{PackedWeights, StepBlock, WeightOrder};
+use super::spin_pool::parallel_for;
 use super::tensor::{Scalar, SharedOutputPtr, scratch, written};
-use super::thread_team::parallel_for;
 use std::ops::Range;
 
 /// Maximum number of input values that a task copies (but at least some rows), and number of summation steps whose
 /// packed weights stay in the first-level cache.
-const PIECE: usize = 48 * 1024;
+const CHUNK: usize = 48 * 1024;
 const DEPTH: usize = 144;
 
 /// Sizes of a convolution: input [B, rows, columns, n_in], weight [n_out, n_in, K rows, K columns], output [B, rows',
@@ -45,7 +45,7 @@ impl ConvSizes {
     }
 }
 
-/// Convolves `x` and adds `bias`. `finish` is called with the number of a piece (0..[`n_pieces`]) and its rows of the
+/// Convolves `x` and adds `bias`. `finish` is called with the number of a chunk (0..[`n_chunks`]) and its rows of the
 /// output [positions, n_out] as soon as they are complete, while they are in the cache.
 pub fn forward<T: Scalar>(
     s: &ConvSizes,
@@ -58,12 +58,12 @@ pub fn forward<T: Scalar>(
     let pass = forward_pass(s);
     let panels = PackedWeights::pack(weight, &pass.order(s.n_in * s.kernel_len(), s.kernel_len()));
     let per_row = s.axes[1].n_out * s.n_out;
-    // SAFETY: the pieces are disjoint and together cover every row of every output.
+    // SAFETY: the chunks are disjoint and together cover every row of every output.
     unsafe {
         written(s.len_out(), |to: SharedOutputPtr<T>| {
-            let pieces = pass.pieces();
-            parallel_for(pieces.len(), |number| {
-                let (b, rows) = pieces[number].clone();
+            let chunks = pass.chunks();
+            parallel_for(chunks.len(), |number| {
+                let (b, rows) = chunks[number].clone();
                 let start = to.at((b * s.axes[0].n_out + rows.start) * per_row);
                 let n = rows.len() * per_row;
                 pass.run(x, &panels, bias, to, b, rows);
@@ -73,9 +73,9 @@ pub fn forward<T: Scalar>(
     }
 }
 
-/// Number of pieces of a forward pass.
-pub fn n_pieces(s: &ConvSizes) -> usize {
-    forward_pass(s).pieces().len()
+/// Number of chunks of a forward pass.
+pub fn n_chunks(s: &ConvSizes) -> usize {
+    forward_pass(s).chunks().len()
 }
 
 fn forward_pass(s: &ConvSizes) -> ConvPass {
@@ -92,7 +92,7 @@ fn forward_pass(s: &ConvSizes) -> ConvPass {
 pub fn gradient_of_input<T: Scalar>(s: &ConvSizes, weight: &[T], grad: &[T]) -> Vec<T> {
     assert!(grad.len() == s.len_out() && weight.len() == s.len_weight());
     let zeros = vec![T::zero(); s.n_in];
-    // SAFETY: the pieces of all phases are disjoint and together cover every position.
+    // SAFETY: the chunks of all phases are disjoint and together cover every position.
     unsafe {
         written(s.len_in(), |to: SharedOutputPtr<T>| {
             for rows in s.axes[0].backward() {
@@ -105,9 +105,9 @@ pub fn gradient_of_input<T: Scalar>(s: &ConvSizes, weight: &[T], grad: &[T]) -> 
                         kernel: s.axes.map(|axis| axis.kernel),
                     };
                     let panels = PackedWeights::pack(weight, &pass.order(s.kernel_len(), s.n_in * s.kernel_len()));
-                    let pieces = pass.pieces();
-                    parallel_for(pieces.len(), |number| {
-                        let (b, rows) = pieces[number].clone();
+                    let chunks = pass.chunks();
+                    parallel_for(chunks.len(), |number| {
+                        let (b, rows) = chunks[number].clone();
                         pass.run(grad, &panels, &zeros, to, b, rows);
                     });
                 }
@@ -138,17 +138,17 @@ impl ConvPass {
         WeightOrder { n_columns: self.n_to, per_column, n_channels: self.n_from, per_channel, kernel_offsets }
     }
 
-    /// Returns sample and window rows of each piece of work, independent of the number of threads.
-    fn pieces(&self) -> Vec<(usize, Range<usize>)> {
+    /// Returns sample and window rows of each chunk of work, independent of the number of threads.
+    fn chunks(&self) -> Vec<(usize, Range<usize>)> {
         let [rows, columns] = &self.windows;
         let per_row = columns.receptive_field(columns.n) * self.n_from;
-        let n_rows = ((PIECE / per_row.max(1)).saturating_sub(rows.kernel_offsets.len()) / rows.step + 1)
+        let n_rows = ((CHUNK / per_row.max(1)).saturating_sub(rows.kernel_offsets.len()) / rows.step + 1)
             .max(MAX_ROWS.div_ceil(columns.n))
             .min(rows.n);
-        // Pieces of equal size instead of a small last one.
+        // Chunks of equal size instead of a small last one.
         let n = rows.n.div_ceil(n_rows);
-        let piece = move |b, i| (b, rows.n * i / n..rows.n * (i + 1) / n);
-        (0..self.batch).flat_map(|b| (0..n).map(move |i| piece(b, i))).collect()
+        let chunk = move |b, i| (b, rows.n * i / n..rows.n * (i + 1) / n);
+        (0..self.batch).flat_map(|b| (0..n).map(move |i| chunk(b, i))).collect()
     }
 
     /// Writes the outputs of the windows of sample `b` in these rows: `begin` plus the sums.
@@ -162,17 +162,17 @@ impl ConvPass {
         begin: &[T],
         to: SharedOutputPtr<T>,
         b: usize,
-        piece: Range<usize>,
+        chunk: Range<usize>,
     ) {
         let [rows, columns] = &self.windows;
         let (width, n_from) = (columns.receptive_field(columns.n), self.n_from);
         let per_row = width * n_from;
-        scratch(rows.receptive_field(piece.len()) * per_row, |padded: &mut [T]| {
-            self.copy(from, padded, b, piece.start);
-            let positions = piece.clone().flat_map(|row| (0..columns.n).map(move |column| (row, column)));
+        scratch(rows.receptive_field(chunk.len()) * per_row, |padded: &mut [T]| {
+            self.copy(from, padded, b, chunk.start);
+            let positions = chunk.clone().flat_map(|row| (0..columns.n).map(move |column| (row, column)));
             let positions: Vec<(usize, usize)> = positions
                 .map(|(row, column)| {
-                    let left = ((row - piece.start) * rows.step * width + column * columns.step) * n_from;
+                    let left = ((row - chunk.start) * rows.step * width + column * columns.step) * n_from;
                     let to_row = b * rows.n_to + rows.to_first + row * rows.to_step;
                     (left, (to_row * columns.n_to + columns.to_first + column * columns.to_step) * self.n_to)
                 })
@@ -209,7 +209,7 @@ impl ConvPass {
         });
     }
 
-    /// Copies the rows that the piece from `first_row` on reads, with zeros outside the input.
+    /// Copies the rows that the chunk from `first_row` on reads, with zeros outside the input.
     fn copy<T: Scalar>(&self, from: &[T], padded: &mut [T], b: usize, first_row: usize) {
         let [rows, columns] = &self.windows;
         let width = columns.receptive_field(columns.n) as isize;

@@ -1,8 +1,8 @@
 //! Operations on sequences in plain slices: linear interpolation of frames with its gradient, and transposition
 //! between channels first and channels last. Every value is computed by one thread in a fixed order.
 
+use super::spin_pool::parallel_for;
 use super::tensor::{Scalar, SharedOutputPtr, written};
-use super::thread_team::parallel_for;
 
 /// Side of the square blocks of a transposition, which fit in the cache.
 const BLOCK: usize = 32;

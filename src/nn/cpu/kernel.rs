@@ -58,7 +58,7 @@ macro_rules! rows {
 /// Tile loop and the dispatch on its size, for one processor type and one number type.
 macro_rules! kernel {
     ($(#[$attribute:meta])* $tile:ident, $choose:ident, $number:ty, $lanes:literal, $vectors:literal;
-     $zero:path, $load:path, $store:path, $spread:path, $add_product:expr) => {
+     $zero:path, $load:path, $store:path, $broadcast:path, $add_product:expr) => {
         $(#[$attribute])*
         unsafe fn $tile<const ROWS: usize, const VECTORS: usize>(job: &TileJob<$number>) {
             // SAFETY: guaranteed by the caller.
@@ -81,7 +81,7 @@ macro_rules! kernel {
                         }
                         for (sums, row) in sums.iter_mut().zip(&rows) {
                             let one: $number = *row.add(left);
-                            let one = $spread(one);
+                            let one = $broadcast(one);
                             for (sum, factor) in sums.iter_mut().zip(&factors) {
                                 *sum = $add_product(one, *factor, *sum);
                             }
@@ -130,7 +130,7 @@ mod any {
         unsafe { at.cast::<[T; 4]>().write_unaligned(values) };
     }
 
-    pub(super) fn spread<T: Copy>(value: T) -> [T; 4] {
+    pub(super) fn broadcast<T: Copy>(value: T) -> [T; 4] {
         [value; 4]
     }
 }
@@ -143,8 +143,8 @@ fn add_product<T: std::ops::Mul<Output = T> + std::ops::Add<Output = T> + Copy>(
     std::array::from_fn(|i| a[i] * b[i] + sum[i])
 }
 
-kernel!(any_tile_f32, any_f32, f32, 4, 2; any::zero, any::load, any::store, any::spread, add_product);
-kernel!(any_tile_f64, any_f64, f64, 4, 2; any::zero, any::load, any::store, any::spread, add_product);
+kernel!(any_tile_f32, any_f32, f32, 4, 2; any::zero, any::load, any::store, any::broadcast, add_product);
+kernel!(any_tile_f64, any_f64, f64, 4, 2; any::zero, any::load, any::store, any::broadcast, add_product);
 
 #[cfg(target_arch = "x86_64")]
 mod x86 {

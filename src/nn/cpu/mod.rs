@@ -6,7 +6,7 @@
 //! | pool | threads | for |
 //! |---|---|---|
 //! | rayon's global pool | one per core | work that is split once: passes of the lifters, matrix products, metrics, pictures. The default everywhere; idle threads sleep |
-//! | [`thread_team`] | one per core, spinning | a training or generation of the GAN and the sequence networks: hundreds of small parallel loops a step, between which sleeping threads would wake too late. Alive only inside `with_spinning_workers`; without a team its functions run on rayon |
+//! | [`spin_pool`] | one per core, spinning | a training or generation of the GAN and the sequence networks: hundreds of small parallel loops a step, between which sleeping threads would wake too late. Alive only inside `with_spinning_workers`; without a pool its functions run on rayon |
 //! | worker pool of a run (`orator_base::stage::parts`) | `--jobs` | whole units of the pipeline (videos) and the parts of a long one; each worker calls FFmpeg, OpenCV and ONNX Runtime, the latter with one thread |
 //! | workers of a cluster (`orator_cluster`) | one process each, on any machine | units of one work folder; inside each process the three above |
 //!
@@ -20,7 +20,7 @@ pub mod frames;
 pub mod kernel;
 pub mod packed_matrix;
 pub mod packed_weights;
+pub mod spin_pool;
 pub mod tensor;
-pub mod thread_team;
 pub mod vectorised;
 pub mod weight_gradient;

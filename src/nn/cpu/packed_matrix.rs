@@ -48,7 +48,7 @@ impl<T: Scalar> PackedMatrix<T> {
             (n_rows - 1) * left_stride + self.depth <= left.len()
                 && (n_rows - 1) * to_stride + self.width <= to.len()
                 && (self.width <= to_stride || n_rows == 1),
-            "rows of {left_stride} and {to_stride} for a matrix of {} x {}",
+            "strides {left_stride} and {to_stride} do not fit a matrix of {} x {}",
             self.depth,
             self.width
         );

@@ -2,8 +2,8 @@
 //! positions of a padded copy.
 
 use super::kernel::{MAX_ROWS, TileJob, TileSteps, panels};
+use super::spin_pool::parallel_for;
 use super::tensor::{LANES, Scalar, SharedOutputPtr, aligned, written};
-use super::thread_team::parallel_for;
 use std::ops::Range;
 
 /// Weights in tile order: consecutive panels of columns; each panel has one row per summation step.
@@ -51,7 +51,7 @@ impl<T: Scalar> PackedWeights<T> {
             panel
         });
         let mut panels: Vec<WeightPanel> = panels.collect();
-        let most = kernel_offsets.iter().copied().max().unwrap_or(0);
+        let max_offset = kernel_offsets.iter().copied().max().unwrap_or(0);
         let n_at_once = (AT_ONCE / kernel_offsets.len().max(1)).max(1);
         // Values that are adjacent in memory are read together: the channels of a column, or the columns of a channel.
         let of_columns = per_column < per_channel;
@@ -63,7 +63,7 @@ impl<T: Scalar> PackedWeights<T> {
                 let some = first..channels.end.min(first + n_at_once);
                 let (n_lines, in_line) = if of_columns { (some.len(), panel.n) } else { (panel.n, some.len()) };
                 let corner = panel.first * per_column + first * per_channel;
-                let length = (in_line - 1) * per_position + most + 1;
+                let length = (in_line - 1) * per_position + max_offset + 1;
                 lines.clear();
                 for n in 0..n_lines {
                     lines.extend_from_slice(&weight[corner + n * per_line..][..length]);

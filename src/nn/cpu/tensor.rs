@@ -54,7 +54,7 @@ real!(f64, kernel::of_f64, f64::exp);
 /// The tensor is not contiguous; callers guarantee that it is.
 pub fn slice<'a, T: Scalar>(storage: &'a CpuStorage, layout: &Layout) -> Result<&'a [T]> {
     let Some((start, end)) = layout.contiguous_offsets() else {
-        candle_core::bail!("this operator wants contiguous tensors, got strides {:?}", layout.stride());
+        candle_core::bail!("expected a contiguous tensor, found strides {:?}", layout.stride());
     };
     Ok(&T::cpu_storage_as_slice(storage)?[start..end])
 }
@@ -65,7 +65,7 @@ pub fn read<T: Scalar, R>(tensor: &Tensor, f: impl FnOnce(&[T]) -> Result<R>) ->
     let (storage, layout) = tensor.storage_and_layout();
     match &*storage {
         Storage::Cpu(storage) => f(slice::<T>(storage, layout)?),
-        _ => candle_core::bail!("this operator runs on the CPU only"),
+        _ => candle_core::bail!("expected a tensor on the CPU: the operator has no GPU implementation"),
     }
 }
 
@@ -77,7 +77,7 @@ pub fn is_f64(dtype: DType) -> Result<bool> {
     match dtype {
         DType::F32 => Ok(false),
         DType::F64 => Ok(true),
-        other => candle_core::bail!("this operator is for f32 and f64, got {other:?}"),
+        other => candle_core::bail!("expected a tensor of f32 or f64, found {other:?}"),
     }
 }
 
@@ -136,7 +136,7 @@ pub fn matmul<T: Scalar>(product: &mut [T], left: Matrix<T>, right: Matrix<T>, m
         return;
     }
     let fits = product.len() == m * n && depth > 0 && left.holds(m, depth) && right.holds(depth, n);
-    assert!(fits, "product of {m} x {n} over {depth}");
+    assert!(fits, "operands do not fit a product of {m} x {n} over {depth}");
     let (tiles_down, tiles_across) = (m.div_ceil(TILE.0), n.div_ceil(TILE.1));
     let start = SharedOutputPtr::new(product);
     (0..tiles_down * tiles_across).into_par_iter().for_each(|tile| {
@@ -155,7 +155,7 @@ pub fn add_product<T: Scalar>(sum: &mut [T], left: Matrix<T>, right: Matrix<T>, 
         return;
     }
     let fits = sum.len() == m * n && left.holds(m, depth) && right.holds(depth, n);
-    assert!(fits, "product of {m} x {n} over {depth}");
+    assert!(fits, "operands do not fit a product of {m} x {n} over {depth}");
     // SAFETY: the assert bounds the factors and the sum.
     unsafe { gemm_on_this_thread(sum.as_mut_ptr(), n, true, left, right, [m, n, depth]) };
 }

@@ -128,14 +128,14 @@ vectorised!(
 
 #[inline(always)]
 fn attend_body<T: Scalar>(state: &[T], keys: &[T], weights: &mut [T], context: &mut [T]) {
-    let mut most = T::zero();
+    let mut max = T::zero();
     for (i, (weight, key)) in weights.iter_mut().zip(keys.chunks_exact(state.len())).enumerate() {
         *weight = inner_product(state, key);
-        most = if i == 0 || *weight > most { *weight } else { most };
+        max = if i == 0 || *weight > max { *weight } else { max };
     }
     let mut total = T::zero();
     for weight in weights.iter_mut() {
-        *weight = (*weight - most).fast_exp();
+        *weight = (*weight - max).fast_exp();
         total += *weight;
     }
     context.fill(T::zero());

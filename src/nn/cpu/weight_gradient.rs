@@ -3,12 +3,12 @@
 
 use super::direct_conv::ConvSizes;
 use super::kernel::{MAX_ROWS, TileJob, TileSteps, panels};
+use super::spin_pool::{parallel_for, parallel_map};
 use super::tensor::{Scalar, SharedOutputPtr, scratch, written};
-use super::thread_team::{parallel_for, parallel_map};
 use rayon::prelude::*;
 use std::ops::Range;
 
-/// Number of positions per piece, whose gradients are copied to contiguous memory: in position they are a power of two
+/// Number of positions per block, whose gradients are copied to contiguous memory: in position they are a power of two
 /// apart, so that only few of them fit in the first-level cache.
 const POSITIONS: usize = 256;
 /// Number of values of an output's weights that are written together: complete cache lines.
@@ -39,7 +39,7 @@ pub fn gradient_of_weight<T: Scalar>(s: &ConvSizes, x: &[T], grad: &[T]) -> Vec<
         let (panel, kernel_offset, of_chunk) = tasks[task];
         sum_products(s, x, grad, n_columns, panels[panel], kernel_offset, chunk(of_chunk))
     });
-    let spread = |gradient: SharedOutputPtr<T>, (panel, of_chunk): (usize, usize)| {
+    let scatter = |gradient: SharedOutputPtr<T>, (panel, of_chunk): (usize, usize)| {
         let ((first, n_vectors), channels) = (panels[panel], chunk(of_chunk));
         let width = n_vectors * kernel.lanes;
         let of_row = tasks.iter().zip(&sums).filter(|((p, _, c), _)| (*p, *c) == (panel, of_chunk));
@@ -65,7 +65,7 @@ pub fn gradient_of_weight<T: Scalar>(s: &ConvSizes, x: &[T], grad: &[T]) -> Vec<
     // SAFETY: the parts together write every value.
     unsafe {
         written(s.len_weight(), |gradient: SharedOutputPtr<T>| {
-            parallel_for(parts.len(), |part| spread(gradient, parts[part]));
+            parallel_for(parts.len(), |part| scatter(gradient, parts[part]));
         })
     }
 }
@@ -101,7 +101,7 @@ fn sum_products<T: Scalar>(
     let mut sums = vec![T::zero(); columns.kernel * channels.len() * width];
     let start = sums.as_mut_ptr();
     let inside = rows.inside(row_offset);
-    // A piece consists of rows of a sample or, if a sample has one row, of samples; a row longer than a piece is
+    // A block consists of rows of a sample or, if a sample has one row, of samples; a row longer than a block is
     // divided.
     let n_positions = POSITIONS.min(columns.n_out);
     let n_lines = (POSITIONS / columns.n_out).max(1);
@@ -113,26 +113,26 @@ fn sum_products<T: Scalar>(
     let of_line = |b: usize, line: usize| if one_row { (line, inside.start) } else { (b, line) };
     let x_per_line = if one_row { rows.n_in } else { rows.stride } * columns.n_in * s.n_in;
     let grad_per_line = if one_row { rows.n_out } else { 1 } * columns.n_out * n_columns;
-    let pieces = || (0..columns.n_out).step_by(n_positions).map(|at| at..columns.n_out.min(at + n_positions));
+    let blocks = || (0..columns.n_out).step_by(n_positions).map(|at| at..columns.n_out.min(at + n_positions));
     scratch(n_lines * n_positions * width, |packed: &mut [T]| {
         for (b, line) in samples.flat_map(|b| lines.clone().step_by(n_lines).map(move |line| (b, line))) {
             let n = n_lines.min(lines.end - line);
             let (b, row) = of_line(b, line);
-            for piece in pieces() {
-                for (line, packed) in packed.chunks_exact_mut(piece.len() * width).take(n).enumerate() {
+            for block in blocks() {
+                for (line, packed) in packed.chunks_exact_mut(block.len() * width).take(n).enumerate() {
                     let grad = &grad[grad_at(b, row) + line * grad_per_line + first..];
-                    for (position, packed) in piece.clone().zip(packed.chunks_exact_mut(width)) {
+                    for (position, packed) in block.clone().zip(packed.chunks_exact_mut(width)) {
                         packed.copy_from_slice(&grad[position * n_columns..][..width]);
                     }
                 }
                 for column_offset in 0..columns.kernel {
                     let across = columns.inside(column_offset);
-                    let across = across.start.max(piece.start)..across.end.min(piece.end);
+                    let across = across.start.max(block.start)..across.end.min(block.end);
                     if across.is_empty() {
                         continue;
                     }
                     let x_at = x_at(b, row) + (across.start * columns.stride + column_offset - columns.pad) * s.n_in;
-                    let outer = TileSteps { n, left: x_per_line, right: piece.len() * width };
+                    let outer = TileSteps { n, left: x_per_line, right: block.len() * width };
                     let inner = TileSteps { n: across.len(), left: columns.stride * s.n_in, right: width };
                     for channel in channels.clone().step_by(MAX_ROWS) {
                         let n_rows = MAX_ROWS.min(channels.end - channel);
@@ -143,7 +143,7 @@ fn sum_products<T: Scalar>(
                             rows: std::array::from_fn(|row| &raw const x[x_at + channel + of(row)]),
                             from: to.map(<*mut T>::cast_const),
                             to,
-                            right: &raw const packed[(across.start - piece.start) * width],
+                            right: &raw const packed[(across.start - block.start) * width],
                             outer,
                             inner,
                         };

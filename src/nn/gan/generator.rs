@@ -33,7 +33,7 @@ impl std::str::FromStr for Preset {
         match name {
             "light" => Ok(Preset::Light),
             "paper" => Ok(Preset::Paper),
-            _ => anyhow::bail!("the network preset is `light` or `paper`, not `{name}`"),
+            _ => anyhow::bail!("unknown network preset `{name}`: expected `light` or `paper`"),
         }
     }
 }
@@ -123,7 +123,7 @@ impl Generator {
     /// and covers the same time as `mels`. `speakers` as in [`Self::encode`].
     pub fn forward(&self, mels: &Tensor, speakers: &[u32], n_frames: usize, train: bool) -> Result<Tensor> {
         if n_frames == 0 || !n_frames.is_multiple_of(FRAMES_MULTIPLE) {
-            candle_core::bail!("the generator makes a multiple of {FRAMES_MULTIPLE} frames, not {n_frames}");
+            candle_core::bail!("{n_frames} frames: expected a multiple of {FRAMES_MULTIPLE}");
         }
         self.decode(&resize::linear(&self.encode(mels, speakers, train)?, n_frames)?, train)
     }
@@ -152,7 +152,7 @@ impl Generator {
             skips.push(std::mem::replace(&mut x, down));
         }
         for (block, skip) in self.ups.iter().zip(skips.iter().rev()) {
-            x = block.forward(&resize::twice_plus(&x, skip)?, train)?;
+            x = block.forward(&resize::repeat_frames_and_add(&x, skip)?, train)?;
         }
         resize::transposed(&self.last.forward(&through(&self.decoder, x, train)?)?)
     }

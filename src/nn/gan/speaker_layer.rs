@@ -54,7 +54,9 @@ fn of_speakers(table: &Tensor, speakers: &[u32], n_sounds: usize) -> Result<Tens
         return Ok(table.clone());
     }
     if speakers.len() != n_sounds || speakers.iter().any(|speaker| *speaker as usize >= n_speakers) {
-        candle_core::bail!("{n_sounds} sounds are of speakers {speakers:?}; the network knows {n_speakers}");
+        candle_core::bail!(
+            "speakers {speakers:?} of {n_sounds} inputs: expected one index below {n_speakers} for each input"
+        );
     }
     table.index_select(&Tensor::new(speakers, table.device())?, 0)
 }
@@ -71,11 +73,11 @@ mod tests {
         let layer = SpeakerLayer::new(&mut params, 3, 4, true)?;
         let encoded = pattern(&[2, 5, 4], 0.0)?;
         let vectors = params.tensors()?[SPEAKER_EMBEDDING].clone();
-        let least = |a: Tensor, b: Tensor| (a - b)?.abs()?.flatten_all()?.max(0)?.to_scalar::<f64>();
+        let max_difference = |a: Tensor, b: Tensor| (a - b)?.abs()?.flatten_all()?.max(0)?.to_scalar::<f64>();
         // Before the first training step the layers only add the vectors.
         let out = layer.forward(&encoded, &[2, 1])?;
         let expected = encoded.i(0)?.broadcast_add(&vectors.narrow(0, 2, 1)?)?;
-        assert!(least(out.i(0)?, expected)? < 1e-12);
+        assert!(max_difference(out.i(0)?, expected)? < 1e-12);
 
         let weights = pattern(&[3, 4, 4], 0.5)?;
         let layer = SpeakerLayer { vectors: vectors.clone(), weights: Some(weights.clone()) };
@@ -83,10 +85,10 @@ mod tests {
         for (sound, speaker) in [(0, 2), (1, 1)] {
             let x = encoded.i(sound)?;
             let expected = (&x + x.matmul(&weights.i(speaker)?)?)?.broadcast_add(&vectors.narrow(0, speaker, 1)?)?;
-            assert!(least(out.i(sound)?, expected.clone())? < 1e-12);
+            assert!(max_difference(out.i(sound)?, expected.clone())? < 1e-12);
             let row = |table: &Tensor| table.narrow(0, speaker, 1);
             let alone = SpeakerLayer { vectors: row(&vectors)?, weights: Some(row(&weights)?) };
-            assert!(least(alone.forward(&encoded.narrow(0, sound, 1)?, &[])?.i(0)?, expected)? < 1e-12);
+            assert!(max_difference(alone.forward(&encoded.narrow(0, sound, 1)?, &[])?.i(0)?, expected)? < 1e-12);
         }
         assert!([&[0][..], &[0, 3], &[]].iter().all(|speakers| layer.forward(&encoded, speakers).is_err()));
         for (n, speakers) in [(3, &[1, 2][..]), (1, &[])] {

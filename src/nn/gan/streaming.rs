@@ -67,13 +67,13 @@ impl<'a, M: FnMut(Range<usize>) -> Result<Tensor>> StreamingGenerator<'a, M> {
         chunk: usize,
         mels: M,
     ) -> Result<Self> {
-        for (what, n) in [("the sound", n_frames), ("a chunk", chunk)] {
+        for (what, n) in [("the audio", n_frames), ("a chunk", chunk)] {
             if n == 0 || !n.is_multiple_of(FRAMES_MULTIPLE) {
-                candle_core::bail!("{what} must have a multiple of {FRAMES_MULTIPLE} frames, not {n}");
+                candle_core::bail!("{what} has {n} frames: expected a multiple of {FRAMES_MULTIPLE}");
             }
         }
         if n_encoded_frames(preset, n_mel_frames) == 0 {
-            candle_core::bail!("{n_mel_frames} spectrogram frames are too few for this network");
+            candle_core::bail!("the spectrogram is too short for this network: {n_mel_frames} frames");
         }
         Ok(Self { generator, preset, mels, n_mel_frames, n_frames, chunk, next: 0, encoded: None, first_encoded: 0 })
     }
@@ -84,7 +84,7 @@ impl<'a, M: FnMut(Range<usize>) -> Result<Tensor>> StreamingGenerator<'a, M> {
         let part = resize::ResizedPart { frames: first..end, n_out: self.n_frames, n_in: n_encoded };
         let needed = part.needed();
         self.encode_until(needed.clone(), n_encoded)?;
-        let Some(encoded) = &self.encoded else { candle_core::bail!("nothing was heard") };
+        let Some(encoded) = &self.encoded else { candle_core::bail!("no encoded audio frames are buffered") };
         let encoded = encoded.narrow(1, needed.start - self.first_encoded, needed.len())?;
         let poses = self.generator.decode(&resize::linear_part(&encoded, &part)?, false)?;
         poses.narrow(2, frames.start - first, frames.len())

@@ -73,10 +73,10 @@ impl TemporalLifter {
     /// A width is even, or there is none.
     pub fn new(params: &mut Params, name: &str, config: &Config) -> Result<Self> {
         let Some((first, others)) = config.widths.split_first() else {
-            candle_core::bail!("a temporal lifter needs at least one width");
+            candle_core::bail!("the temporal lifter has no widths: expected at least one");
         };
         if config.widths.iter().any(|width| width % 2 == 0) {
-            candle_core::bail!("the widths of a temporal lifter are odd, got {:?}", config.widths);
+            candle_core::bail!("invalid widths {:?} of the temporal lifter: expected odd numbers", config.widths);
         }
         let n = config.channels;
         let expand = ConvUnit::new(params, &format!("{name}.expand"), [config.n_in, n], *first)?;

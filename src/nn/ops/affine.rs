@@ -1,18 +1,18 @@
 //! A fully connected layer over the last axis, including bias and ReLU, as one operator, for many rows and few
-//! columns. Each piece of rows is processed by one thread; results do not depend on the number of threads.
+//! columns. Each chunk of rows is processed by one thread; results do not depend on the number of threads.
 
 use super::operator::{CpuOperator, CustomOperator, Gradients, Operand};
 use crate::cpu::packed_matrix::PackedMatrix;
+use crate::cpu::spin_pool::parallel_each;
 use crate::cpu::tensor::{Matrix, Scalar, add_product};
-use crate::cpu::thread_team::parallel_each;
 use crate::params::{Init, Params};
 use candle_core::{D, Module, Result, Shape, Tensor};
 
 /// Number of rows that are multiplied before their sums are stored.
 const ROWS: usize = 48;
-/// Maximum number of pieces, and minimum number of rows per piece.
-const MAX_PIECES: usize = 8;
-const MIN_PIECE_ROWS: usize = 128;
+/// Maximum number of chunks, and minimum number of rows per chunk.
+const MAX_CHUNKS: usize = 8;
+const MIN_CHUNK_ROWS: usize = 128;
 
 /// Tensors `<name>.weight` [out, in] and `<name>.bias` [out], both initialised uniformly in +-1 / sqrt(in), as in
 /// PyTorch.
@@ -74,9 +74,9 @@ fn sizes(x: &[usize], weight: &[usize], n_bias: usize) -> Result<AffineSizes> {
     }
 }
 
-/// Number of rows per piece.
-fn piece(n: usize) -> usize {
-    n.div_ceil(MAX_PIECES).max(MIN_PIECE_ROWS).next_multiple_of(ROWS)
+/// Number of rows per chunk.
+fn chunk(n: usize) -> usize {
+    n.div_ceil(MAX_CHUNKS).max(MIN_CHUNK_ROWS).next_multiple_of(ROWS)
 }
 
 /// Multiplies the rows of `x` with a matrix, some rows at a time; `store` receives the index of the first row and the
@@ -97,10 +97,10 @@ impl CpuOperator for AffineOp {
     fn forward<T: Scalar>(&self, [x, weight, bias]: [Operand<T>; 3]) -> Result<(Vec<T>, Shape)> {
         let (n, n_in, n_out) = sizes(x.dims, weight.dims, bias.values.len())?;
         let packed = PackedMatrix::new(n_in, n_out, |k, c| weight.values[c * n_in + k]);
-        let (piece, zero) = (piece(n), T::zero());
+        let (chunk, zero) = (chunk(n), T::zero());
         let mut y = vec![zero; n * n_out];
-        let pieces = y.chunks_mut(piece * n_out).zip(x.values.chunks(piece * n_in));
-        parallel_each(pieces, |_, (y, x)| {
+        let chunks = y.chunks_mut(chunk * n_out).zip(x.values.chunks(chunk * n_in));
+        parallel_each(chunks, |_, (y, x)| {
             products(x, n_in, &packed, |first, sums| {
                 let rows = y[first * n_out..].chunks_exact_mut(n_out).zip(sums.chunks_exact(packed.width()));
                 for (y, sums) in rows {
@@ -117,15 +117,15 @@ impl CpuOperator for AffineOp {
     fn backward<T: Scalar>(&self, [x, weight, bias]: [Operand<T>; 3], y: &[T], grad: &[T]) -> Gradients<T> {
         let (n, n_in, n_out) = sizes(x.dims, weight.dims, bias.values.len())?;
         let packed = PackedMatrix::new(n_out, n_in, |k, c| weight.values[k * n_in + c]);
-        let (piece, zero) = (piece(n), T::zero());
+        let (chunk, zero) = (chunk(n), T::zero());
         let mut of_x = vec![zero; if x.tracked { n * n_in } else { 0 }];
-        let mut none: Vec<&mut [T]> = (0..n.div_ceil(piece)).map(|_| <&mut [T]>::default()).collect();
+        let mut none: Vec<&mut [T]> = (0..n.div_ceil(chunk)).map(|_| <&mut [T]>::default()).collect();
         if x.tracked {
-            none = of_x.chunks_mut(piece * n_in).collect();
+            none = of_x.chunks_mut(chunk * n_in).collect();
         }
-        let outputs = y.chunks(piece * n_out).zip(grad.chunks(piece * n_out));
-        let pieces = none.into_iter().zip(x.values.chunks(piece * n_in)).zip(outputs);
-        let parts = parallel_each(pieces, |_, ((of_x, x), (y, grad))| {
+        let outputs = y.chunks(chunk * n_out).zip(grad.chunks(chunk * n_out));
+        let chunks = none.into_iter().zip(x.values.chunks(chunk * n_in)).zip(outputs);
+        let parts = parallel_each(chunks, |_, ((of_x, x), (y, grad))| {
             let cut: Vec<T>;
             let grad = if self.relu {
                 cut = y.iter().zip(grad).map(|(y, grad)| if *y > zero { *grad } else { zero }).collect();

@@ -54,7 +54,7 @@ impl BatchNorm {
     /// the ReLU has set to zero.
     pub fn forward_dropped(&self, x: &Tensor, train: bool, dropout: Option<DropMask>) -> Result<Tensor> {
         if dropout.is_some() && self.slope != 0.0 {
-            candle_core::bail!("dropout goes with a ReLU, not with slope {}", self.slope);
+            candle_core::bail!("batch norm: dropout requires a ReLU (slope 0), found slope {}", self.slope);
         }
         let statistics = Arc::new(OnceLock::new());
         if !train {
@@ -130,7 +130,7 @@ fn sizes(dims: &[usize], n_weights: usize) -> Result<NormSizes> {
         [batch, channels, rest @ ..] if *channels == n_weights && dims.iter().all(|d| *d > 0) => {
             Ok((*batch, *channels, rest.iter().product()))
         }
-        _ => candle_core::bail!("batch norm of {n_weights} channels got shape {dims:?}"),
+        _ => candle_core::bail!("batch norm: input {dims:?} does not fit {n_weights} channels"),
     }
 }
 

@@ -26,7 +26,7 @@ fn sizes(x: &Tensor, weight: &Tensor, axis: impl Fn(usize, usize) -> ConvAxis) -
     let (batch, channels, axes) = match (x.dims(), weight.dims()) {
         ([b, t, c], [_, _, kernel]) => (*b, *c, [axis(*t, *kernel), alone]),
         ([b, t, f, c], [_, _, down, across]) => (*b, *c, [axis(*t, *down), axis(*f, *across)]),
-        _ => candle_core::bail!("convolution of {:?} with {:?}: a rank is wrong", x.dims(), weight.dims()),
+        _ => candle_core::bail!("convolution: invalid ranks of input {:?} and weight {:?}", x.dims(), weight.dims()),
     };
     let (n_out, n_in) = (weight.dim(0)?, weight.dim(1)?);
     if n_in != channels || n_in * n_out * batch == 0 || axes.iter().any(|axis| axis.n_in * axis.n_out == 0) {

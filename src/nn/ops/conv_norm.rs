@@ -72,12 +72,12 @@ impl ConvNormOp {
         let (s, bias) = (&self.sizes, &channels[..self.sizes.n_out]);
         if let (None, Some(statistics)) = (&self.saved_input, self.statistics.get()) {
             let norm = self.norm(channels, statistics);
-            return (direct_conv::forward(s, x, weight, bias, |_, piece| norm.apply(piece)), None);
+            return (direct_conv::forward(s, x, weight, bias, |_, chunk| norm.apply(chunk)), None);
         }
-        let moments: Vec<OnceLock<ChannelMoments>> = (0..direct_conv::n_pieces(s)).map(|_| OnceLock::new()).collect();
-        let mut z = direct_conv::forward(s, x, weight, bias, |piece, values| {
+        let moments: Vec<OnceLock<ChannelMoments>> = (0..direct_conv::n_chunks(s)).map(|_| OnceLock::new()).collect();
+        let mut z = direct_conv::forward(s, x, weight, bias, |chunk, values| {
             if self.train {
-                let _ = moments[piece].set(ChannelMoments::measure(values, s.n_out));
+                let _ = moments[chunk].set(ChannelMoments::measure(values, s.n_out));
             }
         });
         let statistics = self.statistics.get_or_init(|| {
@@ -126,7 +126,7 @@ impl CpuOperator for ConvNormOp {
     fn backward<T: Scalar>(&self, [x, weight, channels]: [Operand<T>; 3], _: &[T], grad: &[T]) -> Gradients<T> {
         let saved_input = self.saved_input.as_ref().and_then(|saved_input| saved_input.lock().ok()?.take());
         let (Some(z), Some(statistics)) = (saved_input, self.statistics.get()) else {
-            candle_core::bail!("a layer's way back can be gone once only");
+            candle_core::bail!("conv_norm: backward was called twice for one forward pass");
         };
         let mut z = T::cpu_storage_data(z)?;
         let of_channels = self.overwrite(&mut z, channels.values, statistics, grad);

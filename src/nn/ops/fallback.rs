@@ -28,7 +28,11 @@ pub fn conv_first(x: &Tensor, weight: &Tensor, bias: &Tensor, s: &ConvSizes) -> 
     // A convolution over time only has one frequency, for which every stride gives one position.
     let stride = down.stride;
     if across.stride != stride && across.n_out != 1 {
-        candle_core::bail!("one stride for both axes, not {} and {}", down.stride, across.stride);
+        candle_core::bail!(
+            "convolution: strides {} and {} differ: expected one stride for both axes",
+            down.stride,
+            across.stride
+        );
     }
     for (dim, ConvAxis { n_out, kernel, pad, .. }) in [(2, down), (3, across)] {
         x = fitted(&x, dim, pad, (n_out - 1) * stride + kernel)?;

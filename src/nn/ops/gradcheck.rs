@@ -54,7 +54,7 @@ pub fn max_difference(
     let vars = inputs.iter().map(Var::from_tensor).collect::<Result<Vec<_>>>()?;
     let inputs: Vec<Tensor> = vars.iter().map(|var| var.as_tensor().clone()).collect();
     let (a, b) = (a(&inputs)?, b(&inputs)?);
-    let most = |a: &Tensor, b: &Tensor| {
+    let largest_difference = |a: &Tensor, b: &Tensor| {
         let difference = (a - b)?.abs()?;
         // A maximum ignores NaN, a sum does not.
         let (largest, sum) = (difference.max_all()?.to_scalar::<f64>()?, difference.sum_all()?.to_scalar::<f64>()?);
@@ -62,10 +62,10 @@ pub fn max_difference(
     };
     let backward = |y: &Tensor| (y * pattern(y.dims(), 0.5)?)?.sum_all()?.backward();
     let (of_a, of_b) = (backward(&a)?, backward(&b)?);
-    let mut worst = most(&a, &b)?;
+    let mut worst = largest_difference(&a, &b)?;
     for var in &vars {
-        let (Some(a), Some(b)) = (of_a.get(var), of_b.get(var)) else { candle_core::bail!("no gradient") };
-        let difference = most(a, b)?;
+        let (Some(a), Some(b)) = (of_a.get(var), of_b.get(var)) else { candle_core::bail!("an input has no gradient") };
+        let difference = largest_difference(a, b)?;
         worst = if difference > worst || difference.is_nan() { difference } else { worst };
     }
     Ok(worst)
@@ -90,12 +90,12 @@ pub fn check_thread_independence(
         pool.install(|| {
             let y = f(&inputs)?;
             let gradients = y.sqr()?.sum_all()?.backward()?;
-            let Some(gradient) = gradients.get(&weight) else { candle_core::bail!("no gradient") };
+            let Some(gradient) = gradients.get(&weight) else { candle_core::bail!("input {which} has no gradient") };
             Ok([y.flatten_all()?.to_vec1()?, gradient.flatten_all()?.to_vec1()?])
         })
     };
     if run(1)? != run(3)? {
-        candle_core::bail!("one thread and three give different numbers");
+        candle_core::bail!("the results for one and for three threads differ");
     }
     Ok(())
 }

@@ -8,12 +8,12 @@ use candle_core::{Result, Shape, Tensor};
 use std::ops::Range;
 
 /// Repeats every frame twice: [B, T, C] to [B, 2T, C].
-pub fn twice(x: &Tensor) -> Result<Tensor> {
+pub fn repeat_frames(x: &Tensor) -> Result<Tensor> {
     mix(x, None, doubled(x.dim(1)?))
 }
 
 /// Repeats every frame of `x` [B, T, C] twice and adds `skip` [B, 2T, C].
-pub fn twice_plus(x: &Tensor, skip: &Tensor) -> Result<Tensor> {
+pub fn repeat_frames_and_add(x: &Tensor, skip: &Tensor) -> Result<Tensor> {
     mix(x, Some(skip), doubled(x.dim(1)?))
 }
 
@@ -42,7 +42,7 @@ pub struct ResizedPart {
 impl ResizedPart {
     /// Returns the input frame at or before the position of frame `i` of the result, and the fraction of the distance
     /// to the next.
-    fn place(&self, i: usize) -> (usize, f64) {
+    fn source(&self, i: usize) -> (usize, f64) {
         let at = i as f64 * self.n_in as f64 / self.n_out as f64;
         let before = (at as usize).min(self.n_in.saturating_sub(1));
         (before, at - before as f64)
@@ -50,8 +50,8 @@ impl ResizedPart {
 
     /// Returns the required input frames.
     pub fn needed(&self) -> Range<usize> {
-        let last = self.place(self.frames.end.saturating_sub(1)).0;
-        self.place(self.frames.start).0..(last + 2).min(self.n_in)
+        let last = self.source(self.frames.end.saturating_sub(1)).0;
+        self.source(self.frames.start).0..(last + 2).min(self.n_in)
     }
 }
 
@@ -62,7 +62,7 @@ pub fn linear_part(x: &Tensor, part: &ResizedPart) -> Result<Tensor> {
         candle_core::bail!("cannot interpolate frames {:?} from {} of {needed:?}", part.frames, x.dim(1)?);
     }
     let of = part.frames.clone().map(|i| {
-        let (before, share) = part.place(i);
+        let (before, share) = part.source(i);
         (before - needed.start, (before - needed.start + 1).min(needed.len() - 1), share)
     });
     mix(x, None, FrameInterpolation { n_in: needed.len(), of: of.collect() })
@@ -107,14 +107,14 @@ struct MixOp {
 }
 
 impl CpuOperator for MixOp {
-    const NAME: &'static str = "frames as mixtures of two";
+    const NAME: &'static str = "frame interpolation";
 
     fn forward<T: Scalar>(&self, [x, skip, _]: [Operand<T>; 3]) -> Result<(Vec<T>, Shape)> {
         let (&[batch, n_in, n_channels], n_out) = (x.dims, self.interpolation.n_out()) else {
-            candle_core::bail!("frames [B, T, C] are resized, not {:?}", x.dims);
+            candle_core::bail!("cannot resize shape {:?}: expected [B, T, C]", x.dims);
         };
         if n_in != self.interpolation.n_in || (self.plus && skip.dims != [batch, n_out, n_channels]) {
-            candle_core::bail!("{:?} does not resize to {n_out} frames plus {:?}", x.dims, skip.dims);
+            candle_core::bail!("cannot resize {:?} to {n_out} frames and add {:?}", x.dims, skip.dims);
         }
         let skip = self.plus.then_some(skip.values);
         Ok((self.interpolation.mix(x.values, skip, n_channels), Shape::from((batch, n_out, n_channels))))
@@ -129,11 +129,11 @@ impl CpuOperator for MixOp {
 struct TransposeOp;
 
 impl CpuOperator for TransposeOp {
-    const NAME: &'static str = "transposition in memory";
+    const NAME: &'static str = "transpose";
 
     fn forward<T: Scalar>(&self, [x, ..]: [Operand<T>; 3]) -> Result<(Vec<T>, Shape)> {
         let &[batch, rows, columns] = x.dims else {
-            candle_core::bail!("{:?} has no two axes to exchange", x.dims);
+            candle_core::bail!("cannot transpose shape {:?}: expected [B, rows, columns]", x.dims);
         };
         Ok((transpose(x.values, rows, columns), Shape::from((batch, columns, rows))))
     }
@@ -157,7 +157,7 @@ mod tests {
         }
         let skip = |v: &[Tensor]| {
             let early = v[0].sqr()?;
-            twice_plus(&early.sin()?, &(twice(&early)? * twice(&early.sin()?)?)?)
+            repeat_frames_and_add(&early.sin()?, &(repeat_frames(&early)? * repeat_frames(&early.sin()?)?)?)
         };
         assert!(worst(std::slice::from_ref(&x), skip)? < 1e-7);
         assert!(worst(&[x], |v| transposed(&v[0].sqr()?)? * transposed(&v[0])?)? < 1e-7);
@@ -172,7 +172,7 @@ mod tests {
         let own = |v: &[Tensor]| mix(&v[0], Some(&v[1]), interpolation.clone());
         let off = max_difference(&[x, skip], own, |v| fallback_mix(&v[0], Some(&v[1]), &interpolation))?;
         assert!(off < 1e-12, "{off:e}");
-        assert!(twice_plus(&pattern(&[2, 3, 5], 0.0)?, &pattern(&[2, 5, 5], 0.0)?).is_err());
+        assert!(repeat_frames_and_add(&pattern(&[2, 3, 5], 0.0)?, &pattern(&[2, 5, 5], 0.0)?).is_err());
         Ok(())
     }
 
@@ -187,7 +187,7 @@ mod tests {
         let some = linear_part(&x.narrow(1, 1, 3)?, &part)?.flatten_all()?.to_vec1::<f64>()?;
         assert_eq!(some, [1.5, 2.0, 2.5]);
         assert!(linear_part(&x, &part).is_err());
-        assert_eq!(twice(&x)?.flatten_all()?.to_vec1::<f64>()?, [0.0, 0.0, 1.0, 1.0, 2.0, 2.0, 3.0, 3.0]);
+        assert_eq!(repeat_frames(&x)?.flatten_all()?.to_vec1::<f64>()?, [0.0, 0.0, 1.0, 1.0, 2.0, 2.0, 3.0, 3.0]);
         Ok(())
     }
 }

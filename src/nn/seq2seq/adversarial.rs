@@ -25,7 +25,7 @@ impl SegmentDiscriminator {
         let (mut blocks, mut n_in, mut n_frames) = (Vec::new(), config.pose, config.predicted);
         for (i, (channels, kernel)) in config.score_channels.into_iter().zip(KERNELS).enumerate() {
             if n_frames < kernel {
-                candle_core::bail!("{} poses are too few for the discriminator", config.predicted);
+                candle_core::bail!("too few poses for the discriminator: {}", config.predicted);
             }
             n_frames = (n_frames - kernel) / 2 + 1;
             let conv = Conv1d::valid_with_bias(params, &format!("conv.{i}"), [n_in, channels], kernel, 2)?;

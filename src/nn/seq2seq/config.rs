@@ -25,7 +25,8 @@ pub struct Config {
     /// Number of layers of the encoder of `words`: two in the published network, one in the adversarial one.
     pub encoder_layers: usize,
     /// Whether the encoder of `words` runs a GRU over the audio around a frame instead of using only that frame.
-    pub hears_context: bool,
+    #[serde(rename = "hears_context")]
+    pub audio_context: bool,
     /// Dropout rate between the layers of the encoder; below, the rate after its last layer and after each layer over
     /// the context.
     pub dropout_between: f64,
@@ -53,7 +54,7 @@ impl Default for Config {
             word: 100,
             word_hidden: 100,
             encoder_layers: 2,
-            hears_context: false,
+            audio_context: false,
             dropout_between: 0.2,
             dropout: 0.1,
             dropout_read: 0.5,
@@ -81,7 +82,7 @@ impl Config {
         let previous = [batch, self.previous, self.pose];
         if self.context.is_multiple_of(2) || segment.audio.dims() != expected || segment.previous.dims() != previous {
             candle_core::bail!(
-                "a segment of audio {:?} and previous poses {:?}, expected {expected:?} and {previous:?} (an odd context)",
+                "segment has audio {:?}, previous poses {:?}: expected {expected:?}, {previous:?} and an odd context",
                 segment.audio.dims(),
                 segment.previous.dims()
             );

@@ -67,7 +67,7 @@ impl Decoder {
     }
 
     fn first_state(&self, encoded: &[Tensor]) -> Result<Tensor> {
-        let Some(sound) = encoded.first() else { candle_core::bail!("a decoder without encoder") };
+        let Some(sound) = encoded.first() else { candle_core::bail!("decoder: expected at least one encoder output") };
         let (_, n, both) = sound.dims3()?;
         let end = sound.narrow(1, n - 1, 1)?.narrow(2, 0, both / 2)?;
         let beginning = sound.narrow(1, 0, 1)?.narrow(2, both / 2, both / 2)?;

@@ -22,7 +22,7 @@ impl FrameEncoder {
     pub fn new(params: &mut Params, name: &str, config: &Config) -> Result<Self> {
         let Config { audio, hidden, .. } = *config;
         let mut context = || Gru::new(params, &format!("{name}.context"), [audio, audio], 0, false);
-        let context = config.hears_context.then(&mut context).transpose()?;
+        let context = config.audio_context.then(&mut context).transpose()?;
         let layer = |layer: usize, params: &mut Params| {
             let n_in = if layer == 0 { hidden } else { 2 * hidden };
             Gru::new(params, &format!("{name}.gru"), [n_in, hidden], layer, true)
@@ -153,7 +153,7 @@ pub fn set_word_vectors(params: &Params, name: &str, vectors: &Tensor) -> Result
     let table = table_name(name);
     match params.trainables().find(|(own, _)| *own == table) {
         Some((_, var)) => var.set(&vectors.to_dtype(var.dtype())?.to_device(var.device())?),
-        None => candle_core::bail!("this network has no tensor {table}"),
+        None => candle_core::bail!("the network has no tensor {table}"),
     }
 }
 
@@ -165,18 +165,18 @@ mod tests {
     #[test]
     fn word_vectors_are_set_for_the_named_encoder_only() -> Result<()> {
         let mut params = Params::new(1);
-        let encoder = WordEncoder::new(&mut params, "said", [3, 2, 4])?;
+        let encoder = WordEncoder::new(&mut params, "spoken", [3, 2, 4])?;
         let states = |word: u32| encoder.last(&Tensor::new(&[[word]], &Device::Cpu)?)?.flatten_all()?.to_vec1::<f32>();
         let before = states(1)?;
         let vectors = Tensor::new(&[[0f64, 0.0], [1.0, 1.0], [0.5, -2.0]], &Device::Cpu)?;
-        set_word_vectors(&params, "said", &vectors)?;
-        let table = params.trainables().find(|(name, _)| *name == "said.embedding.weight").map(|(_, var)| var);
+        set_word_vectors(&params, "spoken", &vectors)?;
+        let table = params.trainables().find(|(name, _)| *name == "spoken.embedding.weight").map(|(_, var)| var);
         assert_eq!(
             table.map(|var| var.to_vec2::<f32>()).transpose()?,
             Some(vec![vec![0.0; 2], vec![1.0; 2], vec![0.5, -2.0]])
         );
         assert!(states(1)? != before && states(1)? != states(2)?);
-        for (name, shape) in [("heard", (3, 2)), ("said", (2, 2)), ("said", (3, 3)), ("said", (2, 3))] {
+        for (name, shape) in [("other", (3, 2)), ("spoken", (2, 2)), ("spoken", (3, 3)), ("spoken", (2, 3))] {
             assert!(set_word_vectors(&params, name, &Tensor::zeros(shape, vectors.dtype(), &Device::Cpu)?).is_err());
         }
         assert!(encoder.last(&Tensor::new(&[[3u32]], &Device::Cpu)?).is_err());

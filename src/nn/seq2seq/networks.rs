@@ -80,9 +80,8 @@ impl EncodesAndDecodes for WordsSeq2Seq {
         match (&self.words, &segment.words) {
             (Some(encoder), Some(words)) => encoded.push(encoder.states(words)?),
             (None, None) => {}
-            (reads, _) => {
-                candle_core::bail!("this network reads {} words", if reads.is_some() { "a segment's" } else { "no" })
-            }
+            (Some(_), None) => candle_core::bail!("the input has no words: this network requires them"),
+            (None, Some(_)) => candle_core::bail!("the input has words: this network does not use them"),
         }
         Ok(encoded)
     }
@@ -121,10 +120,12 @@ impl EncodesAndDecodes for ContextSeq2Seq {
     /// Returns the states over the frames of the segment.
     fn encoded(&self, segment: &Segment, mode: &mut Mode) -> Result<Vec<Tensor>> {
         self.config.check(segment)?;
-        let Some(words) = &segment.words else { candle_core::bail!("this network reads the words around each pose") };
+        let Some(words) = &segment.words else {
+            candle_core::bail!("the input has no words: expected those around each pose")
+        };
         let (batch, n_frames, n_words) = words.dims3()?;
         if n_frames != self.config.predicted {
-            candle_core::bail!("words of {n_frames} frames for {} poses", self.config.predicted);
+            candle_core::bail!("the input has words for {n_frames} frames, expected {} poses", self.config.predicted);
         }
         let audio = self.audio.forward(&segment.audio, mode)?;
         let spoken = self.words.last(&words.reshape((batch * n_frames, n_words))?)?.relu()?;

@@ -73,7 +73,7 @@ pub fn generate(
         poses.push(predicted);
     }
     if poses.is_empty() {
-        candle_core::bail!("a sound of {} frames is shorter than one segment", audio.dim(1)?);
+        candle_core::bail!("the audio ({} frames) is shorter than one segment", audio.dim(1)?);
     }
     Tensor::cat(&poses, 1)
 }

@@ -178,7 +178,7 @@ impl Division {
         }
         let pieces = divided.pieces.iter().map(|(_, piece)| *piece).collect();
         let resting = Intervals::new(fps, intervals.n_frames, pieces).with_resting(&intervals.resting);
-        divided.ledger = divided.ledger.with_resting(resting.resting_stretches());
+        divided.ledger = divided.ledger.with_resting(resting.resting_intervals());
         divided.ledger.refused.sort_by(|a, b| a.start_secs.total_cmp(&b.start_secs));
         Ok(divided)
     }

@@ -8,7 +8,7 @@ use orator_base::motion::posture::{self, LiftedBody};
 use orator_base::stage::Unit;
 use orator_base::stage::artifacts::{Artifact, StageName, dir};
 use orator_base::stage::fingerprint::hash_file;
-use orator_base::stage::ledger::{Ledger, TranscriptAccount};
+use orator_base::stage::ledger::{Ledger, TranscriptReport};
 use orator_base::stage::record::Record;
 use orator_base::types::interval::{Interval, Intervals};
 use orator_base::types::pose2d::Keypoints;
@@ -101,7 +101,8 @@ impl LiftedVideo {
             }
         }
         let offset = if fixes_offset { sound_offset_json::read(&path_of(Artifact::SoundOffset))? } else { None };
-        let shift = offset.filter(SoundOffset::is_sure).map_or(0, |o| (o.secs * f64::from(SAMPLE_RATE)).round() as i64);
+        let shift =
+            offset.filter(SoundOffset::is_reliable).map_or(0, |o| (o.secs * f64::from(SAMPLE_RATE)).round() as i64);
         if shift != 0 {
             hasher.update(format!("sound shifted by {shift} samples\n").as_bytes());
         }
@@ -154,7 +155,7 @@ impl LiftedVideo {
     }
 
     /// Statistics of the words in samples of these intervals.
-    pub fn transcript_stats(&self, intervals: impl Iterator<Item = Interval>) -> Option<TranscriptAccount> {
+    pub fn transcript_stats(&self, intervals: impl Iterator<Item = Interval>) -> Option<TranscriptReport> {
         let fps = self.intervals.fps;
         self.words.as_ref().map(|words| words.account(intervals.map(|i| (fps.secs(i.start), fps.secs(i.end)))))
     }

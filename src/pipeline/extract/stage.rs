@@ -129,7 +129,7 @@ impl Stage for ExtractStage {
         facts.insert("n_cuts".into(), n_cuts.into());
         let note = |damage: &String| format!("; the file is damaged, its readable part is used: {damage}");
         let damage = media.damage.as_ref().map(note).unwrap_or_default();
-        let notes = media.remarks().iter().fold(String::new(), |text, note| text + "; " + note);
+        let notes = media.notes().iter().fold(String::new(), |text, note| text + "; " + note);
         Ok(Report { line: format!("{n_frames} frames at {rate}, {cuts}, {sound}{notes}{damage}"), facts })
     }
 }

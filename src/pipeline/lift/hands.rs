@@ -7,7 +7,7 @@ use anyhow::Result;
 use ndarray::{ArrayView3, ArrayViewMut2, ArrayViewMut3, Axis, s};
 use orator_base::math::vec3;
 use orator_base::motion::view::hand::{HandJoints, SeenHand, parent};
-use orator_base::types::pose2d::{HAND_SEEN_SCORE, N_HAND};
+use orator_base::types::pose2d::{HAND_VISIBLE_SCORE, N_HAND};
 use orator_base::types::skeleton::Side;
 use orator_nn::lifter::hand::HandLifter;
 
@@ -49,7 +49,7 @@ pub fn lift(
 fn visible_points(points: &ArrayView3<f32>, t: usize) -> SeenHand {
     std::array::from_fn(|j| {
         let [x, y, score] = [0, 1, 2].map(|k| points[[t, j, k]]);
-        (score >= HAND_SEEN_SCORE && x.abs() <= MAX_PX && y.abs() <= MAX_PX).then_some([x, y])
+        (score >= HAND_VISIBLE_SCORE && x.abs() <= MAX_PX && y.abs() <= MAX_PX).then_some([x, y])
     })
 }
 

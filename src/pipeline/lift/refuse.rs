@@ -67,7 +67,7 @@ pub fn exclude_frames(
     }
     reduced.refused.sort_by(|a, b| a.start_secs.total_cmp(&b.start_secs));
     let left = Intervals::new(fps, intervals.n_frames, left).with_resting(&intervals.resting);
-    let reduced = reduced.with_resting(left.resting_stretches());
+    let reduced = reduced.with_resting(left.resting_intervals());
     Ok((left, reduced))
 }
 

@@ -64,7 +64,7 @@ fn load<T>(
         return parse(builtin, kind, make).with_context(|| format!("invalid built-in {kind}"));
     }
     let bytes =
-        input::read(path, input::MOST_DATA).with_context(|| format!("cannot read the weights {}", path.display()))?;
+        input::read(path, input::MAX_DATA).with_context(|| format!("cannot read the weights {}", path.display()))?;
     parse(&bytes, kind, make).with_context(|| {
         format!("{} is not a {kind}: expected weights of `orator-lab train lifter --part {part}`", path.display())
     })

@@ -33,7 +33,7 @@ pub fn judge(measures: &Measures, video: &MediaInfo, rules: &config::SegmentConf
     let intervals = pieces.iter().filter(|(_, refused)| refused.is_none()).map(|(interval, _)| *interval).collect();
     let resting = runs(n_frames, |t| rests[t], |_| false);
     let intervals = Intervals::new(video.fps, n_frames, intervals).with_resting(&resting);
-    let ledger = ledger(&pieces, n_frames, video).with_resting(intervals.resting_stretches());
+    let ledger = ledger(&pieces, n_frames, video).with_resting(intervals.resting_intervals());
     (intervals, ledger)
 }
 

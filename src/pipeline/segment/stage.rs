@@ -157,7 +157,7 @@ fn report(intervals: &Intervals, ledger: &Ledger) -> Report {
             length(ledger.duration_secs),
             counted(intervals.intervals.len(), "interval"),
             windows.stride_5,
-            windows.apart
+            windows.disjoint
         )
     };
     if intervals.resting_secs() >= 0.05 {

@@ -46,7 +46,7 @@ impl VideoSummary {
             video.note("The video file is missing: no pictures available.");
         }
         if let Ok(media) = MediaInfo::read(&Artifact::MediaInfo.path(work, unit)) {
-            media.remarks().iter().for_each(|remark| video.note(&format!("File: {remark}.")));
+            media.notes().iter().for_each(|remark| video.note(&format!("File: {remark}.")));
             if let Some(reason) = media.not_judged() {
                 video.note(&format!("Created {reason}."));
             }

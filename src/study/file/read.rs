@@ -24,7 +24,7 @@ impl StudyFile {
     /// # Errors
     /// The file cannot be read, or [`ConfigError`] lists its problems.
     pub fn read(file: &Path) -> Result<Self> {
-        let text = input::read_text(file, input::MOST_TEXT).with_context(|| {
+        let text = input::read_text(file, input::MAX_TEXT).with_context(|| {
             format!("cannot read the study file {}; `orator guide study` shows an example", file.display())
         })?;
         let file = std::path::absolute(file)?;

@@ -28,7 +28,7 @@ impl CommonVisibility {
         let (n_frames, n_joints) = shown.first()?.motion.mask.dim();
         let mut joints = Array2::from_elem((n_frames, n_joints), true);
         let mut angles = [(); 2].map(|()| Array2::from_elem((n_frames, 3), true));
-        let unseen = Posture::unseen(n_frames);
+        let unseen = Posture::missing(n_frames);
         for ShownMotion { motion, posture, .. } in shown {
             let finite = motion.joints.map_axis(Axis(2), |coordinates| coordinates.iter().all(|v| v.is_finite()));
             Zip::from(&mut joints)

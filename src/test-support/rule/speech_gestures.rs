@@ -168,7 +168,7 @@ impl SpeechGestures {
 
     /// Head angles at the frames of `fps`, radians; the trunk stays upright.
     pub fn posture(&self, n_frames: usize, fps: FrameRate) -> Posture {
-        let mut posture = Posture::unseen(n_frames);
+        let mut posture = Posture::missing(n_frames);
         posture.trunk.fill(0.0);
         posture.head.fill(0.0);
         for t in 0..n_frames {

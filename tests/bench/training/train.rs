@@ -19,7 +19,7 @@ use orator_gesture::generate::representation::Representation;
 use orator_gesture::train::gan::recipe::{self, InitialWeights, TrainingMaterial};
 use orator_gesture::train::gan::step::{GanTrainer, Losses, MAX_NORM};
 use orator_gesture::train::gan::windows::WindowBatch;
-use orator_nn::cpu::thread_team::with_spinning_workers;
+use orator_nn::cpu::spin_pool::with_spinning_workers;
 use orator_nn::gan::generator::Config;
 use orator_nn::weights::Contents;
 use rand::{Rng, SeedableRng};

@@ -120,7 +120,7 @@ fn what_is_of_another_rate_is_measured_beside_it_by_time() {
     assert!(code == 1 && said.contains("and the frame rates (--fps)"), "{said}");
     std::fs::write(path_of(&dir.join("made.npy")), "{\"fps\": 30}").unwrap();
     let same = done(dir, args);
-    assert!(!same["notes"].to_string().contains("does not say its rate"), "{}", same["notes"]);
+    assert!(!same["notes"].to_string().contains("has no frame rate"), "{}", same["notes"]);
     let noted = done(dir, &format!("{args} --fps 25"));
     assert!(
         noted["notes"].to_string().contains("made.npy has 30 fps: 25 fps (--fps) is ignored for this file"),
@@ -147,5 +147,5 @@ fn units_of_captured_joints_are_found_out() {
     let turned = Motion { joints: motion.joints.mapv(|v| -v.abs()), ..motion };
     joints_npz::write(&path.with_extension("npz"), &turned).unwrap();
     let notes = motion_file::read(&path.with_extension("npz"), None).unwrap().notes;
-    assert!(notes.iter().any(|note| note.contains("as where y points up")), "{notes:?}");
+    assert!(notes.iter().any(|note| note.contains("so y seems to point up")), "{notes:?}");
 }

@@ -275,7 +275,7 @@ fn the_verb_says_what_failed_and_replaces_only_datasets() {
     assert_eq!((code, json["imported"].as_u64(), json["failed"].as_u64()), (Some(2), Some(1), Some(1)));
     assert_eq!(run(&["in", "--out", "out"]).0, Some(1), "it is not empty");
     let ledger = fs::read_to_string(dir.path().join("out/ledger.jsonl")).unwrap();
-    assert!(ledger.contains("bad.bvh is no readable") && !ledger.contains("in/"), "{ledger}");
+    assert!(ledger.contains("bad.bvh is not a valid BVH") && !ledger.contains("in/"), "{ledger}");
     assert_eq!(run(&["in/good.bvh", "--out", "out", "--force"]).0, Some(0));
     assert_eq!(run(&["in", "out", "--out", "out", "--force"]).0, Some(1), "it would be read while it is replaced");
     let (code, json) = run(&["in", "--out", "in", "--force"]);

@@ -67,7 +67,7 @@ fn z_up_inches_and_a_lost_hand_are_the_same_speaker() {
     std::fs::write(&path, format!("{head}\nFrame Time: 0.0333333\n{}\n", frames.join("\n"))).unwrap();
     let take = captured::read(MotionKind::Bvh, &path).unwrap();
     assert_eq!((take.facts["source_unit"].as_str(), take.facts["source_up"].as_str()), (Some("inch"), Some("+z")));
-    assert!(bvh::unit_note(&take.facts).unwrap().contains("its unit is the inch: brought to metres"));
+    assert!(bvh::unit_note(&take.facts).unwrap().contains("the unit is the inch: converted to metres"));
     assert_eq!(take.facts["joints_missing"].as_array().unwrap().len(), 22, "the left wrist and its hand");
     for ((t, j, k), &v) in take.motion.joints.indexed_iter() {
         let lost = (L_HAND..R_HAND).contains(&j) || j == L_WRIST;

@@ -3,7 +3,7 @@
 
 use crate::fixtures::media::lifted_videos::{settings, shard_with_words, video};
 use orator_base::stage::Unit;
-use orator_base::stage::ledger::{TranscriptAccount, WordCount};
+use orator_base::stage::ledger::{TranscriptReport, WordCount};
 use orator_base::stage::progress::Silent;
 use orator_base::types::time::FrameRate;
 use orator_dataset::config::DatasetConfig;
@@ -63,7 +63,7 @@ fn words(dir: &Path) -> BTreeMap<String, Option<Vec<Word>>> {
     samples.into_iter().map(|sample| (sample.key.to_string(), dataset.read(&sample).unwrap().words)).collect()
 }
 
-fn account(dir: &Path, name: &str) -> TranscriptAccount {
+fn account(dir: &Path, name: &str) -> TranscriptReport {
     let lines = read_ledgers(dir).unwrap().into_iter();
     lines.filter(|line| line.file.starts_with(name)).find_map(|line| line.ledger.words).unwrap()
 }
@@ -135,8 +135,8 @@ fn what_is_wrong_with_a_transcript_is_said_and_costs_no_video() {
         ("late.srt", srt(21, "so").into_bytes(), "1 of 21 words lie after the end of the sound and were left out"),
         ("empty.srt", Vec::new(), "the transcript holds no word"),
         ("plain.txt", b"so well".to_vec(), "the transcript has no times"),
-        ("latin.srt", b"1\n00:00:01,000 --> 00:00:02,000\nsch\xf6n\n".to_vec(), "line 3: the byte 0xf6 is no UTF-8"),
-        ("times.tsv", b"0\t1\tso\n2\t1\twell\n".to_vec(), "line 2: `well` is said from 2 to 1 s"),
+        ("latin.srt", b"1\n00:00:01,000 --> 00:00:02,000\nsch\xf6n\n".to_vec(), "line 3: byte 0xf6 is not valid UTF-8"),
+        ("times.tsv", b"0\t1\tso\n2\t1\twell\n".to_vec(), "line 2: invalid times 2.00 to 1.00 s of `well`"),
         ("over.tsv", b"0\t5\tso\n1\t2\twell\n".to_vec(), "1 of 2 words begin before the one before ends"),
         ("cut.json", b"{\"segments\": [".to_vec(), "not valid JSON"),
         ("many.tsv", many.into_bytes(), "100020 of 100020 words"),

@@ -216,7 +216,7 @@ fn bad_input_is_refused_in_clear_words() {
         (&["t.npy", "away.npy", "--audio", "t.npy"], "t.npy"),
         (&["t.npy", "away.npy", "--audio", "short.wav"], "is it the audio of another clip?"),
         (&["t.npy", "away.npy", "--alpha", "0"], "alpha of PCK"),
-        (&["t.npy", "away.npy", "--fps", "0"], "frames a second"),
+        (&["t.npy", "away.npy", "--fps", "0"], "expected 1 to 1000 fps"),
     ];
     for (args, says) in cases {
         let (sides, more) = args.split_at(2);
@@ -244,7 +244,7 @@ fn what_can_be_mended_is_measured_with_a_note() {
     noted("t.npy", "longer.npy", &[], "the truth has 120 frames, the prediction 114: both were cut to 114");
     noted("t.npy", "away.npy", &[], "is up to 0.87 m from the origin");
     noted("t.npy", "30.npz", &[], "at 30 fps was resampled to 15 fps");
-    let exact = noted("t.txt", "t.npy", &[], "does not say its rate");
+    let exact = noted("t.txt", "t.npy", &[], "has no frame rate");
     assert_eq!(value(&exact, "pck_2d", "all", "prediction"), 1.0);
     // telephone sound has onsets, and three hours of sound beside eight seconds of motion are no matter
     let phone = noted("t.npy", "few-nan.npy", &["--audio", "phone.wav", "--convention", "aist"], "NaN");

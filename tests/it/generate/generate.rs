@@ -93,7 +93,7 @@ fn wrong_input_is_named_and_nothing_is_written() {
         ("--checkpoint host.safetensors --audio click.wav --out a.bvh", "too short"),
         (
             "--checkpoint host.safetensors --audio speech.wav --out speech.wav/a.bvh",
-            "cannot make the folder speech.wav",
+            "cannot create the folder speech.wav",
         ),
         ("--checkpoint gone.safetensors --audio speech.wav --out a.bvh", "gone.safetensors does not exist"),
         ("--checkpoint nothing --audio speech.wav --out a.bvh", "no checkpoint in nothing"),

@@ -161,8 +161,8 @@ fn what_is_doubtful_about_a_transcript_is_said() {
     write("broken.json", "{\"segments\": [");
     write("times.tsv", "0\t1\thello\n2\t1\tworld\n");
     for (file, words) in [
-        ("broken.json", "broken.json is no transcript"),
-        ("times.tsv", "line 2: `world` is said from 2 to 1 s"),
+        ("broken.json", "broken.json is not a valid transcript"),
+        ("times.tsv", "line 2: invalid times 2.00 to 1.00 s of `world`"),
         ("gone.tsv", "gone.tsv"),
     ] {
         let said = refusal(dir, &args(file));

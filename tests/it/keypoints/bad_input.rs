@@ -78,53 +78,53 @@ fn every_kind_of_damage_is_named() {
     }
     write_npy(dir.path().join("signed.npy"), &signed).unwrap();
     for (name, expected) in [
-        ("empty.json", "empty.json: no keypoints can be read: no JSON: it begins neither with { nor with ["),
-        ("text.json", "text.json: no keypoints can be read: no JSON: it begins neither with { nor with ["),
+        ("empty.json", "empty.json has no readable keypoints: not JSON: expected { or [ at the start"),
+        ("text.json", "text.json has no readable keypoints: not JSON: expected { or [ at the start"),
         (
             "cut.json",
-            "cut.json: no keypoints can be read: the JSON is cut off, damaged or of another kind: EOF while parsing a",
+            "cut.json has no readable keypoints: the JSON is truncated, damaged or of another format: EOF while \
+             parsing a",
         ),
         ("string.json", "invalid type: string \"none\", expected numbers or lists of numbers at line 1 column"),
-        (
-            "other.json",
-            "other.json: no keypoints can be read: no keypoints are known in it: expected `people` (OpenPose)",
-        ),
-        ("nothing.json", "nothing.json: nobody is seen in any frame"),
+        ("other.json", "other.json has no readable keypoints: expected `people` (OpenPose)"),
+        ("nothing.json", "nothing.json: no person is visible in any frame"),
         (
             "count.json",
-            "count.json: no keypoints can be read: frame 0, person 0: 19 points a person; orders of 17, 18, 25, 26, 133, 136 points are known",
+            "count.json has no readable keypoints: frame 0, person 0: 19 points per person: expected one of 17, 18, 25, \
+             26, 133, 136",
         ),
-        ("uneven.json", "frame 0, person 0: `keypoints` holds 50 numbers, expected x, y and score of each point"),
-        ("nameless.json", "image_id \"first.jpg\" holds no digits: which frame is it?"),
+        ("uneven.json", "frame 0, person 0: `keypoints` has 50 numbers, expected x, y and score for each point"),
+        ("nameless.json", "image_id \"first.jpg\" has no digits: expected the frame number in it"),
         ("half.json", "person 1 of the list: the key image_id is missing"),
-        ("twice.json", "two frames have the frame_id 3; expected the frames of one video"),
-        ("three.json", "frame 0, person 0: `keypoints` holds 51 numbers for 17 scores, expected x and y for each (2D)"),
-        ("picture.json", "annotation 0: the key image_id is missing"),
-        ("unknown.json", "annotation 0: `images` has no picture 2"),
+        ("twice.json", "duplicate frame_id 3: expected the frames of one video"),
         (
-            "sparse.json",
-            "2 frames with numbers from 900 to 397133; expected the frames of one video, one after the other",
+            "three.json",
+            "frame 0, person 0: `keypoints` has 51 numbers for 17 scores, expected x and y for each score (2D)",
         ),
-        ("crowd.json", "frame 0 holds 1001 people, expected 1000 at most"),
-        ("nobody", "nobody: nobody is seen in any frame"),
+        ("picture.json", "annotation 0: the key image_id is missing"),
+        ("unknown.json", "annotation 0: `images` has no image 2"),
+        ("sparse.json", "2 frames numbered from 900 to 397133: expected consecutive frames of one video"),
+        ("crowd.json", "frame 0 has 1001 persons, expected at most 1000"),
+        ("nobody", "nobody: no person is visible in any frame"),
         (
             "mixed",
-            "mixed/a_0_keypoints.json and mixed/b_0_keypoints.json are both frame 0; each video needs a folder of its own",
+            "mixed/a_0_keypoints.json and mixed/b_0_keypoints.json are both frame 0; use a separate folder for each \
+             video",
         ),
-        ("many", "many/talk1.json holds 2 frames, expected one a file in a folder; name the file itself"),
-        ("unnumbered", "unnumbered/first.json: no digits in its name say which frame it is"),
-        ("hands", "hands: frame 0, person 0: `hand_left_keypoints_2d` holds 1 points, expected 21 of a hand"),
-        ("void", "void holds no .json file of a frame"),
-        ("absent.json", "cannot read absent.json: No such file"),
-        ("set.h5", "set.h5 is HDF5, which is not read; save its arrays with numpy.savez, for PATS `pose/data`"),
-        ("list.npy", "list.npy is no .npy file of numbers"),
-        ("shape.npy", "shape.npy has no array `body` [T, 17, 3], nor MediaPipe's landmarks"),
-        ("shape.npy", "it has: [4, 49, 3]"),
-        ("missing.npy", "missing.npy: nobody is seen in any frame"),
         (
-            "signed.npy",
-            "signed.npy: its coordinates lie between -1 and 1; write them in pixels (OpenPose: --keypoint_scale 0)",
+            "many",
+            "many/talk1.json has 2 frames: expected one frame per file in a folder; give the path of the file instead",
         ),
+        ("unnumbered", "unnumbered/first.json: expected the frame number in the file name"),
+        ("hands", "hands: frame 0, person 0: `hand_left_keypoints_2d` has 1 point, expected 21"),
+        ("void", "void contains no .json files of frames"),
+        ("absent.json", "cannot read absent.json: No such file"),
+        ("set.h5", "set.h5 is HDF5 (not supported); save its arrays with numpy.savez (PATS: `pose/data`"),
+        ("list.npy", "list.npy is not a .npy file of numbers"),
+        ("shape.npy", "shape.npy: expected an array `body` [T, 17, 3], MediaPipe landmarks"),
+        ("shape.npy", "found: [4, 49, 3]"),
+        ("missing.npy", "missing.npy: no person is visible in any frame"),
+        ("signed.npy", "signed.npy: coordinates are between -1 and 1: expected pixels (OpenPose: --keypoint_scale 0)"),
     ] {
         let said = said(dir.path(), name);
         assert!(said.contains(expected), "{name}: {said}");
@@ -141,7 +141,7 @@ fn gaps_and_numbers_that_are_none_are_points_not_seen() {
         std::fs::remove_file(folder.join(format!("gap_{t:012}_keypoints.json"))).unwrap();
     }
     let found = read(&folder).unwrap();
-    assert_eq!(found.notes, ["2 frames are missing, the first has the number 3: taken as not seen"]);
+    assert_eq!(found.notes, ["2 missing frames (the first is number 3): marked as not detected"]);
     assert_eq!((found.frames.len(), found.frames[3].len(), found.frames[5].len()), (8, 0, 1));
 
     // Python writes a number that is none as NaN.

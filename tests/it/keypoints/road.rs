@@ -69,7 +69,7 @@ fn keypoints_lead_to_nearly_the_joints_of_their_video() {
 
     // Status, report and card say what was not judged; the dataset names no model.
     let (_, status) = orator(dir.path(), &["status"]);
-    let not_judged = "cuts, still pictures and whether the person is a picture are not judged";
+    let not_judged = "cuts, static images and printed or on-screen persons are not checked";
     assert!(status.contains("OpenPose, 25 points at 15 fps") && status.contains(not_judged), "{status}");
     let dataset = dir.path().join("work/dataset/host");
     let card = std::fs::read_to_string(dataset.join("README.md")).unwrap();
@@ -114,7 +114,7 @@ fn what_the_files_do_not_say_is_asked_for_by_its_key() {
     std::fs::write(dir.path().join("other.wav"), "").unwrap();
     for (keys, expected) in [
         ("keypoints = \"kp\"", "kp/clip: keypoint files contain no audio: add `audio = [\"FOLDER\"]` beside `keypoints`"),
-        ("keypoints = \"kp\"\naudio = \"none\"", "the sound of this stage: cannot read"),
+        ("keypoints = \"kp\"\naudio = \"none\"", "cannot hash the sound: cannot read"),
         ("keypoints = [\"kp\", \"none/*.npz\"]\naudio = \"other.wav\"", "none/*.npz: no matching file"),
         (
             "keypoints = \"kp\"\naudio = \"other.wav\"",

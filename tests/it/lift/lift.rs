@@ -240,7 +240,7 @@ fn the_verb_lifts_a_bare_body_and_says_what_is_wrong() {
     fails(&[&npz, to, &dir.path().join("j.bvh")], ".npy");
     fails(&[&dir.path().join("none.npz"), to, &out], "none.npz");
     write("bodies", &k.body);
-    fails(&[&npz, to, &out], "no array `body`");
+    fails(&[&npz, to, &out], "expected an array `body`");
     write("body", &k.left_hand);
     fails(&[&npz, to, &out], "[40, 21, 3]");
     write("body", &Array3::zeros((0, 17, 3)));

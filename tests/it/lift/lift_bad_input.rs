@@ -95,7 +95,7 @@ fn what_cannot_be_lifted_says_so() {
     bench.fails(&k, &fps, &[0, 720], &["image_size", "width and height"]);
     bench.fails(&k, &fps, &[1280], &["image_size", "[2]"]);
     for fps in [&[0.0][..], &[f64::NAN], &[-15.0], &[15.0, 0.0], &[f64::INFINITY], &[15.0, 1.0, 2.0]] {
-        bench.fails(&k, fps, &size, &["no frame rate", "numerator and denominator"]);
+        bench.fails(&k, fps, &size, &["invalid frame rate", "numerator and denominator"]);
     }
 }
 

@@ -67,12 +67,15 @@ fn shares_of_the_picture_are_lifted_as_their_pixels_or_refused() {
         let apart =
             joints.iter().zip(&expected).map(|(a, b)| (a - b).abs()).filter(|d| d.is_finite()).fold(0.0, f32::max);
         assert!(apart < 1e-3, "{apart} m apart");
-        assert!(said.contains("taken as shares of the picture, 8000x3000 px"), "{said}");
+        assert!(said.contains("interpreted as fractions of the image size, 8000x3000 px"), "{said}");
     }
     for size in [None, Some([1, 1])] {
         write(&dir.join("shares.npz"), &shares, size);
         let (joints, said) = lift(dir, "shares.npz");
-        assert!(joints.is_none() && said.contains("shares.npz: its coordinates lie in 0..1"), "{said}");
+        assert!(
+            joints.is_none() && said.contains("shares.npz: coordinates are fractions of the image size (0..1)"),
+            "{said}"
+        );
         assert!(said.contains("--size 1280x720") && said.contains("image_size"), "{said}");
     }
 }
@@ -83,10 +86,10 @@ fn what_lies_in_no_picture_is_refused() {
     let dir = folder.path();
     let k = talker();
     for (name, place, says) in [
-        ("far", (|[x, y]| [x * 1e4, y * 1e4]) as fn([f32; 2]) -> [f32; 2], "which no picture has room for"),
+        ("far", (|[x, y]| [x * 1e4, y * 1e4]) as fn([f32; 2]) -> [f32; 2], "implausible coordinates (median"),
         ("left", |[x, y]| [x - 4000.0, y], "have a negative x"),
         ("up", |[x, y]| [x, -y], "have a negative y"),
-        ("centred", |[x, y]| [x / 2000.0 - 1.0, y / 1500.0 - 1.0], "lie between -1 and 1"),
+        ("centred", |[x, y]| [x / 2000.0 - 1.0, y / 1500.0 - 1.0], "are between -1 and 1"),
     ] {
         let file = format!("{name}.npz");
         write(&dir.join(&file), &placed(&k, place), Some([4000, 3000]));
@@ -98,5 +101,5 @@ fn what_lies_in_no_picture_is_refused() {
         Array3::from_shape_fn((20, 52, 2), |(t, j, k)| ((t + 3 * j + k) % 7) as f32 / 7.0 * f32::from(u8::from(j > 0)));
     write_npy(dir.join("pats.npy"), &pats).unwrap();
     let (joints, said) = lift(dir, "pats.npy --size 640x480");
-    assert!(joints.is_none() && said.contains("pats.npy") && said.contains("no pixels"), "{said}");
+    assert!(joints.is_none() && said.contains("pats.npy") && said.contains("expected pixels of the video"), "{said}");
 }

@@ -46,7 +46,7 @@ fn the_default_track_is_taken_or_the_one_asked_for() {
             let taken = if expected == 300.0 { 1 } else { 2 };
             let tracks = &report.facts["audio_tracks"];
             assert_eq!((&tracks["n_tracks"], &tracks["taken"]), (&2.into(), &taken.into()), "{tracks}");
-            let words = format!("2 sound tracks (deu, eng), number {taken} taken: extract.audio_track");
+            let words = format!("2 audio tracks (deu, eng): number {taken} is used (extract.audio_track)");
             assert!(report.line.contains(&words), "{}", report.line);
         }
         let error = format!("{:#}", run(&video, &dir.path().join("gone"), 3).unwrap_err());

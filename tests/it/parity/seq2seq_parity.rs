@@ -174,7 +174,7 @@ fn the_network_of_words_is_that_of_pytorch() -> anyhow::Result<()> {
     let run =
         |net: &WordsSeq2Seq, dtype, mode: &mut Mode| net.forward(&inputs(Some(words_of_segments()?), dtype)?, mode);
     compare("words", |params| WordsSeq2Seq::new(params, &small()), run)?;
-    let config = Config { hears_context: true, ..small() };
+    let config = Config { audio_context: true, ..small() };
     compare("words_context", |params| WordsSeq2Seq::new(params, &config), run)
 }
 

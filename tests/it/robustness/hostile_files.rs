@@ -57,7 +57,7 @@ fn names_in_a_dataset_lead_out_of_no_folder() {
         change(&data.join(file), old, &new);
         let before = files_under(dir.path());
         let (code, errors) = run(dir.path(), &["animate", "in/data", "--format", "npy", "--out", "in/deep/out"]);
-        assert!(code == 1 && errors.contains(file) && errors.contains("is no name of a file"), "{new}: {errors}");
+        assert!(code == 1 && errors.contains(file) && errors.contains("invalid file name"), "{new}: {errors}");
         assert!(errors.contains("line 1") || file != "index.jsonl", "{errors}");
         assert_eq!(files_under(dir.path()), before, "{new}");
         fs::remove_dir_all(&data).unwrap();
@@ -67,7 +67,7 @@ fn names_in_a_dataset_lead_out_of_no_folder() {
 #[test]
 fn shards_of_other_names_are_not_taken_over() {
     // A hard link to the file that describes the dataset would be written through.
-    for (other, words) in [("../train-one-0000.tar", "is no name of a file"), ("info.json", "belongs to another video")]
+    for (other, words) in [("../train-one-0000.tar", "invalid file name"), ("info.json", "belongs to another video")]
     {
         shard_is_not_taken_over(other, words);
     }

@@ -53,11 +53,11 @@ fn fresh_units_are_skipped_and_every_change_has_a_name() {
     let stage = Shout { version: 1, mark: "!" };
     let go = |stage: &Shout, force| run(stage, &units, &work, &hashes, (2, force), &Silent);
     let why = |stage: &Shout| match state(stage, &units[0], &work, &hashes) {
-        State::Fresh(record) => format!("fresh: {}", record.line),
+        State::UpToDate(record) => format!("fresh: {}", record.line),
         State::Stale(reason) => reason.to_string(),
         State::Failed(error) => error,
     };
-    assert_eq!(why(&stage), "never done");
+    assert_eq!(why(&stage), "not run yet");
     assert!(go(&stage, false).iter().all(|ended| matches!(ended, StageOutcome::Done(_))));
     assert_eq!(why(&stage), "fresh: 3 letters");
     assert!(go(&stage, false).iter().all(|ended| matches!(ended, StageOutcome::Skipped(_))));
@@ -68,7 +68,7 @@ fn fresh_units_are_skipped_and_every_change_has_a_name() {
     assert_eq!(why(&stage), "the text changed");
     assert!(matches!(go(&stage, false)[..], [StageOutcome::Done(_), StageOutcome::Skipped(_)]));
     std::fs::remove_file(work.join("shout/host/a/loud.txt")).unwrap();
-    assert_eq!(why(&stage), "its file loud.txt is missing");
+    assert_eq!(why(&stage), "output loud.txt is missing");
 }
 
 #[test]

@@ -62,7 +62,7 @@ fn a_video_is_not_forgotten_while_it_is_trained_on() {
     }
     let (code, said) = ended(&mut orator(dir, FORGET));
     assert_eq!(code, 1, "{said}");
-    let who = format!("`orator train gan` (process {}) is at work", training.id());
+    let who = format!("is in use by `orator train gan` (process {})", training.id());
     assert!(said.contains("nothing was removed") && said.contains(&who), "{said}");
     assert!(bytes_under(&dir.join("work/dataset/host")) == before);
     // Others may listen to what is learnt so far.
@@ -86,7 +86,7 @@ fn readers_keep_writers_away_and_are_named() {
     let open = Dataset::open(&dataset).unwrap();
     for verb in [FORGET, "--json import work/dataset/host --speaker host --out work/dataset/host --force"] {
         let (code, said) = ended(&mut orator(dir, verb));
-        let who = format!("(process {}) is at work", std::process::id());
+        let who = format!("(process {}); wait", std::process::id());
         assert!(code == 1 && said.contains(&who), "{verb}: {said}");
     }
     let (code, said) = ended(&mut orator(dir, "dataset verify work/dataset/host"));

@@ -63,7 +63,7 @@ fn spoil(keypoints: &mut Keypoints, joints: &[usize], frames: std::ops::Range<us
 fn a_good_video_is_kept_whole_with_its_windows_counted() {
     assert!(kept_whole(&good(200)));
     let (intervals, ledger) = judged(&good(200));
-    assert_eq!((intervals.windows_64.stride_5, intervals.windows_64.apart), (28, 3));
+    assert_eq!((intervals.windows_64.stride_5, intervals.windows_64.disjoint), (28, 3));
     assert_eq!(ledger.kept_secs(), 200.0 / 15.0);
     let (read, path) = (measures(&good(200)), tempfile::tempdir().unwrap().keep().join("measures.npz"));
     read.write(&path).unwrap();

@@ -181,7 +181,7 @@ fn what_is_wrong_with_captures_names_the_file() {
     let text = says("joint", &[], &other);
     assert!(text.contains("a.bvh") && text.contains("no joint LeftHand") && text.contains("LeftPaw"), "{text}");
     let text = says("transcript", &[], &|dir| std::fs::write(dir.join("b.json"), "{").unwrap());
-    assert!(text.contains("b.json is no transcript"), "{text}");
+    assert!(text.contains("b.json is not a valid transcript"), "{text}");
     let text = says("short", &[], &|dir| ["a", "b"].iter().for_each(|name| write_capture(dir, name, 1.0, 0.0, false)));
     assert!(text.contains("no training motion is as long as a segment (30 frames)"), "{text}");
     let text = says("unknown", &["z"], &|_| ());

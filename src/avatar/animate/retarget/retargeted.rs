@@ -37,7 +37,7 @@ impl RetargetRig {
             "bvh" => RigFile::Bvh(BvhRig::new(&Bvh::read(path)?).with_context(invalid_rig)?),
             "glb" => {
                 let bytes =
-                    input::read(path, input::MOST_DATA).with_context(|| format!("cannot read {}", path.display()))?;
+                    input::read(path, input::MAX_DATA).with_context(|| format!("cannot read {}", path.display()))?;
                 RigFile::Glb(GlbRig::new(&bytes).with_context(invalid_rig)?)
             }
             _ => bail!("{}: unsupported skeleton format: expected .bvh or .glb", path.display()),

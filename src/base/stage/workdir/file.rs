@@ -91,7 +91,7 @@ pub fn write_file(path: &Path, bytes: &[u8]) -> Result<()> {
 /// Those of `write`; a file operation fails (`NoSpace` if the disk is full). The file at `path` is then unchanged.
 pub fn replace(path: &Path, write: impl FnOnce(&Path) -> Result<()>) -> Result<()> {
     let folder = parent(path);
-    fs::create_dir_all(&folder).with_context(|| format!("cannot make the folder {}", folder.display()))?;
+    fs::create_dir_all(&folder).with_context(|| format!("cannot create the folder {}", folder.display()))?;
     let replaced = || -> Result<()> {
         let attempt = attempt::begin(path, |attempt| File::create_new(attempt).map(drop))?;
         let written = write(&attempt).and_then(|()| flush(&attempt)).and_then(|()| Ok(fs::rename(&attempt, path)?));

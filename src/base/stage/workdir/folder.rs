@@ -22,7 +22,7 @@ pub fn replace_folder(attempt: &Path, target: &Path) -> Result<()> {
         flush_tree(attempt)?;
         put(attempt, target, &exchange, &mut || Ok(()))
     };
-    moved().map_err(full_disk).with_context(|| format!("cannot put {} in its place", target.display()))
+    moved().map_err(full_disk).with_context(|| format!("cannot replace {}", target.display()))
 }
 
 /// Calls `write` with an empty folder to fill, which then replaces `target`.
@@ -57,7 +57,7 @@ pub fn attempt_folder(target: &Path) -> Result<PathBuf> {
     };
     create()
         .map_err(|error| full_disk(error.into()))
-        .with_context(|| format!("cannot write {}: no folder can be made beside it", target.display()))
+        .with_context(|| format!("cannot write {}: no folder can be created beside it", target.display()))
 }
 
 /// Recovers from programs that were killed while replacing `target`: moves the folder back to its path and removes
@@ -73,7 +73,8 @@ pub fn recover_folder(target: &Path) -> Result<()> {
         }
         attempt::sweep(target)
     };
-    remove().with_context(|| format!("cannot remove what a killed program left beside {}", target.display()))
+    remove()
+        .with_context(|| format!("cannot remove the temporary files of a killed program beside {}", target.display()))
 }
 
 /// Moves the folder back that `replace_folder` had renamed when it was killed between its two renames.
@@ -88,7 +89,7 @@ pub fn restore_folder(target: &Path) -> Result<()> {
     match fs::rename(&old, target) {
         // Another reader has restored it first.
         Err(_) if target.symlink_metadata().is_ok() => Ok(()),
-        renamed => renamed.with_context(|| format!("cannot put {} back", target.display())),
+        renamed => renamed.with_context(|| format!("cannot restore {}", target.display())),
     }
 }
 

@@ -17,7 +17,7 @@ use std::sync::OnceLock;
 
 /// Error: another program is working in the folder.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("{by} is at work in {}; wait for it to end", folder.display())]
+#[error("{} is in use by {by}; wait for it to end", folder.display())]
 pub struct BusyFolder {
     /// The locked folder.
     pub folder: PathBuf,
@@ -48,8 +48,8 @@ pub fn announce(program: String) {
 /// `BusyFolder`; the folder is not writable.
 pub fn lock(folder: &Path) -> Result<FolderLock> {
     let path = folder.join(".lock");
-    fs::create_dir_all(folder).with_context(|| format!("cannot write in {}", folder.display()))?;
-    let file = take(folder, &path, true)?.with_context(|| format!("cannot write in {}", folder.display()))?;
+    fs::create_dir_all(folder).with_context(|| format!("cannot write to {}", folder.display()))?;
+    let file = take(folder, &path, true)?.with_context(|| format!("cannot write to {}", folder.display()))?;
     Ok(FolderLock { file: Some(file), path: None })
 }
 
@@ -59,7 +59,7 @@ pub fn lock(folder: &Path) -> Result<FolderLock> {
 /// `BusyFolder`; the folder cannot be created.
 pub fn lock_shared(folder: &Path) -> Result<FolderLock> {
     let path = folder.join(".lock");
-    fs::create_dir_all(folder).with_context(|| format!("cannot write in {}", folder.display()))?;
+    fs::create_dir_all(folder).with_context(|| format!("cannot write to {}", folder.display()))?;
     Ok(FolderLock { file: take(folder, &path, false)?, path: None })
 }
 
@@ -123,7 +123,7 @@ pub fn locks_work(folder: &Path) -> Result<bool> {
         let (first, second) = (open(&probe)?, open(&probe)?);
         Ok(first.try_lock().is_ok() && second.try_lock().is_err())
     };
-    let tried = tried().with_context(|| format!("cannot write in {}", folder.display()));
+    let tried = tried().with_context(|| format!("cannot write to {}", folder.display()));
     let _ = fs::remove_file(&probe);
     tried
 }
@@ -215,7 +215,7 @@ mod tests {
         let folder = dir.path().join("host");
         let (first, second) = (FolderLock::shared(&folder).unwrap(), FolderLock::shared(&folder).unwrap());
         let error = FolderLock::exclusive(&folder).unwrap_err();
-        let expected = format!("(process {}) is at work in {}", std::process::id(), folder.display());
+        let expected = format!("(process {}); wait", std::process::id());
         assert!(error.is::<BusyFolder>() && error.to_string().contains(&expected), "{error}");
         drop(first);
         assert!(FolderLock::exclusive(&folder).is_err());

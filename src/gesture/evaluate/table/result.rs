@@ -114,7 +114,7 @@ impl StoredResult {
     /// A missing file, other JSON, another version, or a hash that does not match its definition.
     pub fn read(path: &Path) -> Result<Self> {
         let text =
-            input::read_text(path, input::MOST_TEXT).with_context(|| format!("cannot read {}", path.display()))?;
+            input::read_text(path, input::MAX_TEXT).with_context(|| format!("cannot read {}", path.display()))?;
         let stored: Self = serde_json::from_str(&text).with_context(|| {
             format!(
                 "{} is not an evaluation result: create one with `orator evaluate --json ... > FILE`",

@@ -74,7 +74,7 @@ impl SequenceMetadata {
         ensure!(self.vocabulary.is_sorted(), "the vocabulary is not sorted");
         let (pose, words) = (self.poses.n_features(), self.vocabulary.n_indices());
         let sizes = network_config(fps, pose, words, [network.hidden, network.word]);
-        let expected = Config { hears_context: network.hears_context, ..sizes };
+        let expected = Config { audio_context: network.audio_context, ..sizes };
         ensure!(*network == expected, "unsupported network sizes: {network:?}");
         Ok(())
     }

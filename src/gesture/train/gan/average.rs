@@ -2,7 +2,7 @@
 //! It fluctuates less than the weights of the last step, and is used for validation and generation.
 
 use candle_core::{CpuStorage, InplaceOp2, Layout, Result};
-use orator_nn::cpu::thread_team::parallel_for;
+use orator_nn::cpu::spin_pool::parallel_for;
 use orator_nn::params::Params;
 use std::sync::Mutex;
 

@@ -24,7 +24,7 @@ use orator_base::text::counted;
 use orator_dataset::config::{ComputeDevice, GanConfig, GanSettings};
 use orator_dataset::{Dataset, Split};
 use orator_formats::checkpoint;
-use orator_nn::cpu::thread_team::with_spinning_workers;
+use orator_nn::cpu::spin_pool::with_spinning_workers;
 use orator_nn::gan::generator::FRAMES_MULTIPLE;
 use orator_nn::params::open_device;
 use orator_nn::weights::Contents;

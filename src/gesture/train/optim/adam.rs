@@ -7,7 +7,7 @@ use anyhow::{Context, ensure};
 use candle_core::backprop::GradStore;
 use candle_core::{CpuStorage, Device, InplaceOp2, Layout, Result, Tensor, Var};
 use candle_nn::Optimizer;
-use orator_nn::cpu::thread_team::{parallel_for, parallel_map};
+use orator_nn::cpu::spin_pool::{parallel_for, parallel_map};
 use orator_nn::params::Params;
 use std::cell::RefCell;
 use std::collections::BTreeMap;

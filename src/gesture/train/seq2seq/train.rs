@@ -25,7 +25,7 @@ use orator_dataset::Split;
 use orator_dataset::config::Seq2seqConfig;
 use orator_formats::checkpoint;
 use orator_formats::word_vectors::WordVectors;
-use orator_nn::cpu::thread_team::with_spinning_workers;
+use orator_nn::cpu::spin_pool::with_spinning_workers;
 use orator_nn::seq2seq::config::Config;
 use orator_nn::seq2seq::encoders::set_word_vectors;
 use orator_nn::weights::Contents;
@@ -142,7 +142,7 @@ fn initialise(
     let (fps, poses) = (source.fps(), source.pose_format()?);
     let word = vectors.map_or(WORD_DIM, WordVectors::dim);
     let sizes = |n_words| Config {
-        hears_context: settings.audio_context,
+        audio_context: settings.audio_context,
         ..network_config(fps, poses.n_features(), n_words, [settings.hidden, word])
     };
     let splits = source.sequences(&poses, sizes(0).context)?;

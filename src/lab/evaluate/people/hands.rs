@@ -5,7 +5,7 @@ use super::clips::{HandArrays, RenderedClip};
 use super::points::share;
 use crate::rendered_truth::Visibility;
 use orator_base::math::order::Ordered;
-use orator_base::types::pose2d::{HAND_SEEN_SCORE, N_HAND};
+use orator_base::types::pose2d::{HAND_VISIBLE_SCORE, N_HAND};
 use orator_base::types::skeleton::{L_HAND, R_HAND};
 use serde::Serialize;
 
@@ -72,7 +72,7 @@ fn of_frame(clip: &RenderedClip, t: usize) -> [HandOutcome; 2] {
 
 /// Whether any point of the hand is detected in a frame.
 pub fn is_found(hand: HandArrays, t: usize) -> bool {
-    (0..N_HAND).any(|point| hand.found[[t, point, 2]] >= HAND_SEEN_SCORE)
+    (0..N_HAND).any(|point| hand.found[[t, point, 2]] >= HAND_VISIBLE_SCORE)
 }
 
 /// Share of the points that are visible, 0..1.

@@ -7,7 +7,7 @@ use anyhow::{Result, ensure};
 use ndarray::ArrayView3;
 use orator_base::math::order::{Ordered, median};
 use orator_base::stage::artifacts::Artifact;
-use orator_base::types::pose2d::{HAND_SEEN_SCORE, Keypoints, SEEN_SCORE, coco};
+use orator_base::types::pose2d::{HAND_VISIBLE_SCORE, Keypoints, SEEN_SCORE, coco};
 use orator_dataset::config;
 use orator_formats::keypoints_npz;
 use serde::Serialize;
@@ -78,7 +78,7 @@ fn measure(name: &str, clips: &[Keypoints]) -> KeypointStatistics {
         for (hand, wrist) in [(&clip.left_hand, coco::L_WRIST), (&clip.right_hand, coco::R_WRIST)] {
             n_frames += clip.n_frames();
             for t in 0..clip.n_frames() {
-                if hand[[t, 0, 2]] < HAND_SEEN_SCORE {
+                if hand[[t, 0, 2]] < HAND_VISIBLE_SCORE {
                     continue;
                 }
                 n_hands += 1;
@@ -88,7 +88,7 @@ fn measure(name: &str, clips: &[Keypoints]) -> KeypointStatistics {
                 }
             }
             for point in 1..hand.shape()[1] {
-                let differences = second_differences(hand.view(), point, Some(0), HAND_SEEN_SCORE);
+                let differences = second_differences(hand.view(), point, Some(0), HAND_VISIBLE_SCORE);
                 hand_jitter.extend(differences.map(|d| d / shoulders));
             }
         }

@@ -9,14 +9,14 @@ use candle_core::Result;
 use std::any::Any;
 use std::sync::OnceLock;
 
-/// Maximum number of rows of a piece of a batch.
-const PIECE: usize = 64;
-/// Batches with fewer rows are one piece.
+/// Maximum number of rows of a chunk of a batch.
+const CHUNK: usize = 64;
+/// Batches with fewer rows are one chunk.
 const MIN_DIVIDED: usize = 8;
 
-/// Number of rows per piece of a batch, independent of the number of threads; the last piece may have fewer.
-pub fn piece_rows(batch: usize) -> usize {
-    if batch < MIN_DIVIDED { batch.max(1) } else { batch.div_ceil(batch.div_ceil(PIECE).next_multiple_of(2)) }
+/// Number of rows per chunk of a batch, independent of the number of threads; the last chunk may have fewer.
+pub fn chunk_rows(batch: usize) -> usize {
+    if batch < MIN_DIVIDED { batch.max(1) } else { batch.div_ceil(batch.div_ceil(CHUNK).next_multiple_of(2)) }
 }
 
 /// Sizes of the input and of the state.
@@ -147,7 +147,7 @@ impl<T: Scalar> BackwardCell<T> {
         self.to_input.multiply_add(to.len() / input_width, of_gates, 4 * width, to, input_width);
     }
 
-    /// Adds the gradients of the weights to `to`, in their order, from all rows of a piece: gradients of the gates,
+    /// Adds the gradients of the weights to `to`, in their order, from all rows of a chunk: gradients of the gates,
     /// inputs (rows of `input` values) and previous states.
     pub fn add_weight_gradients(&self, of_gates: &[T], inputs: &[T], previous: &[T], to: &mut [T]) {
         let (s, width) = (self.sizes, self.sizes.width());
@@ -175,11 +175,11 @@ impl<T: Scalar> BackwardCell<T> {
     }
 }
 
-/// Sums the weight gradients of the pieces of a batch, in order.
-pub fn sum_pieces<T: Scalar>(pieces: &[Vec<T>]) -> Vec<T> {
-    let mut sum = pieces.first().cloned().unwrap_or_default();
-    for piece in pieces.iter().skip(1) {
-        sum.iter_mut().zip(piece).for_each(|(sum, value)| *sum += *value);
+/// Sums the weight gradients of the chunks of a batch, in order.
+pub fn sum_chunks<T: Scalar>(chunks: &[Vec<T>]) -> Vec<T> {
+    let mut sum = chunks.first().cloned().unwrap_or_default();
+    for chunk in chunks.iter().skip(1) {
+        sum.iter_mut().zip(chunk).for_each(|(sum, value)| *sum += *value);
     }
     sum
 }
@@ -191,13 +191,13 @@ pub fn widen<T: Scalar>(rows: &[T], hidden: usize, to: &mut [T], width: usize) {
     }
 }
 
-/// Values that the forward pass of an operator saves for its backward pass, per piece of the batch; written once.
+/// Values that the forward pass of an operator saves for its backward pass, per chunk of the batch; written once.
 #[derive(Default)]
-pub struct SavedPieces(OnceLock<Box<dyn Any + Send + Sync>>);
+pub struct SavedChunks(OnceLock<Box<dyn Any + Send + Sync>>);
 
-impl SavedPieces {
-    pub fn put<T: Send + Sync + 'static>(&self, pieces: Vec<Vec<T>>) {
-        let _ = self.0.set(Box::new(pieces));
+impl SavedChunks {
+    pub fn put<T: Send + Sync + 'static>(&self, chunks: Vec<Vec<T>>) {
+        let _ = self.0.set(Box::new(chunks));
     }
 
     /// Returns the saved values.
@@ -205,8 +205,8 @@ impl SavedPieces {
     /// # Errors
     /// No forward pass has saved values.
     pub fn get<T: 'static>(&self) -> Result<&[Vec<T>]> {
-        match self.0.get().and_then(|pieces| pieces.downcast_ref::<Vec<Vec<T>>>()) {
-            Some(pieces) => Ok(pieces),
+        match self.0.get().and_then(|chunks| chunks.downcast_ref::<Vec<Vec<T>>>()) {
+            Some(chunks) => Ok(chunks),
             None => candle_core::bail!("backward was called without a forward pass"),
         }
     }

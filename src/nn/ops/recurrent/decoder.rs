@@ -3,10 +3,10 @@
 //! loop, with backpropagation through time, is one operator, because twenty steps of small products would otherwise be
 //! several hundred operators in each direction.
 
-use super::cell::{GruSizes, SavedPieces, piece_rows, sum_pieces};
+use super::cell::{GruSizes, SavedChunks, chunk_rows, sum_chunks};
 use super::decoder_pass::{BackwardDecoder, DecoderSizes, ForwardDecoder};
+use crate::cpu::spin_pool::parallel_each;
 use crate::cpu::tensor::Scalar;
-use crate::cpu::thread_team::parallel_each;
 use crate::cpu::vectorised::DropMask;
 use crate::ops::operator::{CpuOperator, CustomOperator, Gradients, Operand};
 use candle_core::{Result, Shape, Tensor};
@@ -46,23 +46,23 @@ pub fn decode(
     let all = Tensor::cat(&[weights.gru, &weights.weight.flatten_all()?, weights.bias], 0)?;
     let n_keys = inputs.keys.iter().map(|keys| keys.dim(1)).collect::<Result<Vec<_>>>()?;
     let cell = GruSizes { input: pose, hidden: inputs.state.dim(1)? };
-    let sizes = DecoderSizes { batch, n_previous, n_steps, cell, n_keys, piece: piece_rows(batch) };
+    let sizes = DecoderSizes { batch, n_previous, n_steps, cell, n_keys, chunk: chunk_rows(batch) };
     if weights.weight.dims() != [pose, sizes.n_read() * cell.hidden] {
         candle_core::bail!(
-            "decoder: output weights {:?} for poses {:?}",
+            "decoder: output weights {:?} do not fit poses {:?}",
             weights.weight.dims(),
             inputs.previous.dims()
         );
     }
     let saves = start.track_op() || keys.track_op() || all.track_op();
-    start.apply_op3(&keys, &all, CustomOperator(DecoderOp { sizes, mask, saves, saved: SavedPieces::default() }))
+    start.apply_op3(&keys, &all, CustomOperator(DecoderOp { sizes, mask, saves, saved: SavedChunks::default() }))
 }
 
 struct DecoderOp {
     sizes: DecoderSizes,
     mask: Option<DropMask>,
     saves: bool,
-    saved: SavedPieces,
+    saved: SavedChunks,
 }
 
 impl CpuOperator for DecoderOp {
@@ -74,9 +74,9 @@ impl CpuOperator for DecoderOp {
         let (row, keys_row) = (s.n_steps * s.cell.input, s.all_keys() * s.cell.hidden);
         let decoder = ForwardDecoder::new(s, self.mask, weights.values);
         let mut y = vec![T::zero(); s.batch * row];
-        let pieces = start.values.chunks(s.piece * s.start_len()).zip(keys.values.chunks(s.piece * keys_row));
-        let saved = parallel_each(y.chunks_mut(s.piece * row).zip(pieces), |piece, (y, (start, keys))| {
-            let saved = decoder.run(piece * s.piece, start, keys, y);
+        let chunks = start.values.chunks(s.chunk * s.start_len()).zip(keys.values.chunks(s.chunk * keys_row));
+        let saved = parallel_each(y.chunks_mut(s.chunk * row).zip(chunks), |chunk, (y, (start, keys))| {
+            let saved = decoder.run(chunk * s.chunk, start, keys, y);
             if self.saves { saved } else { Vec::new() }
         });
         if self.saves {
@@ -92,18 +92,18 @@ impl CpuOperator for DecoderOp {
         let decoder = BackwardDecoder::new(s, self.mask, weights.values);
         let mut of_start = vec![T::zero(); start.values.len()];
         let mut of_keys = vec![T::zero(); keys.values.len()];
-        let inputs = start.values.chunks(s.piece * s.start_len()).zip(keys.values.chunks(s.piece * keys_row));
-        let outputs = y.chunks(s.piece * row).zip(grad.chunks(s.piece * row));
+        let inputs = start.values.chunks(s.chunk * s.start_len()).zip(keys.values.chunks(s.chunk * keys_row));
+        let outputs = y.chunks(s.chunk * row).zip(grad.chunks(s.chunk * row));
         let results =
-            of_start.chunks_mut(s.piece * s.start_len()).zip(of_keys.chunks_mut(s.piece * keys_row)).zip(saved);
-        let of_weights = parallel_each(results.zip(inputs.zip(outputs)), |piece, (results, (inputs, outputs))| {
+            of_start.chunks_mut(s.chunk * s.start_len()).zip(of_keys.chunks_mut(s.chunk * keys_row)).zip(saved);
+        let of_weights = parallel_each(results.zip(inputs.zip(outputs)), |chunk, (results, (inputs, outputs))| {
             let ((of_start, of_keys), saved) = results;
-            decoder.run(piece * s.piece, inputs, outputs, saved, of_start, of_keys)
+            decoder.run(chunk * s.chunk, inputs, outputs, saved, of_start, of_keys)
         });
         Ok([
             start.tracked.then_some(of_start),
             keys.tracked.then_some(of_keys),
-            weights.tracked.then(|| sum_pieces(&of_weights)),
+            weights.tracked.then(|| sum_chunks(&of_weights)),
         ])
     }
 }

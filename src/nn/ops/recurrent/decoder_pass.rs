@@ -1,4 +1,4 @@
-//! The decoder's loop over one piece of a batch, forward and backward.
+//! The decoder's loop over one chunk of a batch, forward and backward.
 
 use super::cell::{BackwardCell, ForwardCell, GruSizes, widen};
 use crate::cpu::packed_matrix::PackedMatrix;
@@ -15,8 +15,8 @@ pub struct DecoderSizes {
     pub cell: GruSizes,
     /// Number of keys of each sequence.
     pub n_keys: Vec<usize>,
-    /// Number of rows per piece.
-    pub piece: usize,
+    /// Number of rows per chunk.
+    pub chunk: usize,
 }
 
 impl DecoderSizes {
@@ -50,13 +50,13 @@ impl DecoderSizes {
             && !self.n_keys.contains(&0)
             && self.batch * self.n_previous * self.n_steps * self.cell.input * self.cell.hidden > 0;
         if !fits {
-            candle_core::bail!("decoder: starts {start:?} and keys {keys:?} do not fit {n_weights} weights");
+            candle_core::bail!("decoder: start {start:?} and keys {keys:?} do not fit {n_weights} weights");
         }
         Ok(())
     }
 }
 
-/// Lengths of the values that the forward pass of a piece of `n` rows saves, in order: gates of every step; states of
+/// Lengths of the values that the forward pass of a chunk of `n` rows saves, in order: gates of every step; states of
 /// every step and the initial one; attention weights, and inputs of the output layer, of every step with an output.
 fn saved_len(s: &DecoderSizes, n: usize) -> [usize; 4] {
     let (width, steps) = (s.cell.width(), s.n_previous + s.n_steps);
@@ -64,13 +64,13 @@ fn saved_len(s: &DecoderSizes, n: usize) -> [usize; 4] {
 }
 
 /// Column of the output weights for a position in the padded input of the output layer; `None` in the padding.
-fn output_column(s: &DecoderSizes, place: usize) -> Option<usize> {
-    let (part, i) = (place / s.cell.width(), place % s.cell.width());
+fn output_column(s: &DecoderSizes, position: usize) -> Option<usize> {
+    let (part, i) = (position / s.cell.width(), position % s.cell.width());
     (i < s.cell.hidden).then_some(part * s.cell.hidden + i)
 }
 
 /// Position in the dropout mask of the first input of the output layer of row `row` at step `step`.
-fn drop_place(s: &DecoderSizes, row: usize, step: usize) -> usize {
+fn mask_position(s: &DecoderSizes, row: usize, step: usize) -> usize {
     (row * s.n_steps + step) * s.n_read() * s.cell.width()
 }
 
@@ -83,7 +83,7 @@ fn sequences(s: &DecoderSizes) -> impl Iterator<Item = (usize, usize)> {
     firsts.zip(s.n_keys.iter().copied())
 }
 
-/// Keys of a piece, padded to complete vectors.
+/// Keys of a chunk, padded to complete vectors.
 fn wide_keys<T: Scalar>(s: &DecoderSizes, keys: &[T]) -> Vec<T> {
     let mut wide = vec![T::zero(); keys.len() / s.cell.hidden * s.cell.width()];
     widen(keys, s.cell.hidden, &mut wide, s.cell.width());
@@ -149,7 +149,7 @@ impl<'a, T: Scalar> ForwardDecoder<'a, T> {
                     attend(state, &keys[first * width..][..n * width], &mut weights[first..][..n], context);
                 }
                 if let Some(mask) = self.mask {
-                    drop_out(read, drop_place(s, begin + row, step), mask);
+                    drop_out(read, mask_position(s, begin + row, step), mask);
                 }
             }
             out.chunks_exact_mut(self.bias.len()).for_each(|row| row.copy_from_slice(&self.bias));
@@ -226,7 +226,7 @@ impl<'a, T: Scalar> BackwardDecoder<'a, T> {
                 for row in 0..n {
                     let of_read = &mut of_read[row * read_len..][..read_len];
                     if let Some(mask) = self.mask {
-                        drop_out(of_read, drop_place(s, begin + row, step), mask);
+                        drop_out(of_read, mask_position(s, begin + row, step), mask);
                     }
                     let (own, contexts) = of_read.split_at(width);
                     let of_state = &mut of_state[row * width..][..width];

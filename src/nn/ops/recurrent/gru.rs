@@ -1,11 +1,11 @@
 //! A GRU layer over a complete sequence, in one direction or both, with backpropagation through time, as one operator,
-//! which avoids the overhead of separate operators per step. Pieces of the batch are processed in parallel; results do
+//! which avoids the overhead of separate operators per step. Chunks of the batch are processed in parallel; results do
 //! not depend on the number of threads.
 
-use super::cell::{BackwardCell, ForwardCell, GruSizes, SavedPieces, piece_rows, sum_pieces, widen};
+use super::cell::{BackwardCell, ForwardCell, GruSizes, SavedChunks, chunk_rows, sum_chunks, widen};
 use crate::Mode;
+use crate::cpu::spin_pool::parallel_each;
 use crate::cpu::tensor::Scalar;
-use crate::cpu::thread_team::parallel_each;
 use crate::cpu::vectorised::{DropMask, drop_out};
 use crate::ops::operator::{CpuOperator, CustomOperator, Gradients, Operand};
 use crate::params::{Init, Params};
@@ -93,14 +93,14 @@ pub struct GruOptions {
 /// `weights` of the directions: [B, T, directions * H], or [B, directions * H] with `last`.
 pub fn gru(x: &Tensor, first: &Tensor, weights: &Tensor, options: GruOptions) -> Result<Tensor> {
     let saves = x.track_op() || first.track_op() || weights.track_op();
-    let op = GruOp { options, saves, saved: SavedPieces::default() };
+    let op = GruOp { options, saves, saved: SavedChunks::default() };
     x.contiguous()?.apply_op3(&first.contiguous()?, weights, CustomOperator(op))
 }
 
 struct GruOp {
     options: GruOptions,
     saves: bool,
-    saved: SavedPieces,
+    saved: SavedChunks,
 }
 
 /// Sizes of one pass.
@@ -108,8 +108,8 @@ struct PassSizes {
     batch: usize,
     n_steps: usize,
     cell: GruSizes,
-    /// Number of rows per piece.
-    piece: usize,
+    /// Number of rows per chunk.
+    chunk: usize,
     /// Number of values per row of the result.
     row: usize,
 }
@@ -122,10 +122,10 @@ impl GruOp {
             let fits = (directions, b, n_weights) == (n_directions, batch, n_directions * cell.n_weights());
             if fits && batch * n_steps * input * hidden > 0 {
                 let row = if last { 1 } else { n_steps } * directions * hidden;
-                return Ok(PassSizes { batch, n_steps, cell, piece: piece_rows(batch), row });
+                return Ok(PassSizes { batch, n_steps, cell, chunk: chunk_rows(batch), row });
             }
         }
-        candle_core::bail!("gru: input {x:?} does not fit first states {first:?} and {n_weights} weights")
+        candle_core::bail!("gru: input {x:?} does not fit initial states {first:?} and {n_weights} weights")
     }
 
     /// Number of steps of a direction.
@@ -139,14 +139,14 @@ impl GruOp {
     }
 
     /// Position of the output of step `k` in a row of the result; `None` for steps without output.
-    fn place(&self, direction: usize, k: usize, s: &PassSizes) -> Option<usize> {
+    fn position(&self, direction: usize, k: usize, s: &PassSizes) -> Option<usize> {
         let GruOptions { n_directions, last, .. } = self.options;
         let time = Self::time(direction, k, s);
         let at = |time: usize| (time * n_directions + direction) * s.cell.hidden;
         if last { (time == s.n_steps - 1).then(|| at(0)) } else { Some(at(time)) }
     }
 
-    /// Numbers of values saved for a direction of a piece of `n` rows: gates of every step; states of every step and
+    /// Numbers of values saved for a direction of a chunk of `n` rows: gates of every step; states of every step and
     /// the initial one.
     fn saved_len(&self, direction: usize, n: usize, s: &PassSizes) -> [usize; 2] {
         let (steps, width) = (self.steps(direction, s), s.cell.width());
@@ -163,8 +163,8 @@ impl CpuOperator for GruOp {
         let cells: Vec<ForwardCell<T>> =
             weights.values.chunks_exact(s.cell.n_weights()).map(|weights| ForwardCell::new(s.cell, weights)).collect();
         let mut y = vec![T::zero(); s.batch * s.row];
-        let saved = parallel_each(y.chunks_mut(s.piece * s.row), |piece, y| {
-            let (n, begin) = (y.len() / s.row, piece * s.piece);
+        let saved = parallel_each(y.chunks_mut(s.chunk * s.row), |chunk, y| {
+            let (n, begin) = (y.len() / s.row, chunk * s.chunk);
             let x = &x.values[begin * x_row..][..n * x_row];
             let mut saved = vec![T::zero(); (0..cells.len()).flat_map(|d| self.saved_len(d, n, s)).sum()];
             let mut rest = &mut saved[..];
@@ -173,15 +173,15 @@ impl CpuOperator for GruOp {
                 let (gates, after) = std::mem::take(&mut rest).split_at_mut(n_gates);
                 let (states, after) = after.split_at_mut(n_states);
                 rest = after;
-                let of_piece = &first.values[(direction * s.batch + begin) * hidden..][..n * hidden];
-                widen(of_piece, hidden, &mut states[..n * width], width);
+                let of_chunk = &first.values[(direction * s.batch + begin) * hidden..][..n * hidden];
+                widen(of_chunk, hidden, &mut states[..n * width], width);
                 for (k, gates) in gates.chunks_exact_mut(n * 4 * width).enumerate() {
                     let x = &x[Self::time(direction, k, s) * s.cell.input..];
                     let (previous, next) = states[k * n * width..][..2 * n * width].split_at_mut(n * width);
                     cell.step(x, x_row, previous, gates, next);
-                    let Some(place) = self.place(direction, k, s) else { continue };
+                    let Some(position) = self.position(direction, k, s) else { continue };
                     for (y, state) in y.chunks_exact_mut(s.row).zip(next.chunks_exact(width)) {
-                        y[place..][..hidden].copy_from_slice(&state[..hidden]);
+                        y[position..][..hidden].copy_from_slice(&state[..hidden]);
                     }
                 }
             }
@@ -207,11 +207,11 @@ impl CpuOperator for GruOp {
             weights.values.chunks_exact(s.cell.n_weights()).map(|weights| BackwardCell::new(s.cell, weights)).collect();
         let mut of_x = vec![T::zero(); if x.tracked { x.values.len() } else { 0 }];
         let mut none = saved.iter().map(|_| <&mut [T]>::default());
-        let pieces: Vec<&mut [T]> =
-            if x.tracked { of_x.chunks_mut(s.piece * x_row).collect() } else { none.by_ref().collect() };
-        let gradients = parallel_each(pieces.into_iter().zip(saved), |piece, (of_x, saved)| {
-            let begin = piece * s.piece;
-            let n = s.piece.min(s.batch - begin);
+        let chunks: Vec<&mut [T]> =
+            if x.tracked { of_x.chunks_mut(s.chunk * x_row).collect() } else { none.by_ref().collect() };
+        let gradients = parallel_each(chunks.into_iter().zip(saved), |chunk, (of_x, saved)| {
+            let begin = chunk * s.chunk;
+            let n = s.chunk.min(s.batch - begin);
             let x = &x.values[begin * x_row..][..n * x_row];
             let mut grad = grad[begin * s.row..][..n * s.row].to_vec();
             if let Some(mask) = self.options.mask {
@@ -232,9 +232,9 @@ impl CpuOperator for GruOp {
                 let steps = gates.chunks_exact(n * 4 * width).zip(of_gates.chunks_exact_mut(n * 4 * width));
                 for (k, ((gates, of_gates), inputs)) in steps.zip(inputs.chunks_exact_mut(n * input)).enumerate().rev()
                 {
-                    if let Some(place) = self.place(direction, k, s) {
+                    if let Some(position) = self.position(direction, k, s) {
                         for (to, grad) in of_state.chunks_exact_mut(width).zip(grad.chunks_exact(s.row)) {
-                            to.iter_mut().zip(&grad[place..][..hidden]).for_each(|(to, grad)| *to += *grad);
+                            to.iter_mut().zip(&grad[position..][..hidden]).for_each(|(to, grad)| *to += *grad);
                         }
                     }
                     cell.step(gates, &states[k * n * width..][..n * width], &mut of_state, of_gates);
@@ -257,16 +257,16 @@ impl CpuOperator for GruOp {
             }
             (of_weights, of_first)
         });
-        let (of_weights, of_pieces): (Vec<_>, Vec<_>) = gradients.into_iter().unzip();
+        let (of_weights, of_chunks): (Vec<_>, Vec<_>) = gradients.into_iter().unzip();
         let of_first = first.tracked.then(|| {
-            let part = |direction: usize, piece: &Vec<T>| {
-                let n = piece.len() / n_directions;
-                piece[direction * n..][..n].to_vec()
+            let part = |direction: usize, chunk: &Vec<T>| {
+                let n = chunk.len() / n_directions;
+                chunk[direction * n..][..n].to_vec()
             };
-            let parts = (0..n_directions).flat_map(|d| of_pieces.iter().map(move |piece| part(d, piece)));
+            let parts = (0..n_directions).flat_map(|d| of_chunks.iter().map(move |chunk| part(d, chunk)));
             parts.flatten().collect()
         });
-        Ok([x.tracked.then_some(of_x), of_first, weights.tracked.then(|| sum_pieces(&of_weights))])
+        Ok([x.tracked.then_some(of_x), of_first, weights.tracked.then(|| sum_chunks(&of_weights))])
     }
 }
 

@@ -1,6 +1,6 @@
 //! Parallel loops for the operators of this crate, by default on rayon's threads. A training step consists of some
 //! hundred small loops, and a thread that falls asleep between two of them wakes too late for the next, on a shared
-//! machine by a time slice. Training therefore uses a team of spinning threads, as other frameworks do. Results do not
+//! machine by a time slice. Training therefore uses a pool of spinning threads, as other frameworks do. Results do not
 //! depend on which thread runs a task.
 
 use rayon::prelude::*;
@@ -9,12 +9,12 @@ use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering::SeqCst};
 use std::sync::{Mutex, OnceLock};
 
-/// Work of the team, called with the number of a piece; valid until `ThreadTeam::run` returns.
-type TeamTask = *const (dyn Fn(usize) + Sync);
+/// Work of the pool, called with the number of a chunk; valid until `SpinPool::run` returns.
+type PoolTask = *const (dyn Fn(usize) + Sync);
 
-struct ThreadTeam {
+struct SpinPool {
     /// Written only by the leader, while `closed` is set and `active` is 0.
-    work: UnsafeCell<Option<(TeamTask, usize)>>,
+    work: UnsafeCell<Option<(PoolTask, usize)>>,
     next: AtomicUsize,
     /// Number of helpers that may be reading `work`.
     active: AtomicUsize,
@@ -24,13 +24,13 @@ struct ThreadTeam {
 }
 
 // SAFETY: access to `work` is synchronised by `closed` and `active`, as documented there.
-unsafe impl Sync for ThreadTeam {}
+unsafe impl Sync for SpinPool {}
 
-thread_local!(static TEAM: Cell<*const ThreadTeam> = const { Cell::new(std::ptr::null()) });
+thread_local!(static POOL: Cell<*const SpinPool> = const { Cell::new(std::ptr::null()) });
 
 /// Calls `f`; its parallel loops use threads that spin until it returns.
 pub fn with_spinning_workers<R>(f: impl FnOnce() -> R) -> R {
-    let team = ThreadTeam {
+    let pool = SpinPool {
         work: UnsafeCell::new(None),
         next: AtomicUsize::new(0),
         active: AtomicUsize::new(0),
@@ -39,32 +39,32 @@ pub fn with_spinning_workers<R>(f: impl FnOnce() -> R) -> R {
         ended: AtomicBool::new(false),
     };
     let n_helpers = rayon::current_num_threads().saturating_sub(1);
-    if n_helpers == 0 || !TEAM.get().is_null() {
+    if n_helpers == 0 || !POOL.get().is_null() {
         return f();
     }
     std::thread::scope(|scope| {
         (0..n_helpers).for_each(|_| {
-            scope.spawn(|| team.help());
+            scope.spawn(|| pool.help());
         });
-        TEAM.set(&raw const team);
+        POOL.set(&raw const pool);
         let result = catch_unwind(AssertUnwindSafe(f));
-        TEAM.set(std::ptr::null());
-        team.ended.store(true, SeqCst);
+        POOL.set(std::ptr::null());
+        pool.ended.store(true, SeqCst);
         result.unwrap_or_else(|panic| resume_unwind(panic))
     })
 }
 
 /// Calls `f` for 0..n in any order, on all available threads.
 pub fn parallel_for(n: usize, f: impl Fn(usize) + Sync) {
-    let team = TEAM.get();
-    if team.is_null() {
+    let pool = POOL.get();
+    if pool.is_null() {
         return (0..n).into_par_iter().for_each(&f);
     }
-    // Nested loops run on the thread of the outer piece.
-    TEAM.set(std::ptr::null());
-    // SAFETY: the team outlives the period in which its leader's thread points to it.
-    let result = catch_unwind(AssertUnwindSafe(|| unsafe { &*team }.run(n, &f)));
-    TEAM.set(team);
+    // Nested loops run on the thread of the outer chunk.
+    POOL.set(std::ptr::null());
+    // SAFETY: the pool outlives the period in which its leader's thread points to it.
+    let result = catch_unwind(AssertUnwindSafe(|| unsafe { &*pool }.run(n, &f)));
+    POOL.set(pool);
     if let Err(panic) = result {
         resume_unwind(panic);
     }
@@ -89,10 +89,10 @@ pub fn parallel_each<I: Send, R: Send + Sync>(
     parallel_map(items.len(), |i| take(i).map(|item| f(i, item))).into_iter().flatten().collect()
 }
 
-impl ThreadTeam {
+impl SpinPool {
     fn run(&self, n: usize, f: &(dyn Fn(usize) + Sync)) {
         // SAFETY: only the lifetime is erased; no helper is active when this function returns.
-        let work: TeamTask = unsafe { std::mem::transmute::<&(dyn Fn(usize) + Sync), TeamTask>(f) };
+        let work: PoolTask = unsafe { std::mem::transmute::<&(dyn Fn(usize) + Sync), PoolTask>(f) };
         // SAFETY: `closed` is set and no helper is active, since the previous run or since construction.
         unsafe { *self.work.get() = Some((work, n)) };
         self.next.store(0, SeqCst);
@@ -106,16 +106,16 @@ impl ThreadTeam {
         if let Err(panic) = own {
             resume_unwind(panic);
         }
-        assert!(!self.failed.load(SeqCst), "a piece of parallel work failed");
+        assert!(!self.failed.load(SeqCst), "a chunk of parallel work failed");
     }
 
     fn take(&self, f: &(dyn Fn(usize) + Sync), n: usize) {
         loop {
-            let piece = self.next.fetch_add(1, SeqCst);
-            if piece >= n {
+            let chunk = self.next.fetch_add(1, SeqCst);
+            if chunk >= n {
                 return;
             }
-            f(piece);
+            f(chunk);
         }
     }
 
@@ -171,7 +171,7 @@ mod tests {
     }
 
     #[test]
-    fn every_piece_runs_once() {
+    fn every_chunk_runs_once() {
         for n_threads in [1, 3] {
             with_threads(n_threads, || {
                 with_spinning_workers(|| {
@@ -188,8 +188,8 @@ mod tests {
     }
 
     #[test]
-    fn a_panicking_piece_is_reported_and_the_threads_end() {
-        let failing = || with_spinning_workers(|| parallel_for(100, |i| assert!(i != 50, "piece 50")));
+    fn a_panicking_chunk_is_reported_and_the_threads_end() {
+        let failing = || with_spinning_workers(|| parallel_for(100, |i| assert!(i != 50, "chunk 50")));
         assert!(with_threads(3, || catch_unwind(failing)).is_err());
     }
 }
