@@ -134,7 +134,7 @@ impl Decode {
                 ensure!(blur % 2 == 1 && *blur <= 31, "decode.blur must be odd and at most 31, not {blur}");
             }
             Self::Simcc { split, .. } => {
-                ensure!(split.is_finite() && *split > 0.0, "decode.split must be > 0, not {split}")
+                ensure!(split.is_finite() && *split > 0.0, "decode.split must be > 0, not {split}");
             }
             Self::YoloxGrid { strides, .. } | Self::SsdAnchors { strides, .. } => {
                 ensure!(

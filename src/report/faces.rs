@@ -8,8 +8,8 @@ use orator_dataset::config::Settings;
 use orator_dataset::config::videos::Videos;
 use orator_media::ffmpeg;
 use orator_media::opencv::png;
-use orator_pipeline::dataset::people;
-use orator_pipeline::dataset::people::VideoPerson;
+use orator_pipeline::dataset::persons;
+use orator_pipeline::dataset::persons::VideoPerson;
 use std::path::Path;
 
 /// Maximum number of faces shown per person.
@@ -23,7 +23,7 @@ pub fn section(settings: &Settings, videos: &[Videos]) -> Vec<Node> {
         .flat_map(|of| {
             let is_declared = settings.speaker.iter().any(|entry| entry.name == of.speaker && entry.same_person);
             let persons: Vec<VideoPerson> = of.units.iter().map(|unit| VideoPerson::read(work, unit)).collect();
-            let groups = if is_declared { vec![persons.iter().collect()] } else { people::groups(&persons) };
+            let groups = if is_declared { vec![persons.iter().collect()] } else { persons::groups(&persons) };
             of_speaker(work, &of.speaker, &groups, is_declared)
         })
         .collect()

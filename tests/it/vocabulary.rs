@@ -45,7 +45,8 @@ fn declared(code: &str) -> Vec<String> {
             (!scope.contains('(')).then_some(rest)
         });
         let item = public.unwrap_or(text);
-        let kinds = ["const fn", "unsafe fn", "async fn", "fn", "struct", "enum", "const", "trait", "type", "static", "mod"];
+        let kinds =
+            ["const fn", "unsafe fn", "async fn", "fn", "struct", "enum", "const", "trait", "type", "static", "mod"];
         let kind = kinds.iter().find_map(|kind| Some((*kind, item.strip_prefix(kind)?.strip_prefix(' ')?)));
         match kind {
             Some((kind, rest)) => {
@@ -90,7 +91,9 @@ fn flags() -> BTreeSet<String> {
         let output = Command::new(program).args(args).output().unwrap();
         assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
         let text = String::from_utf8(output.stdout).unwrap();
-        text.split_whitespace().filter_map(|word| word.trim_matches('"').strip_prefix("--").map(str::to_owned)).collect()
+        text.split_whitespace()
+            .filter_map(|word| word.trim_matches('"').strip_prefix("--").map(str::to_owned))
+            .collect()
     };
     of(Path::new(env!("CARGO_BIN_EXE_orator")), &["completions", "bash"])
 }
@@ -102,9 +105,10 @@ fn names() -> BTreeMap<String, String> {
         names.entry(name).or_insert_with(|| place.strip_prefix(root()).unwrap().display().to_string());
     };
     for file in rust_files(&root().join("src")) {
-        let text = without_tests(&fs::read_to_string(&file).unwrap());
-        declared(&scan(&text).0).into_iter().for_each(|name| add(name, &file));
-        keys(&text).into_iter().for_each(|name| add(name, &file));
+        let all = fs::read_to_string(&file).unwrap();
+        let text = without_tests(&all);
+        declared(&scan(text).0).into_iter().for_each(|name| add(name, &file));
+        keys(text).into_iter().for_each(|name| add(name, &file));
         add(file.file_stem().unwrap().to_str().unwrap().to_owned(), &file);
         add(file.parent().unwrap().file_name().unwrap().to_str().unwrap().to_owned(), &file);
     }

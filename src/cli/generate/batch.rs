@@ -51,5 +51,8 @@ fn text(report: &BatchReport) -> String {
     }
     let BatchReport { created, up_to_date, failed, out_folder, sounds } = report;
     let sounds = counted(sounds.len(), "audio file");
-    text + &format!("{sounds}: {created} generated, {up_to_date} up to date, {failed} failed; in {}", out_folder.display())
+    text + &format!(
+        "{sounds}: {created} generated, {up_to_date} up to date, {failed} failed; in {}",
+        out_folder.display()
+    )
 }

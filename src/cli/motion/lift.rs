@@ -14,7 +14,7 @@ use orator_dataset::config;
 use orator_formats::keypoints::{CoordinateUnit, range};
 use orator_formats::npz::Npz;
 use orator_formats::{joints_description as description, keypoints, keypoints_npz, npy};
-use orator_pipeline::keypoints::take_in;
+use orator_pipeline::keypoints::convert;
 use orator_pipeline::lift::Lifter;
 use serde_json::json;
 use std::path::{Path, PathBuf};
@@ -108,7 +108,7 @@ fn read_foreign(args: &Args) -> Result<(Keypoints, Vec<String>)> {
         }
         None => bail!("{file} does not state its image size; give it with --size, such as 1280x720"),
     };
-    let imported = take_in(found, fps, size, fps)?;
+    let imported = convert(found, fps, size, fps)?;
     notes.extend(imported.notes);
     Ok((imported.keypoints, notes))
 }

@@ -68,7 +68,7 @@ fn with_checkpoint_note(table: &Table, body: Vec<Node>) -> Vec<Node> {
 fn conclusions(table: &Table) -> Vec<Node> {
     let card = |(own, conclusion): (&PredictorRow, Conclusion)| {
         let class = format!("card conclusion {}", conclusion.word.replace(' ', "-"));
-        let votes = verdict.votes.iter().map(|vote| {
+        let votes = conclusion.votes.iter().map(|vote| {
             let (class, outcome) = match vote.answer {
                 Answer::Yes => ("better", "better than"),
                 Answer::No => ("worse", "worse than"),
@@ -78,7 +78,7 @@ fn conclusions(table: &Table) -> Vec<Node> {
             node("li").class(format!("vote {class}")).text(description)
         });
         let of = own.checkpoint.as_ref().map(|of| format!("{}: ", of.name)).unwrap_or_default();
-        let card = node("div").class(class).child(node("p").text(format!("{of}{}", verdict.sentence)));
+        let card = node("div").class(class).child(node("p").text(format!("{of}{}", conclusion.sentence)));
         card.child(node("ul").class("votes").children(votes))
     };
     let both = |own| [(own, better_than_constant_pose(table, own)), (own, depends_on_audio(table, own))];

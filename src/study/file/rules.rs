@@ -231,7 +231,7 @@ impl StudyRules<'_> {
             }
             TaskDesign::Sliders => {}
             _ if !task.scale.is_empty() => {
-                self.report(key("scale"), "only the design sliders has a scale: remove the key")
+                self.report(key("scale"), "only the design sliders has a scale: remove the key");
             }
             _ => {}
         }

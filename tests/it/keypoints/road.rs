@@ -113,7 +113,10 @@ fn what_the_files_do_not_say_is_asked_for_by_its_key() {
     foreign::openpose(&dir.path().join("kp/clip"), &foreign::sample(30, RATE), OpenPoseOrder::Body25);
     std::fs::write(dir.path().join("other.wav"), "").unwrap();
     for (keys, expected) in [
-        ("keypoints = \"kp\"", "kp/clip: keypoint files contain no audio: add `audio = [\"FOLDER\"]` beside `keypoints`"),
+        (
+            "keypoints = \"kp\"",
+            "kp/clip: keypoint files contain no audio: add `audio = [\"FOLDER\"]` beside `keypoints`",
+        ),
         ("keypoints = \"kp\"\naudio = \"none\"", "cannot hash the sound: cannot read"),
         ("keypoints = [\"kp\", \"none/*.npz\"]\naudio = \"other.wav\"", "none/*.npz: no matching file"),
         (

@@ -67,8 +67,7 @@ fn names_in_a_dataset_lead_out_of_no_folder() {
 #[test]
 fn shards_of_other_names_are_not_taken_over() {
     // A hard link to the file that describes the dataset would be written through.
-    for (other, words) in [("../train-one-0000.tar", "invalid file name"), ("info.json", "belongs to another video")]
-    {
+    for (other, words) in [("../train-one-0000.tar", "invalid file name"), ("info.json", "belongs to another video")] {
         shard_is_not_taken_over(other, words);
     }
 }

@@ -58,7 +58,7 @@ fn films_of_all_conditions_differ_in_motion_alone() {
     let file = StudyFile::read(&dir.join("study.toml")).unwrap();
     let cut = || CutSpeaker::new(&file, &file.speaker[0], 4, |name| name.len() as u64).unwrap();
     let mut host = cut();
-    assert!(host.cut.clips.len() == 4 && host.cut.refused.is_empty());
+    assert!(host.cut.clips.len() == 4 && host.cut.rejected.is_empty());
     for clip in &host.cut.clips {
         assert!(clip.cut_db < -15.0 && clip.hidden_share == 0.0 && clip.frames.len() == 30, "{clip:?}");
     }

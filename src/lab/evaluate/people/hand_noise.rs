@@ -26,7 +26,7 @@ pub fn fit(set: &str, clips: &[RenderedClip]) -> HandNoise {
     for clip in clips {
         for (t, frame) in outcomes(clip).into_iter().enumerate() {
             for (side, outcome) in frame.into_iter().enumerate() {
-                if matches!(outcome, HandOutcome::Right | HandOutcome::Unjudged) {
+                if matches!(outcome, HandOutcome::Correct | HandOutcome::Unjudged) {
                     hands.extend(HandResidual::new(clip, t, side));
                 }
             }
