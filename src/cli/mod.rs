@@ -14,6 +14,7 @@ pub mod moved;
 pub mod outputs;
 pub mod pipeline;
 pub mod program;
+mod renamed;
 pub mod sandbox;
 pub mod setup;
 pub mod signals;

@@ -9,7 +9,7 @@ use super::pipeline::{init, report, run, status};
 use super::setup::{completions, doctor, models, words};
 use super::signals;
 use super::ui::Ui;
-use super::{animate, evaluate, generate, study, train, ui, verb_groups};
+use super::{animate, evaluate, generate, renamed, study, train, ui, verb_groups};
 use anyhow::Result;
 use clap::{ArgMatches, CommandFactory, FromArgMatches, Parser, Subcommand};
 use orator_base::stage::workdir;
@@ -123,16 +123,19 @@ pub fn run_program<C: CommandFactory + FromArgMatches>(
     let name = command.get_name().to_owned();
     let parsed = command.try_get_matches().and_then(|matches| {
         workdir::announce(verb_path(&name, &matches));
-        C::from_arg_matches(&matches)
+        let verb = matches.subcommand_name().filter(|_| name == "orator").unwrap_or_default().to_owned();
+        Ok((C::from_arg_matches(&matches)?, verb))
     });
-    let cli = match parsed {
-        Ok(cli) => cli,
+    let (cli, verb) = match parsed {
+        Ok(parsed) => parsed,
         Err(error) => {
             let _ = error.print();
             return if error.use_stderr() { ExitCode::from(1) } else { ExitCode::SUCCESS };
         }
     };
-    let ui = Ui::new(json(&cli));
+    let arguments = std::env::args_os().skip(1).map(|argument| argument.to_string_lossy().into_owned());
+    renamed::flag_notes(&verb, arguments).iter().for_each(|note| ui::note(note));
+    let ui = Ui::new(json(&cli), verb);
     match run(cli, &ui) {
         Ok(_) if ui.has_output_error() => ExitCode::from(1),
         Ok(Outcome::Done) => ExitCode::SUCCESS,

@@ -112,7 +112,7 @@ fn time_excerpts(
     }
     ensure!(
         !files.is_empty(),
-        "cannot time the stages: no excerpt could be copied from any video; plan without estimates by --untimed"
+        "cannot time the stages: no excerpt could be copied from any video; plan without estimates by --no-timing"
     );
     let work = folder.join("work");
     let task = progress.begin("timing the stages", 1);

@@ -38,7 +38,7 @@ pub struct DatasetInfo {
     pub source: String,
     /// Further notes for readers, a sentence each.
     pub notes: Vec<String>,
-    /// Whether the sound was replaced by silence (`orator import --no-sound`).
+    /// Whether the sound was replaced by silence (`orator import --no-audio`).
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub no_sound: bool,
     /// How the splits were made; `None`: the dataset was written by an earlier version.

@@ -7,7 +7,7 @@ pub(super) struct FilmArgs {
     /// Removed: only its former default is accepted.
     #[arg(long = "style", hide = true, value_parser = former_style)]
     _style: Option<String>,
-    /// Camera of an .mp4 output; `source` uses the camera fitted to the video of --beside and draws the avatar over
+    /// Camera of an .mp4 output; `source` uses the camera fitted to the video of --compare and draws the avatar over
     /// its frames.
     #[arg(long, value_enum, default_value = "front")]
     camera: CameraName,

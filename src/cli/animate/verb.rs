@@ -82,20 +82,20 @@ pub struct Args {
     audio: Option<PathBuf>,
     /// Second panel of an .mp4 output: the source video, whose audio is used if there is no other, or another motion
     /// (.npy, .txt, .npz, .bvh), which is converted in the same way.
-    #[arg(long, value_name = "FILE", conflicts_with = "format")]
-    beside: Option<PathBuf>,
-    /// Time in the video of --beside at which the motion begins, seconds.
-    #[arg(long, value_name = "SECS", default_value_t = 0.0, requires = "beside")]
-    beside_from: f64,
-    /// Labels of the two motions with --beside, such as `prediction truth`; default to the file names.
-    #[arg(long, value_names = ["FIRST", "SECOND"], num_args = 2, requires = "beside")]
+    #[arg(long, alias = "beside", value_name = "FILE", conflicts_with = "format")]
+    compare: Option<PathBuf>,
+    /// Time in the video of --compare at which the motion begins, seconds.
+    #[arg(long, value_name = "SECS", default_value_t = 0.0, requires = "compare", alias = "beside-from")]
+    compare_start: f64,
+    /// Labels of the two motions with --compare, such as `prediction truth`; default to the file names.
+    #[arg(long, value_names = ["FIRST", "SECOND"], num_args = 2, requires = "compare")]
     labels: Option<Vec<String>>,
     #[command(flatten)]
     film: FilmArgs,
     /// Frame rate of a .npy or .txt input that does not state one; defaults to 15. It is an error if the file states
     /// another rate.
-    #[arg(long, value_name = "RATE")]
-    in_fps: Option<FrameRate>,
+    #[arg(long, value_name = "RATE", alias = "in-fps")]
+    input_fps: Option<FrameRate>,
     #[command(flatten)]
     body: BodyArgs,
     #[command(flatten)]
@@ -128,7 +128,7 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     };
     let is_read = |path: &Path| {
         input.is_at(path)
-            || [&args.audio, &args.beside]
+            || [&args.audio, &args.compare]
                 .into_iter()
                 .flatten()
                 .map(PathBuf::as_path)
@@ -198,8 +198,8 @@ fn animate_folder(
 /// Rejects options that have no effect on these outputs.
 fn check_effect(args: &Args, outputs: &OutputFiles) -> Result<()> {
     let is_film = outputs.iter().any(|&(_, format)| format == ExportFormat::Mp4);
-    let (beside, audio) = (args.beside.is_some(), args.audio.is_some());
-    for (option, is_given) in [("--beside", beside), ("--audio", audio), ("--camera", args.film.is_given())] {
+    let (beside, audio) = (args.compare.is_some(), args.audio.is_some());
+    for (option, is_given) in [("--compare", beside), ("--audio", audio), ("--camera", args.film.is_given())] {
         ensure!(
             is_film || !is_given,
             "{option} applies to .mp4 outputs only: add an .mp4 to --out, or remove {option}"
@@ -222,7 +222,7 @@ fn animate(
     options: &AnimationOptions,
     ui: &Ui,
 ) -> Result<AnimationSummary> {
-    let loaded = input.read(args.in_fps, args.keypoints.as_deref())?;
+    let loaded = input.read(args.input_fps, args.keypoints.as_deref())?;
     let options = &args.body.of(&loaded, options);
     let InputMotion { motion, posture, sound: own, has_rate, mut notes, .. } = loaded;
     let (sound, posture) = (sound.or(own), args.body.posture(posture));
@@ -231,12 +231,12 @@ fn animate(
     let secs = started.elapsed().as_secs_f64();
     let source = source(args, input, &motion)?;
     let film_fps = options.fps.unwrap_or_else(|| smooth_rate(motion.fps));
-    let other = match &args.beside {
+    let other = match &args.compare {
         Some(path) if motion_file::has_ending(path) => {
-            let other = motion_file::read(path, Some(args.in_fps.unwrap_or(DEFAULT_FPS)))?;
+            let other = motion_file::read(path, Some(args.input_fps.unwrap_or(DEFAULT_FPS)))?;
             units::check(&other.motion).with_context(|| path.display().to_string())?;
             notes.extend(other.notes);
-            if !other.has_rate && args.in_fps.is_none() {
+            if !other.has_rate && args.input_fps.is_none() {
                 notes.push(format!("{} does not state its frame rate: {DEFAULT_FPS} is assumed", path.display()));
             }
             Some(perform(&other.motion, None, &AnimationOptions { fps: Some(film_fps), ..*options }))
@@ -246,14 +246,14 @@ fn animate(
     let stem = |path: &Path| path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     let labels = match args.labels.as_deref() {
         Some([ours, other]) => [ours.clone(), other.clone()],
-        _ => [input.name.clone(), args.beside.as_deref().map(stem).unwrap_or_default()],
+        _ => [input.name.clone(), args.compare.as_deref().map(stem).unwrap_or_default()],
     };
-    let beside = match (&args.beside, &other) {
+    let beside = match (&args.compare, &other) {
         (None, _) => SecondPanel::Itself,
         (Some(_), Some(performance)) => {
             SecondPanel::Motion { performance, labels: labels.each_ref().map(String::as_str) }
         }
-        (Some(path), None) => SecondPanel::Video { path, from_secs: args.beside_from, camera: source.as_ref() },
+        (Some(path), None) => SecondPanel::Video { path, from_secs: args.compare_start, camera: source.as_ref() },
     };
     let is_film = outputs.iter().any(|&(_, format)| format == ExportFormat::Mp4);
     let motion_secs = motion.fps.secs(motion.n_frames());
@@ -288,7 +288,7 @@ fn animate(
         format.write(path, &performance, &sources, ui).with_context(|| format!("cannot write {}", path.display()))?;
     }
     let Performance { report, clip, .. } = &performance;
-    let assumed = if has_rate { "" } else { " (assumed: not stated in the file; set it with --in-fps)" };
+    let assumed = if has_rate { "" } else { " (assumed: not stated in the file; set it with --input-fps)" };
     let noted: String = notes.iter().map(|note| format!("note: {note}\n")).collect();
     let text = format!(
         "{} at {}{assumed}, {}; written: {} at {}\n{}{noted}{silence}",
@@ -320,8 +320,8 @@ fn source(args: &Args, input: &MotionInput, motion: &Motion) -> Result<Option<So
     if !args.film.is_over_video() {
         return Ok(None);
     }
-    let is_video = args.beside.as_ref().is_some_and(|path| !motion_file::has_ending(path));
-    ensure!(is_video, "--camera source needs the video that the motion was lifted from: give --beside VIDEO");
+    let is_video = args.compare.as_ref().is_some_and(|path| !motion_file::has_ending(path));
+    ensure!(is_video, "--camera source needs the video that the motion was lifted from: give --compare VIDEO");
     let keypoints = input.keypoints(args.keypoints.as_deref(), motion)?.with_context(|| {
         format!("{} has no keypoints, which --camera source needs: give --keypoints FILE.npz", input.name)
     })?;

@@ -30,7 +30,7 @@ pub(crate) struct Args {
     #[command(flatten)]
     config: ConfigArgs,
     /// Plan file to write; defaults to plan.json in the work folder.
-    #[arg(short, long, value_name = "FILE")]
+    #[arg(long, short_alias = 'o', value_name = "FILE")]
     out: Option<PathBuf>,
     /// Print the estimated duration with this number of workers.
     #[arg(long, value_name = "N")]
@@ -39,11 +39,11 @@ pub(crate) struct Args {
     #[arg(long, value_name = "HOURS")]
     hours: Option<f64>,
     /// Length of the parts into which a long video is split for workers, minutes.
-    #[arg(long, value_name = "MINUTES", default_value_t = PART_SECS / 60.0)]
-    piece: f64,
+    #[arg(long, alias = "piece", value_name = "MINUTES", default_value_t = PART_SECS / 60.0)]
+    max_part: f64,
     /// Do not time the stages, and print no estimates.
-    #[arg(long, conflicts_with_all = ["workers", "hours"])]
-    untimed: bool,
+    #[arg(long, alias = "untimed", conflicts_with_all = ["workers", "hours"])]
+    no_timing: bool,
 }
 
 /// Reads a plan and its pipeline, and checks that they still match.
@@ -59,8 +59,8 @@ pub(crate) fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     if args.workers == Some(0) || args.hours.is_some_and(|hours| !hours.is_finite() || hours <= 0.0) {
         bail!("--workers: expected at least 1; --hours: expected more than 0");
     }
-    if !args.piece.is_finite() || args.piece < 1.0 {
-        bail!("--piece: expected at least 1 minute");
+    if !args.max_part.is_finite() || args.max_part < 1.0 {
+        bail!("--max-part: expected at least 1 minute");
     }
     let pipeline = Pipeline::open(args.config.load()?)?.with_processes(this_program());
     let work = &pipeline.config().settings.work.dir;
@@ -71,7 +71,7 @@ pub(crate) fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     };
     // The shared lock prevents `orator forget` from running at the same time.
     let lock = FolderLock::shared(work).context("cannot write a plan now")?;
-    let plan = ClusterPlan::new(&pipeline, &args.config.set, &this_program(), &secs, 60.0 * args.piece, ui)?;
+    let plan = ClusterPlan::new(&pipeline, &args.config.set, &this_program(), &secs, 60.0 * args.max_part, ui)?;
     plan.write(&out)?;
     drop(lock);
     let videos = plan.videos();
@@ -81,7 +81,7 @@ pub(crate) fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     let mut lines = vec![format!("{n_units} of {n_videos}, {} in total", length(total_secs))];
     let next = format!("orator work --plan {}", out.display());
     let mut facts = json!({ "plan": out, "units": plan.units.len(), "hours": total_secs / 3600.0, "next": next });
-    if !args.untimed && !lengths.is_empty() {
+    if !args.no_timing && !lengths.is_empty() {
         let times = times(&pipeline, &videos, ui)?;
         lines.extend(prediction_lines(&times, &lengths));
         facts["stages"] = stages(&times, &lengths);

@@ -38,12 +38,12 @@ pub(crate) struct Args {
     #[arg(long)]
     no_wait: bool,
     /// Interval between heartbeats, seconds.
-    #[arg(long, value_name = "SECONDS", default_value_t = 15.0)]
-    beat: f64,
+    #[arg(long, alias = "beat", value_name = "SECONDS", default_value_t = 15.0)]
+    heartbeat: f64,
     /// Time without a heartbeat after which another worker counts as dead, seconds; must exceed the cache time of the
     /// network file system.
-    #[arg(long, value_name = "SECONDS", default_value_t = DEAD_AFTER.as_secs_f64())]
-    dead_after: f64,
+    #[arg(long, alias = "dead-after", value_name = "SECONDS", default_value_t = DEAD_AFTER.as_secs_f64())]
+    claim_timeout: f64,
 }
 
 fn shard(text: &str) -> Result<(usize, usize), String> {
@@ -62,8 +62,8 @@ pub(crate) fn run(args: Args, ui: &Ui) -> Result<Outcome> {
         shard: args.shard,
         retry: args.retry,
         wait: !args.no_wait,
-        beat: secs(args.beat),
-        dead_after: secs(args.dead_after),
+        beat: secs(args.heartbeat),
+        dead_after: secs(args.claim_timeout),
     };
     ui.enable_stop_requests(
         "stopping after the current unit; a second signal exits at once",

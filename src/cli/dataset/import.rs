@@ -51,12 +51,12 @@ pub struct Args {
     #[arg(long, default_value_t = 64, value_name = "N")]
     min_frames: usize,
     /// Maximum difference in duration between audio and motion, seconds.
-    #[arg(long, default_value_t = 0.5, value_name = "SECS")]
-    max_apart: f64,
+    #[arg(long, alias = "max-apart", default_value_t = 0.5, value_name = "SECS")]
+    max_length_difference: f64,
     /// Import captures without audio: audio files are ignored and silence is stored instead. Such a dataset is for
     /// lifters and evaluation.
-    #[arg(long, conflicts_with = "max_apart")]
-    no_sound: bool,
+    #[arg(long, alias = "no-sound", conflicts_with = "max_length_difference")]
+    no_audio: bool,
     /// Fraction of the takes for validation, 0 to 0.9; takes are assigned by a hash of their content.
     #[arg(long, default_value_t = 0.15, value_name = "FRACTION")]
     validation: f64,
@@ -118,7 +118,7 @@ fn plan(args: &Args) -> Result<ImportPlan> {
         share.contains(&args.validation) && share.contains(&args.test) && args.validation + args.test <= 0.95,
         "--validation and --test: expected 0 to 0.9, together at most 0.95"
     );
-    ensure!((0.0..=60.0).contains(&args.max_apart), "--max-apart: expected 0 to 60 seconds");
+    ensure!((0.0..=60.0).contains(&args.max_length_difference), "--max-length-difference: expected 0 to 60 seconds");
     let fps = args.fps.or_else(|| rate_of(&args.sources)).unwrap_or(FrameRate::new(15, 1));
     let (licence, consent, source) = (args.licence.clone(), args.consent.clone(), args.source.clone());
     Ok(ImportPlan {
@@ -134,8 +134,8 @@ fn plan(args: &Args) -> Result<ImportPlan> {
         limits: TakeLimits {
             fps,
             min_frames: args.min_frames.max(1),
-            max_difference_secs: args.max_apart,
-            no_sound: args.no_sound,
+            max_difference_secs: args.max_length_difference,
+            no_sound: args.no_audio,
         },
         dataset: config::DatasetConfig {
             validation: args.validation,

@@ -64,8 +64,8 @@ struct MotionArgs {
     #[arg(long, value_name = "PATH", requires = "truth")]
     audio: Option<PathBuf>,
     /// Frame rate of files that do not state one (.npy, .txt), such as 15 or 30000/1001; defaults to 15.
-    #[arg(long, value_name = "RATE", requires = "truth")]
-    fps: Option<FrameRate>,
+    #[arg(long, alias = "fps", value_name = "RATE", requires = "truth")]
+    input_fps: Option<FrameRate>,
     /// Dataset folder of `orator run` or `orator import`, instead of files.
     #[arg(long, value_name = "DIR", conflicts_with = "truth", requires = "checkpoint")]
     dataset: Option<PathBuf>,
@@ -173,7 +173,7 @@ fn evaluation(args: &MotionArgs, store: &MotionStore, ui: &Ui) -> Result<Evaluat
     let (Some(truth), Some(prediction)) = (&args.truth, &args.prediction) else {
         bail!("nothing to measure: give --truth and --prediction, or --dataset and --checkpoint")
     };
-    Evaluation::from_files(truth, prediction, args.audio.as_deref(), args.fps, store, ui)
+    Evaluation::from_files(truth, prediction, args.audio.as_deref(), args.input_fps, store, ui)
 }
 
 /// Compare two results, and reject values that are not comparable.

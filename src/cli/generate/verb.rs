@@ -75,8 +75,8 @@ pub struct Args {
     #[arg(long, value_name = "EXTENSION", value_delimiter = ',', default_value = "bvh", conflicts_with = "audio")]
     format: Vec<String>,
     /// Regenerate outputs of --audio-folder and --batch that are up to date.
-    #[arg(long, conflicts_with = "audio")]
-    again: bool,
+    #[arg(long, alias = "again", conflicts_with = "audio")]
+    force: bool,
 }
 
 pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
@@ -208,6 +208,6 @@ fn batch(args: Args) -> Result<SpeechBatch> {
     }
     transcripts::find(&mut sounds, args.transcript.as_deref())?;
     let (figure, seams) = (args.figure.options(), seams(args.carry_state));
-    let (formats, checkpoint, again) = (args.format, args.checkpoint, args.again);
+    let (formats, checkpoint, again) = (args.format, args.checkpoint, args.force);
     Ok(SpeechBatch { sounds, folder, formats, checkpoint, seams, figure, again })
 }

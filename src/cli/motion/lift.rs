@@ -40,8 +40,8 @@ pub struct Args {
     #[arg(value_name = "KEYPOINTS")]
     keypoints: PathBuf,
     /// Frame rate of the keypoints, frames per second; defaults to what the file states.
-    #[arg(long, value_name = "RATE")]
-    fps: Option<FrameRate>,
+    #[arg(long, alias = "fps", value_name = "RATE")]
+    input_fps: Option<FrameRate>,
     /// Width and height of the image, pixels, such as 1280x720; coordinates from 0 to 1 are multiplied by it.
     #[arg(long, value_name = "WIDTHxHEIGHT", value_parser = size)]
     size: Option<[u32; 2]>,
@@ -86,7 +86,7 @@ fn is_ours(path: &Path) -> bool {
 fn read_own(args: &Args) -> Result<(Keypoints, Vec<String>)> {
     let (mut keypoints, mut notes) = keypoints_npz::read_sized(&args.keypoints, args.size)?;
     range::check_pixels(range::coordinates(&keypoints)).with_context(|| args.keypoints.display().to_string())?;
-    if let Some(fps) = args.fps {
+    if let Some(fps) = args.input_fps {
         keypoints.fps = fps;
         notes.retain(|note| !note.contains("`fps`"));
     }
@@ -97,8 +97,8 @@ fn read_own(args: &Args) -> Result<(Keypoints, Vec<String>)> {
 fn read_foreign(args: &Args) -> Result<(Keypoints, Vec<String>)> {
     let file = args.keypoints.display();
     let found = keypoints::read(&args.keypoints)?;
-    let fps = args.fps.or(found.fps);
-    let fps = fps.with_context(|| format!("{file} does not state its frame rate; give it with --fps"))?;
+    let fps = args.input_fps.or(found.fps);
+    let fps = fps.with_context(|| format!("{file} does not state its frame rate; give it with --input-fps"))?;
     let mut notes = vec![format!("{} at {fps}", found.format)];
     let size = match args.size.or(found.image_size) {
         Some(size) => size,

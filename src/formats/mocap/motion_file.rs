@@ -76,7 +76,7 @@ pub fn read(path: &Path, fps: Option<FrameRate>) -> Result<MotionFile> {
     };
     // The authors' clips always have 15 frames per second, which needs no note.
     if !has_rate && fps.is_none() && ending != "txt" {
-        notes.push(format!("{name} has no frame rate: assuming {DEFAULT_FPS}; set it with --fps"));
+        notes.push(format!("{name} has no frame rate: assuming {DEFAULT_FPS}; set it with --input-fps"));
     }
     ensure!(motion.n_frames() > 0, "{} has no frames", path.display());
     ensure!(
@@ -106,7 +106,10 @@ pub fn read_at(path: &Path, fps: Option<FrameRate>) -> Result<MotionFile> {
     let read = read(path, Some(fps.unwrap_or(DEFAULT_FPS)))?;
     if let Some(fps) = fps.filter(|fps| read.has_rate && *fps != read.motion.fps) {
         let own = read.motion.fps;
-        bail!("{} has a frame rate of {own}, but --in-fps is {fps}: omit --in-fps or correct the file", path.display());
+        bail!(
+            "{} has a frame rate of {own}, but --input-fps is {fps}: omit --input-fps or correct the file",
+            path.display()
+        );
     }
     Ok(read)
 }
@@ -152,7 +155,7 @@ mod tests {
             let found = read(&at(name), Some(fps)).unwrap();
             assert!(found.motion.joints == joints && found.motion.fps == fps && found.notes.is_empty(), "{name}");
             let found = read(&at(name), None).unwrap();
-            assert!(found.motion.fps == DEFAULT_FPS && found.notes[0].contains("--fps"), "{name}");
+            assert!(found.motion.fps == DEFAULT_FPS && found.notes[0].contains("--input-fps"), "{name}");
         }
         assert_eq!(read(&at("d.npz"), Some(FrameRate::new(7, 1))).unwrap().motion, motion);
     }

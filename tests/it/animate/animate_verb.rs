@@ -58,7 +58,7 @@ fn a_motion_becomes_files_and_what_was_done_is_told() {
     let text = authors_txt::read(&dir.join("made/b.txt"), fps).unwrap();
     assert!((&text.joints - &joints.joints).iter().all(|v| v.abs() < 1e-6));
     // Again, from another kind of file, untouched: the motion's own arms.
-    done(dir, "made/b.txt --in-fps 30 --out c.npy --smoothing none --no-constraints");
+    done(dir, "made/b.txt --input-fps 30 --out c.npy --smoothing none --no-constraints");
     let same = npy::read(&dir.join("c.npy"), fps).unwrap();
     assert!((&same.joints - &joints.joints).iter().all(|v| v.abs() < 1e-4));
     for more in [
@@ -222,7 +222,7 @@ fn what_is_wrong_is_said_and_nothing_is_written() {
         ("good.npy --out good.npy", "is an input"),
         ("good.npy --out x.bvh x.bvh", "listed twice"),
         ("good.npy --out nothing", "is a folder"),
-        ("good.npy --out x.bvh --in-fps 0", "1 to 1000 fps"),
+        ("good.npy --out x.bvh --input-fps 0", "1 to 1000 fps"),
         ("good.npy --out x.bvh --fps 1001", "1 to 1000 fps"),
         ("good.npy --out x.bvh --fps fast", "1 to 1000 fps"),
         ("good.npy --out x.bvh --sample one", "is not a dataset"),

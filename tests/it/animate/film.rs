@@ -194,8 +194,8 @@ fn a_film_beside_its_video_has_the_videos_sound_from_there_on() {
     let [motion, film] = ["motion.npy", "film.mp4"].map(|name| folder.path().join(name));
     npy::write(&motion, &swinging(6, 30)).unwrap();
     let mut orator = Command::new(env!("CARGO_BIN_EXE_orator"));
-    orator.arg("animate").arg(&motion).arg("--out").arg(&film).arg("--beside").arg(&clip.path);
-    let output = orator.args(["--beside-from", "2"]).output().unwrap();
+    orator.arg("animate").arg(&motion).arg("--out").arg(&film).arg("--compare").arg(&clip.path);
+    let output = orator.args(["--compare-start", "2"]).output().unwrap();
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     let lengths: Vec<f64> = streams(&film).into_iter().map(|stream| stream.2).collect();
     assert!(lengths.len() == 2 && lengths.iter().all(|secs| (secs - 2.0).abs() < FPS.secs(1)), "{lengths:?}");

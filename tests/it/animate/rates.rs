@@ -66,10 +66,10 @@ fn a_lift_at_30_frames_a_second_is_animated_at_30() {
         // The figure's joints say their rate as well.
         let again = motion_file::read(&dir.join(format!("again-{joints}")), None).unwrap();
         assert!(again.motion.fps == THIRTY && again.has_rate && again.notes.is_empty(), "{joints}: {:?}", again.notes);
-        let (code, _, said) = orator(dir, &format!("animate {joints} --out x.bvh --in-fps 15"));
+        let (code, _, said) = orator(dir, &format!("animate {joints} --out x.bvh --input-fps 15"));
         assert!(code == 1 && said.contains("says 30 fps, and 15 fps is given"), "{joints}: {said}");
-        assert!(said.contains(joints) && said.contains("--in-fps"), "{joints}: {said}");
-        assert_eq!(done(dir, &format!("animate {joints} --out x.bvh --in-fps 30"))["fps_assumed"], false);
+        assert!(said.contains(joints) && said.contains("--input-fps"), "{joints}: {said}");
+        assert_eq!(done(dir, &format!("animate {joints} --out x.bvh --input-fps 30"))["fps_assumed"], false);
         std::fs::remove_file(dir.join("x.bvh")).unwrap();
     }
     let mask = joints_npz::read(&dir.join("j.npz")).unwrap();
@@ -77,7 +77,7 @@ fn a_lift_at_30_frames_a_second_is_animated_at_30() {
     let described: Value = serde_json::from_slice(&std::fs::read(dir.join("j.npy.json")).unwrap()).unwrap();
     assert_eq!((&described["fps"], &described["shape"]), (&json!([30, 1]), &json!([45, 49, 3])));
     // Given, the rate takes the place of the keypoints' own.
-    assert_eq!(done(dir, "lift k.npz --fps 25 --out j.npz")["fps"]["num"], 25);
+    assert_eq!(done(dir, "lift k.npz --input-fps 25 --out j.npz")["fps"]["num"], 25);
 }
 
 #[test]
@@ -89,11 +89,14 @@ fn an_assumed_rate_is_said() {
     joints_npz::write(&dir.join("c.npz"), &swinging(2, 20)).unwrap();
     for bare in ["a.npy", "b.txt"] {
         let (_, _, said) = orator(dir, &format!("animate {bare} --out a.bvh"));
-        assert!(said.contains("20 frames at 15 fps (assumed: not stated in the file; set it with --in-fps)"), "{said}");
+        assert!(
+            said.contains("20 frames at 15 fps (assumed: not stated in the file; set it with --input-fps)"),
+            "{said}"
+        );
         assert_eq!(done(dir, &format!("animate {bare} --out a.bvh"))["fps_assumed"], true);
-        let (_, _, said) = orator(dir, &format!("animate {bare} --out a.bvh --in-fps 30"));
+        let (_, _, said) = orator(dir, &format!("animate {bare} --out a.bvh --input-fps 30"));
         assert!(said.contains("20 frames at 30 fps, 0.7 s"), "{said}");
-        let facts = done(dir, &format!("animate c.npz --out a.mp4 --beside {bare}"));
+        let facts = done(dir, &format!("animate c.npz --out a.mp4 --compare {bare}"));
         assert!(facts["notes"].to_string().contains("does not say its rate: taken for 15 fps"), "{facts}");
     }
     let (_, _, said) = orator(dir, "animate c.npz --out a.bvh");
@@ -117,13 +120,13 @@ fn what_is_of_another_rate_is_measured_beside_it_by_time() {
     let args = "evaluate --truth truth.npz --prediction made.npy --convention speech2gesture";
     // 16 s beside 8: the rate is what is wrong.
     let (code, _, said) = orator(dir, args);
-    assert!(code == 1 && said.contains("and the frame rates (--fps)"), "{said}");
+    assert!(code == 1 && said.contains("and the frame rates (--input-fps)"), "{said}");
     std::fs::write(path_of(&dir.join("made.npy")), "{\"fps\": 30}").unwrap();
     let same = done(dir, args);
     assert!(!same["notes"].to_string().contains("has no frame rate"), "{}", same["notes"]);
-    let noted = done(dir, &format!("{args} --fps 25"));
+    let noted = done(dir, &format!("{args} --input-fps 25"));
     assert!(
-        noted["notes"].to_string().contains("made.npy has 30 fps: 25 fps (--fps) is ignored for this file"),
+        noted["notes"].to_string().contains("made.npy has 30 fps: 25 fps (--input-fps) is ignored for this file"),
         "{}",
         noted["notes"]
     );

@@ -78,7 +78,7 @@ fn a_long_video_is_shared_and_its_bytes_are_those_of_one_worker() {
     compare(written(&shared.work()));
 
     let Some(planned) = project("planned", n_repeats) else { return };
-    let plan = planned.answer(&["plan", "--untimed", "--piece", "2"]);
+    let plan = planned.answer(&["plan", "--no-timing", "--max-part", "2"]);
     let n_units = plan.json["units"].as_u64().unwrap();
     assert!(plan.code == 0 && (n_units == 4 || is_long), "{n_units}: {}", plan.errors);
     // Their clocks are up to 15 minutes apart. Workers are killed with a unit in hand: one when spans are shared, the

@@ -8,7 +8,7 @@ use std::process::Command;
 #[test]
 fn a_folder_in_the_place_of_a_claim_holds_one_unit_and_is_named() {
     let project = Project::with_clips("planted", 2, 4.6);
-    assert_eq!(project.answer(&["plan", "--untimed"]).code, 0);
+    assert_eq!(project.answer(&["plan", "--no-timing"]).code, 0);
     let plan: Value = serde_json::from_slice(&fs::read(project.work().join("plan.json")).unwrap()).unwrap();
     let folder = project.work().join(format!("plan-{}", &plan["seal"].as_str().unwrap()[..12]));
     let planted = folder.join("claims/0000/000000.claim.0001");

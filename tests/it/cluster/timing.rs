@@ -6,7 +6,7 @@ use serde_json::json;
 #[test]
 fn a_plan_predicts_what_a_run_takes() {
     let project = Project::with_clips("timed", 3, 5.0);
-    let untimed = project.answer(&["plan", "--untimed"]);
+    let untimed = project.answer(&["plan", "--no-timing"]);
     assert_eq!((untimed.code, untimed.json.get("stages")), (0, None), "{}", untimed.errors);
     let plan = project.answer(&["plan", "--workers", "3", "--hours", "100"]);
     assert_eq!((plan.code, &plan.json["workers_needed"]), (0, &json!(1)), "{}", plan.errors);

@@ -47,7 +47,7 @@ fn killed_and_lost_workers_leave_the_bytes_of_one_run() {
     while n_killed + n_lost < n_kills {
         n_plans += 1;
         let project = Project::with_clips("crowd", n_clips, 4.6);
-        let plan = project.answer(&["plan", "--untimed"]);
+        let plan = project.answer(&["plan", "--no-timing"]);
         assert_eq!((plan.code, &plan.json["units"]), (0, &serde_json::json!(n_clips)), "{}", plan.errors);
         let mut workers: Vec<Child> = (0..n_workers).map(|_| clocks.start(&project, &mut rng)).collect();
         let mut still: Vec<Child> = Vec::new();
@@ -105,7 +105,7 @@ fn killed_and_lost_workers_leave_the_bytes_of_one_run() {
 fn a_bad_video_fails_alone_and_a_plan_is_kept() {
     let project = Project::with_clips("cluster", 2, 4.6);
     std::fs::write(project.video("broken.mp4"), b"no video").unwrap();
-    assert_eq!(project.answer(&["plan", "--untimed"]).code, 0);
+    assert_eq!(project.answer(&["plan", "--no-timing"]).code, 0);
     // An exclusive run is refused while workers have the folder.
     let first = project.answer(&["work", "--plan", "work/plan.json", "--shard", "0/2"]);
     let second = project.answer(&["work", "--plan", "work/plan.json", "--shard", "1/2"]);
@@ -121,7 +121,7 @@ fn a_bad_video_fails_alone_and_a_plan_is_kept() {
     std::fs::copy(project.clips().pop().unwrap(), project.video("broken.mp4")).unwrap();
     let retried = project.answer(&["work", "--plan", "work/plan.json", "--retry"]);
     assert_eq!((retried.code, retried.json["done"].as_u64()), (2, Some(0)), "another video: {}", retried.errors);
-    assert_eq!(project.answer(&["plan", "--untimed"]).code, 0);
+    assert_eq!(project.answer(&["plan", "--no-timing"]).code, 0);
     let planned = project.answer(&["work", "--plan", "work/plan.json"]);
     let counts = ["done", "up_to_date"].map(|key| planned.json[key].as_u64());
     assert_eq!((planned.code, counts), (0, [Some(3), Some(2)]), "{}", planned.errors);
@@ -145,7 +145,7 @@ fn a_bad_video_fails_alone_and_a_plan_is_kept() {
 #[test]
 fn a_worker_that_is_asked_to_end_with_all_its_processes_finishes_its_unit() {
     let project = Project::with_clips("asked", 2, 4.6);
-    assert_eq!(project.answer(&["plan", "--untimed"]).code, 0);
+    assert_eq!(project.answer(&["plan", "--no-timing"]).code, 0);
     let worker = worker(&project);
     while epochs(&project.work(), "claim").is_empty() {
         std::thread::sleep(Duration::from_millis(20));
@@ -172,7 +172,7 @@ fn a_worker_that_is_asked_to_end_with_all_its_processes_finishes_its_unit() {
 fn eight_workers_at_once_do_every_unit_once() {
     let n_clips = 8;
     let project = Project::with_clips("eight", n_clips, 4.6);
-    assert_eq!(project.answer(&["plan", "--untimed"]).code, 0);
+    assert_eq!(project.answer(&["plan", "--no-timing"]).code, 0);
     let workers: Vec<Child> = (0..8).map(|_| worker(&project)).collect();
     for mut worker in workers {
         assert!(worker.wait().unwrap().success());

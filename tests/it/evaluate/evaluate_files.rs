@@ -83,7 +83,7 @@ fn only_values_of_one_hash_are_compared() {
     };
     save("a.json", &[]);
     save("b.json", &["--alpha", "0.2"]);
-    save("c.json", &["--fps", "30"]);
+    save("c.json", &["--input-fps", "30"]);
     let same = project.answer(&["evaluate", "compare", "a.json", "b.json"]);
     assert_eq!(same.code, 0, "{}", same.errors);
     let of = |answer: &ProgramAnswer, what: &str| answer.json["compared"][what].as_array().unwrap().clone();
@@ -216,7 +216,7 @@ fn bad_input_is_refused_in_clear_words() {
         (&["t.npy", "away.npy", "--audio", "t.npy"], "t.npy"),
         (&["t.npy", "away.npy", "--audio", "short.wav"], "is it the audio of another clip?"),
         (&["t.npy", "away.npy", "--alpha", "0"], "alpha of PCK"),
-        (&["t.npy", "away.npy", "--fps", "0"], "expected 1 to 1000 fps"),
+        (&["t.npy", "away.npy", "--input-fps", "0"], "expected 1 to 1000 fps"),
     ];
     for (args, says) in cases {
         let (sides, more) = args.split_at(2);

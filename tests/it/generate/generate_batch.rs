@@ -46,7 +46,7 @@ fn a_folder_is_made_once_and_goes_on_after_a_bad_file() {
     assert_eq!(bytes("one.npy.json"), bytes("made/a.npy.json"));
 
     assert_eq!(run(dir, args).0, [0, 2, 1]);
-    assert_eq!(run(dir, &format!("{args} --again")).0, [2, 0, 1]);
+    assert_eq!(run(dir, &format!("{args} --force")).0, [2, 0, 1]);
     std::fs::remove_file(dir.join("made/a.bvh")).unwrap();
     assert_eq!(run(dir, args).0, [1, 1, 1]);
     let before = bytes("made/sub/b.npy");

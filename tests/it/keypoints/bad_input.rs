@@ -171,14 +171,14 @@ fn the_verb_asks_for_what_the_format_does_not_say() {
         let (code, text) = lift(file, args);
         assert!(code.is_some_and(|code| code != 0) && text.contains(expected), "{text}");
     };
-    fails(&folder, &[], "op does not state its frame rate; give it with --fps");
-    fails(&npz, &["--fps", "15"], "mp.npy does not state its image size; give it with --size, such as 1280x720");
-    fails(&folder, &["--fps", "15", "--size", "wide"], "expected width and height in pixels, such as 1280x720");
-    let (code, text) = lift(&folder, &["--fps", "15"]);
+    fails(&folder, &[], "op does not state its frame rate; give it with --input-fps");
+    fails(&npz, &["--input-fps", "15"], "mp.npy does not state its image size; give it with --size, such as 1280x720");
+    fails(&folder, &["--input-fps", "15", "--size", "wide"], "expected width and height in pixels, such as 1280x720");
+    let (code, text) = lift(&folder, &["--input-fps", "15"]);
     assert!(code == Some(0) && text.contains("OpenPose, 25 points at 15 fps"), "{text}");
     assert!(text.contains("image size not stated: derived from the outermost points"), "{text}");
     let first = std::fs::read(&out).unwrap();
-    let (code, text) = lift(&npz, &["--fps", "15", "--size", "640x480"]);
+    let (code, text) = lift(&npz, &["--input-fps", "15", "--size", "640x480"]);
     assert!(code == Some(0) && text.contains("20 frames at 15 fps lifted"), "{text}");
     assert_eq!(first.len(), std::fs::read(&out).unwrap().len());
 }

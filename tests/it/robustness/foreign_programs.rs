@@ -226,7 +226,7 @@ fn npm_asks_the_users_registry_whatever_lies_around_the_working_directory_and_th
 #[test]
 fn programs_of_clusters_are_those_installed_and_find_what_the_user_names() {
     let project = Project::with_clips("foreign", 1, 1.0);
-    assert_eq!(project.answer(&["plan", "--untimed"]).code, 0);
+    assert_eq!(project.answer(&["plan", "--no-timing"]).code, 0);
     let dir = project.dir().canonicalize().unwrap();
     plant(&dir);
     let bin = tempfile::tempdir().unwrap();

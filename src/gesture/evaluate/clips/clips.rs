@@ -196,7 +196,7 @@ fn clip(
         notes.extend(read.notes);
         if let Some(given) = given.filter(|given| read.has_rate && *given != read.motion.fps) {
             let name = path.file_name().unwrap_or_default().to_string_lossy();
-            notes.push(format!("{name} has {}: {given} (--fps) is ignored for this file", read.motion.fps));
+            notes.push(format!("{name} has {}: {given} (--input-fps) is ignored for this file", read.motion.fps));
         }
         let mut motion = read.motion;
         if motion.fps != fps {
@@ -218,7 +218,7 @@ fn clip(
     ensure!(
         difference <= MAX_LENGTH_DIFFERENCE_SECS.max(MAX_LENGTH_DIFFERENCE * truth_secs.max(predicted_secs)),
         "the truth lasts {truth_secs:.2} s ({n_ground_truth} frames at {fps}) and the prediction {predicted_secs:.2} s ({n_predicted} frames): \
-         expected lengths that differ by at most 1 s or 5 %; check that both are of the same audio, and the frame rates (--fps)"
+         expected lengths that differ by at most 1 s or 5 %; check that both are of the same audio, and the frame rates (--input-fps)"
     );
     let n_frames = n_ground_truth.min(n_predicted);
     if n_ground_truth != n_predicted {
