@@ -2,7 +2,7 @@
 //! belongs to a stage that failed. `segment` writes it and `lift` moves seconds from retained to refused; later stages
 //! only sum them.
 
-use super::refusal::FrameRefusal;
+use super::refusal::{FrameRefusal, Refusal};
 use crate::input;
 use anyhow::{Context, Result, ensure};
 use serde::{Deserialize, Serialize};
@@ -188,9 +188,13 @@ impl Ledger {
     }
 }
 
-/// Formats `reason 3.2 s, reason 1.0 s`, longest first; reasons below 0.05 s are omitted.
+/// Formats `label 3.2 s, label 1.0 s`, longest first; reasons below 0.05 s are omitted.
 pub fn longest_first(secs: &BTreeMap<String, f64>) -> String {
     let mut reasons: Vec<_> = secs.iter().filter(|(_, secs)| **secs >= 0.05).collect();
     reasons.sort_by(|a, b| b.1.total_cmp(a.1).then(a.0.cmp(b.0)));
-    reasons.iter().map(|(reason, secs)| format!("{reason} {secs:.1} s")).collect::<Vec<_>>().join(", ")
+    reasons
+        .iter()
+        .map(|(reason, secs)| format!("{} {secs:.1} s", Refusal::label(reason)))
+        .collect::<Vec<_>>()
+        .join(", ")
 }

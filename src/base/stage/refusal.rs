@@ -1,9 +1,9 @@
-//! Reasons for refusing seconds of a video: each has a machine-readable word, the unit of its measured value, a
+//! Reasons for rejecting seconds of a video: each has a word in the ledger, a label, the unit of its measured value, a
 //! heading and a sentence for the user.
 
-/// Defines the reasons: the measured quantity as documentation, then name, word in the ledger, unit and heading.
+/// Defines the reasons: the measured quantity as documentation, then name, word in the ledger, label, unit and heading.
 macro_rules! refusals {
-    ($($(#[$doc:meta])* $name:ident: $reason:literal, $unit:literal, $heading:literal;)*) => {
+    ($($(#[$doc:meta])* $name:ident: $reason:literal, $label:literal, $unit:literal, $heading:literal;)*) => {
         /// A reason for refusing frames. The reasons in `JUDGED` come first, in the order in which they are checked:
         /// the first one that applies is recorded.
         #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -14,9 +14,9 @@ macro_rules! refusals {
         impl Refusal {
             const ALL: &[Self] = &[$(Self::$name),*];
 
-            const fn texts(self) -> [&'static str; 3] {
+            const fn texts(self) -> [&'static str; 4] {
                 match self {
-                    $(Self::$name => [$reason, $unit, $heading],)*
+                    $(Self::$name => [$reason, $label, $unit, $heading],)*
                 }
             }
         }
@@ -25,61 +25,61 @@ macro_rules! refusals {
 
 refusals! {
     /// Fraction of the frames with sound.
-    NoSound: "no sound", "", "no audio track, or it has ended";
+    NoSound: "no sound", "no audio", "", "no audio track, or it has ended";
     /// Loudness in dB of full scale.
-    Quiet: "quiet", "dB", "the audio is too quiet for speech";
+    Quiet: "quiet", "too quiet", "dB", "the audio is too quiet for speech";
     /// Fraction of the sound that is speech.
-    NoSpeech: "no speech", "", "the audio is not speech";
+    NoSpeech: "no speech", "no speech", "", "the audio is not speech";
     /// Correlation between the visible mouth and the voice.
-    OffScreenSpeaker: "voice of another", "", "the voice belongs to an off-screen speaker";
+    OffScreenSpeaker: "voice of another", "off-screen speaker", "", "the voice belongs to an off-screen speaker";
     /// Seconds for which the picture is static.
-    Static: "still", "s", "the picture is static";
+    Static: "still", "static picture", "s", "the picture is static";
     /// Highest score of face and arms.
-    NoPerson: "no person", "", "no person is detected";
+    NoPerson: "no person", "no person", "", "no person is detected";
     /// Distance between the shoulders in px.
-    Small: "too small", "px", "the speaker is too small in the picture";
+    Small: "too small", "person too small", "px", "the speaker is too small in the picture";
     /// Score of nose and eyes.
-    Face: "face", "", "the face is not visible";
+    Face: "face", "face not visible", "", "the face is not visible";
     /// Width of the shoulders in neck-nose distances.
-    Turned: "turned", "neck-nose distances", "the speaker is turned sideways or away";
+    Turned: "turned", "turned away", "neck-nose distances", "the speaker is turned sideways or away";
     /// Horizontal distance from nose to neck in half shoulder widths.
-    NoseOff: "turned", "half shoulder widths", "the speaker is turned sideways or away";
+    NoseOff: "turned", "turned away", "half shoulder widths", "the speaker is turned sideways or away";
     /// Lowest score of shoulders and elbows.
-    Arms: "arms", "", "shoulders or elbows are not visible";
+    Arms: "arms", "arms not visible", "", "shoulders or elbows are not visible";
     /// Seconds for which a hand is missing because the other hand was detected at its position.
-    OtherHand: "other hand", "s", "one hand is detected at the position of the other";
+    OtherHand: "other hand", "duplicate hand", "s", "one hand is detected at the position of the other";
     /// Seconds for which a hand is missing.
-    HandGap: "hands", "s", "a hand is not visible for too long";
+    HandGap: "hands", "hand not visible", "s", "a hand is not visible for too long";
     /// Shoulder widths that the neck moves from one frame to the next.
-    Jump: "jump", "shoulder widths", "the speaker jumps from frame to frame";
+    Jump: "jump", "jump", "shoulder widths", "the speaker jumps from frame to frame";
     /// Seconds of an interval that remain beside a shot boundary.
-    Cut: "cut", "s", "the interval before or after a cut is too short";
+    Cut: "cut", "close to a cut", "s", "the interval before or after a cut is too short";
     /// Seconds of an interval that remain beside a change of the tracked person.
-    Identity: "other person", "s", "the interval before or after a change of person is too short";
+    Identity: "other person", "change of person", "s", "the interval before or after a change of person is too short";
     /// Seconds of an interval that remain between other refusals.
-    TooShort: "too short", "s", "too short between other rejected intervals";
+    TooShort: "too short", "too short", "s", "too short between other rejected intervals";
     /// Fraction of the frames in which the less visible hand is visible.
-    HandShare: "hands", "", "a hand is not visible for too long";
+    HandShare: "hands", "hand not visible", "", "a hand is not visible for too long";
     /// Fraction of the frames with too many persons.
-    Crowd: "crowd", "", "too many persons are in view";
+    Crowd: "crowd", "too many persons", "", "too many persons are in view";
     /// Deviation of a lifted bone from its length in the video, as a fraction of that length.
-    Bones: "bones", "bone lengths", "a lifted bone deviates too much from its length";
+    Bones: "bones", "bone length", "bone lengths", "a lifted bone deviates too much from its length";
     /// Number of joints that are not visible for longer than lifting interpolates.
-    MissingJoints: "open", "joints", "joints are not visible for too long";
+    MissingJoints: "open", "missing joints", "joints", "joints are not visible for too long";
     /// Seconds that are also in another video of the dataset.
-    Duplicate: "duplicate", "s", "duplicate of another video";
+    Duplicate: "duplicate", "duplicate", "s", "duplicate of another video";
     /// Seconds omitted between two splits of a video.
-    SplitGap: "between splits", "s", "omitted between two splits";
+    SplitGap: "between splits", "between splits", "s", "omitted between two splits";
     /// An imported take without a sound file, or its frames after the end of the sound.
-    NoSoundFile: "no sound", "s", "no audio file was found, or the audio has ended";
+    NoSoundFile: "no sound", "no sound", "s", "no audio file was found, or the audio has ended";
     /// An imported take that was predicted by a model.
-    Prediction: "prediction", "", "predicted by a model";
+    Prediction: "prediction", "prediction", "", "predicted by a model";
     /// Difference in seconds between the lengths of sound and motion of an imported take.
-    LengthMismatch: "out of step", "s", "audio and motion differ in length";
+    LengthMismatch: "out of step", "out of step", "s", "audio and motion differ in length";
     /// Number of frames of an imported take with both motion and sound.
-    FewFrames: "too short", "frames", "audio and motion have too few frames in common";
+    FewFrames: "too short", "too short", "frames", "audio and motion have too few frames in common";
     /// Seconds that the imported shards do not contain.
-    NotImported: "not here", "s", "not contained in the imported shards";
+    NotImported: "not here", "not here", "s", "not contained in the imported shards";
 }
 
 impl Refusal {
@@ -99,15 +99,20 @@ impl Refusal {
         self.texts()[0]
     }
 
+    /// Label of the ledger word `reason` for people who read it; an unknown word is its own label.
+    pub fn label(reason: &str) -> &str {
+        Self::ALL.iter().find(|known| known.reason() == reason).map_or(reason, |known| known.texts()[1])
+    }
+
     /// Unit of the measured value and the threshold. Empty for scores and fractions (0 to 1) and for correlations (-1
     /// to 1).
     pub const fn unit(self) -> &'static str {
-        self.texts()[1]
+        self.texts()[2]
     }
 
     /// Explanation of the reason, for a legend.
     pub const fn heading(self) -> &'static str {
-        self.texts()[2]
+        self.texts()[3]
     }
 
     /// Formats the sentence for the user from the measured value and the threshold, both in `unit()`.

@@ -8,31 +8,31 @@ use orator_base::text::with_unit;
 /// Label of a video that no stage has finished.
 pub const WAITING: &str = "not processed";
 
-/// Label and measured quantity of a reason.
-const fn texts(refusal: Refusal) -> [&'static str; 2] {
+/// Measured quantity of a reason.
+const fn quantity(refusal: Refusal) -> &'static str {
     match refusal {
-        Refusal::NoSound => ["no audio", "share of frames with audio"],
-        Refusal::Quiet => ["too quiet", "loudness"],
-        Refusal::NoSpeech => ["no speech", "share of speech"],
-        Refusal::OffScreenSpeaker => ["off-screen speaker", "correlation of mouth and voice"],
-        Refusal::Static => ["static picture", "duration"],
-        Refusal::NoPerson => ["no person", "highest score of face and arms"],
-        Refusal::Small => ["person too small", "distance between the shoulders"],
-        Refusal::Face => ["face not visible", "score of nose and eyes"],
-        Refusal::Turned => ["turned away", "shoulder width"],
-        Refusal::NoseOff => ["turned away", "horizontal distance from nose to neck"],
-        Refusal::Arms => ["arms not visible", "lowest score of shoulders and elbows"],
-        Refusal::OtherHand => ["duplicate hand", "gap"],
-        Refusal::HandGap => ["hand not visible", "gap"],
-        Refusal::HandShare => ["hand not visible", "share of frames in which the hand is visible"],
-        Refusal::Jump => ["jump", "neck movement per frame"],
-        Refusal::Cut => ["close to a cut", "remaining length"],
-        Refusal::Identity => ["change of person", "remaining length"],
-        Refusal::TooShort => ["too short", "length"],
-        Refusal::Crowd => ["too many persons", "share of frames with too many persons"],
-        Refusal::Bones => ["bone length", "deviation"],
-        Refusal::MissingJoints => ["missing joints", "count"],
-        other => [other.reason(), "measured"],
+        Refusal::NoSound => "share of frames with audio",
+        Refusal::Quiet => "loudness",
+        Refusal::NoSpeech => "share of speech",
+        Refusal::OffScreenSpeaker => "correlation of mouth and voice",
+        Refusal::Static => "duration",
+        Refusal::NoPerson => "highest score of face and arms",
+        Refusal::Small => "distance between the shoulders",
+        Refusal::Face => "score of nose and eyes",
+        Refusal::Turned => "shoulder width",
+        Refusal::NoseOff => "horizontal distance from nose to neck",
+        Refusal::Arms => "lowest score of shoulders and elbows",
+        Refusal::OtherHand => "gap",
+        Refusal::HandGap => "gap",
+        Refusal::HandShare => "share of frames in which the hand is visible",
+        Refusal::Jump => "neck movement per frame",
+        Refusal::Cut => "remaining length",
+        Refusal::Identity => "remaining length",
+        Refusal::TooShort => "length",
+        Refusal::Crowd => "share of frames with too many persons",
+        Refusal::Bones => "deviation",
+        Refusal::MissingJoints => "count",
+        _ => "measured",
     }
 }
 
@@ -45,11 +45,6 @@ pub fn order(reason: &str) -> usize {
     find(reason).unwrap_or(Refusal::JUDGED.len())
 }
 
-/// Label of a reason; unknown reasons are their own labels.
-pub fn label(reason: &str) -> &str {
-    find(reason).map_or(reason, |at| texts(Refusal::JUDGED[at])[0])
-}
-
 /// Heading of a reason; empty for unknown reasons.
 pub fn heading(reason: &str) -> &'static str {
     find(reason).map_or("", |at| Refusal::JUDGED[at].heading())
@@ -59,7 +54,7 @@ pub fn heading(reason: &str) -> &'static str {
 pub fn description(refused: &Refused) -> String {
     let [measured, threshold] = [refused.measured, refused.threshold].map(|value| with_unit(value, &refused.unit));
     match Refusal::find(&refused.reason, &refused.unit) {
-        Some(refusal) => format!("{}: {} {measured}, threshold {threshold}", refusal.heading(), texts(refusal)[1]),
+        Some(refusal) => format!("{}: {} {measured}, threshold {threshold}", refusal.heading(), quantity(refusal)),
         None => format!("{}: measured {measured}, threshold {threshold}", refused.message),
     }
 }
@@ -79,7 +74,7 @@ mod tests {
         let style = include_str!("page.css");
         for refusal in Refusal::JUDGED {
             let reason = refusal.reason();
-            assert!(texts(refusal)[1] != "measured" && label(reason) == texts(refusal)[0], "{reason}");
+            assert!(quantity(refusal) != "measured", "{reason}");
             assert!(!heading(reason).is_empty(), "{reason}");
             assert!(style.contains(&format!(".{} ", class(reason))), "{reason} has no colour");
         }

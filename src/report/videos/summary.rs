@@ -6,6 +6,7 @@ use super::video::VideoSummary;
 use crate::html;
 use crate::html::{Node, legend, node};
 use orator_base::stage::artifacts::{StageName, speaker_dir};
+use orator_base::stage::refusal::Refusal;
 use orator_base::text::counted;
 use orator_base::text::{length, percent};
 use orator_base::types::split::Split;
@@ -105,7 +106,7 @@ pub fn by_reason(sums: &ReportTotals) -> Vec<Node> {
     refused.sort_by(|a, b| b.2.total_cmp(&a.2).then(a.0.cmp(&b.0)));
     let mut parts: Vec<Part> = vec![("accepted", "accepted".to_owned(), sums.kept, "usable for the dataset")];
     parts.extend(
-        refused.iter().map(|(name, class, secs, heading)| (reasons::label(name), class.clone(), *secs, *heading)),
+        refused.iter().map(|(name, class, secs, heading)| (Refusal::label(name), class.clone(), *secs, *heading)),
     );
     if sums.failed > 0.0 {
         parts.push(("failed", "failed".to_owned(), sums.failed, "a stage failed"));
@@ -169,7 +170,7 @@ pub fn table(videos: &[VideoSummary], splits: &VideoSplits) -> Vec<Node> {
         let longest = refused.iter().take(3);
         let why =
             legend(longest.map(|(reason, secs)| {
-                (reasons::class(reason), format!("{} {}", reasons::label(reason), length(*secs)))
+                (reasons::class(reason), format!("{} {}", Refusal::label(reason), length(*secs)))
             }));
         let state = match ledger.failed.first() {
             Some(failed) if failed.stage == WAITING => node("span").text("not processed"),

@@ -7,6 +7,7 @@ use crate::html;
 use crate::html::chart::timeline::{TimelineSpan, timeline};
 use crate::html::{Node, node};
 use orator_base::stage::ledger::Kept;
+use orator_base::stage::refusal::Refusal;
 use orator_base::text::counted;
 use orator_base::text::{clock, length, number};
 use std::collections::BTreeSet;
@@ -91,7 +92,7 @@ fn spans(video: &VideoSummary) -> Vec<TimelineSpan> {
             refused.start_secs,
             refused.end_secs,
             reasons::class(&refused.reason),
-            reasons::label(&refused.reason),
+            Refusal::label(&refused.reason),
             reasons::description(refused),
         )
     });
@@ -114,7 +115,7 @@ fn legend(videos: &[VideoSummary]) -> Node {
         .collect();
     let stages: BTreeSet<&str> = ledgers().flat_map(|ledger| &ledger.failed).map(|f| f.stage.as_str()).collect();
     let mut entries = vec![("accepted".to_owned(), "accepted")];
-    entries.extend(found.iter().map(|(_, reason)| (reasons::class(reason), reasons::label(reason))));
+    entries.extend(found.iter().map(|(_, reason)| (reasons::class(reason), Refusal::label(reason))));
     if stages.iter().any(|stage| *stage != WAITING) {
         entries.push(("failed".to_owned(), "failed"));
     }
