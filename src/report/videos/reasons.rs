@@ -78,7 +78,10 @@ mod tests {
             assert!(!heading(reason).is_empty(), "{reason}");
             assert!(style.contains(&format!(".{} ", class(reason))), "{reason} has no colour");
         }
-        assert_eq!((class("<b>").as_str(), order("new"), label("new")), ("r-unknown", Refusal::JUDGED.len(), "new"));
+        assert_eq!(
+            (class("<b>").as_str(), order("new"), Refusal::label("new")),
+            ("r-unknown", Refusal::JUDGED.len(), "new")
+        );
         let quiet = Refused::new(0.0, 1.0, FrameRefusal::new(Refusal::Quiet, -62.0, -50.0));
         assert!(description(&quiet).ends_with(": loudness -62 dB, threshold -50 dB"));
         let other = Refused { reason: "new".to_owned(), message: "new rule".to_owned(), ..quiet };

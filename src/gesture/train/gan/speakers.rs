@@ -35,7 +35,7 @@ impl SpeakerSet {
             };
             ensure!(
                 other.fps == first.fps && channels(other) == channels(first) && other.network == first.network,
-                "{} has {} and {} {}, but a network has one frame rate: set [video] fps and build both datasets again",
+                "{} has {} and {} {}, but a network has one frame rate: set extract.fps and build both datasets again",
                 first.name,
                 first.fps,
                 other.name,
