@@ -1,8 +1,13 @@
 //! Formatting of counts, numbers and durations for readers.
 
-/// Count with its noun: `1 video`, `2 videos`.
+/// Count with its regular noun: `1 video`, `2 videos`, `2 entries`, `2 processes`.
 pub fn counted(n: usize, noun: &str) -> String {
-    if n == 1 { format!("1 {noun}") } else { format!("{n} {noun}s") }
+    match noun.strip_suffix('y').filter(|stem| !stem.ends_with(['a', 'e', 'o', 'u'])) {
+        _ if n == 1 => format!("1 {noun}"),
+        Some(stem) => format!("{n} {stem}ies"),
+        None if ["s", "x", "ch", "sh"].iter().any(|end| noun.ends_with(end)) => format!("{n} {noun}es"),
+        None => format!("{n} {noun}s"),
+    }
 }
 
 /// Duration in whole seconds, with two units from a minute on: `59 s`, `1 min 01 s`, `2 h 03 min`.
@@ -66,6 +71,7 @@ mod tests {
     #[test]
     fn numbers_read_well() {
         assert_eq!([0, 1, 2].map(|n| counted(n, "video")), ["0 videos", "1 video", "2 videos"]);
+        assert_eq!(["entry", "key", "process"].map(|noun| counted(2, noun)), ["2 entries", "2 keys", "2 processes"]);
         assert_eq!([59.4, 61.0, 3599.4, 7384.0].map(duration), ["59 s", "1 min 01 s", "59 min 59 s", "2 h 03 min"]);
         assert_eq!([41.24, 744.0, 11_772.0, -0.0].map(length), ["41.2 s", "12.4 min", "3.27 h", "0.0 s"]);
         assert_eq!([4.8, 59.96, 3723.0].map(clock), ["0:04.8", "1:00.0", "1:02:03.0"]);

@@ -11,6 +11,7 @@ use anyhow::{Context, Result};
 use orator_base::stage::artifacts::{self, StageName, speaker_dir};
 use orator_base::stage::fingerprint::hash_file;
 use orator_base::stage::{record, workdir};
+use orator_base::text::counted;
 use orator_formats::checkpoint;
 use std::collections::BTreeSet;
 use std::fs;
@@ -157,10 +158,10 @@ impl Removal {
     pub fn lines(&self, keep_models: bool) -> Vec<String> {
         let mut lines: Vec<String> = self.paths.iter().map(|path| path.display().to_string()).collect();
         if let Some((path, n)) = &self.hashes {
-            lines.push(format!("{n} entries of {}", path.display()));
+            lines.push(format!("{} of {}", counted(*n, "entry"), path.display()));
         }
         if let Some((path, n)) = &self.splits {
-            lines.push(format!("{n} entries of {}", path.display()));
+            lines.push(format!("{} of {}", counted(*n, "entry"), path.display()));
         }
         if let Some((dir, names)) = &self.dataset {
             lines.extend(names.iter().map(|name| format!("{name} of the dataset {}", dir.display())));
