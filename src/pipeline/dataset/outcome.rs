@@ -76,7 +76,7 @@ impl DatasetOutcome<'_> {
             format!("{} {:.1} s in {}", split.name(), info.secs, counted(info.samples, "interval"))
         };
         let n_windows: usize = self.stats.windows.strided.values().sum();
-        let mut line = format!("{}; {n_windows} windows of 64 frames", Split::ALL.map(part).join(", "));
+        let mut line = format!("{}; {} of 64 frames", Split::ALL.map(part).join(", "), counted(n_windows, "window"));
         let SplitRule { unit, why, guard_secs } = self.rule;
         let splits = match unit {
             SplitUnit::Time => format!("; split by time, {guard_secs:.1} s apart ({why})"),
