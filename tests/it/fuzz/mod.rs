@@ -1,5 +1,5 @@
-//! Fuzz tests of the file readers, one test per reader: random mutations of the files in `fixtures/fuzz` must not cause a
-//! panic, a long run time or excessive memory use (`fixtures::fuzzing`). BOLERO_RANDOM_ITERATIONS sets the number of
+//! Fuzz tests of the file readers, one test per reader: random mutations of the files in `fixtures/fuzz` must not cause
+//! a panic, a long run time or excessive memory use (`fixtures::fuzzing`). BOLERO_RANDOM_ITERATIONS sets the number of
 //! executions per test, BOLERO_RANDOM_SEED reproduces one.
 
 pub(crate) mod arrays;
