@@ -114,7 +114,7 @@ fn marked_share(found: &Transcript, is_selected: impl Fn(usize) -> bool) -> f64 
 }
 
 #[test]
-fn words_of_plachosen_are_aligned_to_the_audio() {
+fn words_of_plain_text_are_aligned_to_the_audio() {
     let n_sentences = if std::env::var("ORATOR_LONG").is_ok() { 140 } else { 8 };
     let Some(speech) = Speech::synthesise(n_sentences) else { return };
     let text: Vec<&str> = speech.words.iter().map(|word| word.0.as_str()).collect();
@@ -140,16 +140,16 @@ fn mismatched_words_are_marked_and_do_not_shift_the_others() {
     let Some(speech) = Speech::synthesise(8) else { return };
     let other: Vec<&str> = UNRELATED_TEXT.split_whitespace().collect();
     let words = &speech.words;
-    let replaced = |n: usize| n % 25 >= 20 && n / 25 < 3;
+    let is_replaced = |n: usize| n % 25 >= 20 && n / 25 < 3;
     // One spoken sentence is missing in the text.
     let chosen: Vec<usize> = (0..words.len()).filter(|n| !(32..42).contains(n)).collect();
-    let text = chosen.iter().map(|&n| if replaced(n) { other[(5 * n) % other.len()] } else { words[n].0.as_str() });
+    let text = chosen.iter().map(|&n| if is_replaced(n) { other[(5 * n) % other.len()] } else { words[n].0.as_str() });
     let found = speech.aligned("text.txt", text.collect::<Vec<_>>().join(" ")).unwrap();
-    let known: Vec<_> = chosen.iter().map(|&n| (!replaced(n)).then_some((words[n].1, words[n].2))).collect();
+    let known: Vec<_> = chosen.iter().map(|&n| (!is_replaced(n)).then_some((words[n].1, words[n].2))).collect();
     let errors = boundary_errors(&found, &known);
     let far = errors.iter().filter(|error| **error > 0.2).count() as f64 / errors.len() as f64;
     let (mismatched, matching) =
-        (marked_share(&found, |n| replaced(chosen[n])), marked_share(&found, |n| !replaced(chosen[n])));
+        (marked_share(&found, |n| is_replaced(chosen[n])), marked_share(&found, |n| !is_replaced(chosen[n])));
     eprintln!(
         "words marked: mismatched {mismatched:.2}, matching {matching:.2}; boundaries off by over 0.2 s: {far:.3}"
     );

@@ -108,7 +108,7 @@ fn blender_agrees_with_forward_kinematics_on_joint_positions() {
                 std::array::from_fn(|k| scene["frames"][t][name][0][k].as_f64().unwrap_or(f64::NAN))
             };
             let expected = rig.rig().positions(local);
-            let moving: Vec<usize> = (0..places.len()).filter(|&joint| rig.rig().joints[joint].moves).collect();
+            let moving: Vec<usize> = (0..expected.len()).filter(|&joint| rig.rig().joints[joint].moves).collect();
             let root_offset = if mm < 100.0 { sub(position(moving[0]), expected[moving[0]]) } else { [0.0; 3] };
             for joint in moving {
                 let error = mm * norm(sub(position(joint), add(expected[joint], root_offset)));

@@ -25,7 +25,7 @@ fn upright(n_frames: usize, yaw: f64, rng: &mut ChaCha8Rng) -> Vec<Pose> {
 }
 
 /// Keypoints seen by a camera 2 m from the neck, pitched down by `pitch` and rolled by `roll`, radians.
-fn film(poses: &[Pose], roll: f64, pitch: f64) -> Keypoints {
+fn project_keypoints(poses: &[Pose], roll: f64, pitch: f64) -> Keypoints {
     let view = Rotation::about([0.0, 0.0, 1.0], roll) * Rotation::about([1.0, 0.0, 0.0], pitch);
     let mut body = Array3::zeros((poses.len(), 17, 3));
     for (t, pose) in poses.iter().enumerate() {
@@ -65,7 +65,7 @@ fn known_camera_angles_are_estimated_and_compensated() {
     for _ in 0..24 {
         let poses = upright(60, rng.random_range(-0.8..0.8), &mut rng);
         let (roll, pitch) = (rng.random_range(-0.25f64..0.25), rng.random_range(-0.25f64..0.4));
-        let keypoints = film(&poses, roll, pitch);
+        let keypoints = project_keypoints(&poses, roll, pitch);
         let [uncorrected, level] = lifters.each_ref().map(|lifter| lifter.lift_all(&keypoints).unwrap());
         let camera = uncorrected.cameras[0];
         assert_eq!(camera.interval, Interval { start: 0, end: 60 });
@@ -93,7 +93,7 @@ fn without_hips_the_pitch_is_unknown() {
     let (mut errors, n) = (vec![], 12);
     for _ in 0..n {
         let roll: f64 = rng.random_range(-0.25..0.25);
-        let mut keypoints = film(&upright(60, 0.0, &mut rng), roll, 0.1);
+        let mut keypoints = project_keypoints(&upright(60, 0.0, &mut rng), roll, 0.1);
         keypoints.body.slice_mut(s![.., 11..13, ..]).fill(0.0);
         let lifted = lifter.lift_all(&keypoints).unwrap();
         assert!(lifted.extra.slice(s![.., 1.., ..]).iter().all(|v| v.is_nan()), "hips are missing");
@@ -105,7 +105,7 @@ fn without_hips_the_pitch_is_unknown() {
     eprintln!("roll from the shoulders: median error {error:.1} degrees");
     assert!(error < 8.0, "{error}");
     // For a speaker turned to the side neither angle is known, and the joints are not rotated.
-    let mut keypoints = film(&upright(60, 1.0, &mut rng), 0.0, 0.1);
+    let mut keypoints = project_keypoints(&upright(60, 1.0, &mut rng), 0.0, 0.1);
     keypoints.body.slice_mut(s![.., 11..13, ..]).fill(0.0);
     let lifted = lifter.lift_all(&keypoints).unwrap();
     assert_eq!((lifted.cameras[0].roll_degrees, lifted.cameras[0].pitch_degrees), (None, None));

@@ -27,7 +27,7 @@ fn cuts(video: &Path, fps: u32) -> Vec<usize> {
 }
 
 /// Writes a video of `inputs` through a filter graph with the output `[v]` to `dir`.
-fn film(dir: &Path, name: &str, inputs: &str, graph: &str) -> PathBuf {
+fn write_video(dir: &Path, name: &str, inputs: &str, graph: &str) -> PathBuf {
     let out = dir.join(format!("{name}.mp4"));
     let args = format!(
         "{inputs} -filter_complex {graph} -map [v] -c:v libx264 -preset ultrafast -crf 20 -pix_fmt yuv420p {}",
@@ -44,7 +44,7 @@ fn check_transitions(dir: &Path, inputs: &str, kinds: &[(&str, f64)], rates: &[u
         let graph = format!(
             "[0:v]{fmt},trim=0:4[a];[1:v]{fmt},trim=0:3.5[b];[a][b]xfade=transition={kind}:duration={secs}:offset=2[v]"
         );
-        let video = film(dir, &format!("{kind}-{secs}"), inputs, &graph);
+        let video = write_video(dir, &format!("{kind}-{secs}"), inputs, &graph);
         for &fps in rates {
             let found = cuts(&video, fps);
             let [first, last] = [2.0, 2.0 + secs].map(|at| at * f64::from(fps));
@@ -99,7 +99,7 @@ const MOVES: [(&str, &str); 9] = [
 
 fn check_moves(dir: &Path, input: &str, rates: &[u32]) {
     for (name, filter) in MOVES {
-        let video = film(dir, name, input, &format!("[0:v]fps=30,{filter},setsar=1[v]"));
+        let video = write_video(dir, name, input, &format!("[0:v]fps=30,{filter},setsar=1[v]"));
         for &fps in rates {
             let found = cuts(&video, fps);
             assert!(found.is_empty(), "{name} of {input} at {fps}: {found:?}");

@@ -49,7 +49,7 @@ fn verdict(footage: &Footage) -> (Vec<(usize, usize)>, Vec<String>) {
     (intervals, ledger.refused.iter().map(|r| r.reason.clone()).collect())
 }
 
-fn is_accepted(footage: &Footage) -> bool {
+fn is_fully_accepted(footage: &Footage) -> bool {
     verdict(footage) == (vec![(0, footage.shot.len())], vec![])
 }
 
@@ -61,7 +61,7 @@ fn hide(keypoints: &mut Keypoints, joints: &[usize], frames: std::ops::Range<usi
 
 #[test]
 fn a_good_video_is_accepted_completely_and_its_windows_counted() {
-    assert!(is_accepted(&good(200)));
+    assert!(is_fully_accepted(&good(200)));
     let (intervals, ledger) = judged(&good(200));
     assert_eq!((intervals.windows_64.stride_5, intervals.windows_64.disjoint), (28, 3));
     assert_eq!(ledger.kept_secs(), 200.0 / 15.0);
@@ -77,7 +77,7 @@ fn short_gaps_are_accepted_and_longer_ones_rejected() {
     hide(&mut footage.keypoints, &[coco::L_ELBOW], 50..55);
     footage.keypoints.left_hand.slice_mut(s![80..95, .., ..]).fill(0.0);
     footage.keypoints.right_hand.slice_mut(s![185..200, .., ..]).fill(0.0);
-    assert!(is_accepted(&footage));
+    assert!(is_fully_accepted(&footage));
     hide(&mut footage.keypoints, &[coco::L_ELBOW], 50..56);
     assert_eq!(verdict(&footage), (vec![(56, 200)], vec!["too short".into(), "arms".into()]));
     footage.keypoints.left_hand.slice_mut(s![80..96, .., ..]).fill(0.0);
@@ -136,7 +136,7 @@ fn judged_with(change: impl Fn(&mut Measures)) -> (Vec<(usize, usize)>, Vec<Stri
 }
 
 #[test]
-fn gaps_with_the_other_hand_detected_in_place_have_their_own_reason() {
+fn gaps_where_the_other_hand_was_detected_have_their_own_reason() {
     let gap = |measures: &mut Measures, share: f32| {
         measures.left_hand[70..100].fill(0.0);
         measures.left_other[70..100].fill(share);

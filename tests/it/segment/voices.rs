@@ -119,8 +119,8 @@ fn own_voices_are_distinguished_from_others_and_shifts_estimated() {
         }
         let area = area(&own, &other);
         eprintln!(
-            "{:<38} {offset}, correlation {:.2}, confidence {:.4}; area {area:.3} ({} own, {} other windows); shifts of \
-             10 s within {:.0} ms",
+            "{:<38} {offset}, correlation {:.2}, confidence {:.4}; area {area:.3} ({} own, {} other windows); shifts \
+             of 10 s within {:.0} ms",
             clip.name,
             offset.correlation,
             offset.confidence,
