@@ -1,5 +1,5 @@
-//! `orator align` on speech of espeak-ng, whose word times are known, with the Python package pocketsphinx (`make
-//! aligner`). `ORATOR_LONG=1` (`make prove`): more than eight minutes; otherwise half a minute.
+//! `orator align` on speech synthesised by espeak-ng, with known word times, using the Python package pocketsphinx
+//! (`make aligner`). `ORATOR_LONG=1` (`make prove`) aligns more than eight minutes of speech, otherwise half a minute.
 
 use orator_formats::transcript::{Transcript, WordSource};
 use orator_test_support::skip::{aligner, skip};
@@ -23,11 +23,12 @@ const SENTENCES: [&str; 14] = [
     "Kubernetes and TypeScript are words no dictionary from that time contains.",
     "Can you hear me now, or should I speak a little louder?",
 ];
-const OTHER: &str = "the committee met on tuesday to consider a proposal from the ministry of agriculture concerning the \
-    price of wheat and barley members asked whether farmers in the northern provinces would receive any support during \
-    winter the chairman replied that money was short and that every department had been told to save a tenth of its budget";
+const UNRELATED_TEXT: &str = "the committee met on tuesday to consider a proposal from the ministry of agriculture \
+    concerning the price of wheat and barley members asked whether farmers in the northern provinces would receive \
+    any support during winter the chairman replied that money was short and that every department had been told to \
+    save a tenth of its budget";
 
-/// Words said, with the beginning and the end of each, where the voice tells them.
+/// Synthesised speech: its words with their start and end times, where the synthesiser reports them.
 struct Speech {
     dir: tempfile::TempDir,
     python: PathBuf,
@@ -35,22 +36,22 @@ struct Speech {
 }
 
 impl Speech {
-    /// Speech of `n_sentences`, in an order that repeats none within a minute.
+    /// Synthesises `n_sentences`, ordered so that none is repeated within a minute.
     #[track_caller]
-    fn of(n_sentences: usize) -> Option<Self> {
+    fn synthesise(n_sentences: usize) -> Option<Self> {
         let packages = aligner()?;
         let dir = tempfile::tempdir().unwrap();
         let text: Vec<&str> = (0..n_sentences).map(|n| SENTENCES[(n * 5 + n / 14) % 14]).collect();
         let path = |name: &str| dir.path().join(name);
-        std::fs::write(path("said.txt"), text.join(" ")).unwrap();
+        std::fs::write(path("speech.txt"), text.join(" ")).unwrap();
         let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/reference/spoken_words.py");
-        let files = ["said.txt", "said.wav", "said.json"].map(path);
-        let spoken = Command::new("python3").arg(script).args(files).arg("en-us+f2").output().unwrap();
-        if !spoken.status.success() {
-            skip(&format!("no voice of espeak-ng (`make aligner`): {}", String::from_utf8_lossy(&spoken.stderr)));
+        let files = ["speech.txt", "speech.wav", "speech.json"].map(path);
+        let synthesis = Command::new("python3").arg(script).args(files).arg("en-us+f2").output().unwrap();
+        if !synthesis.status.success() {
+            skip(&format!("no voice of espeak-ng (`make aligner`): {}", String::from_utf8_lossy(&synthesis.stderr)));
             return None;
         }
-        let known: Value = serde_json::from_slice(&std::fs::read(path("said.json")).unwrap()).unwrap();
+        let known: Value = serde_json::from_slice(&std::fs::read(path("speech.json")).unwrap()).unwrap();
         let words = known.as_array().unwrap().iter().map(|word| {
             (word["word"].as_str().unwrap().to_owned(), word["start_secs"].as_f64(), word["end_secs"].as_f64())
         });
@@ -63,10 +64,10 @@ impl Speech {
         self.dir.path().join(name)
     }
 
-    /// What `orator align` makes of a text of this speech.
+    /// Transcript that `orator align` writes for `text` and this speech, or its error output.
     fn aligned(&self, file: &str, text: impl AsRef<[u8]>) -> Result<Transcript, String> {
         std::fs::write(self.path(file), text).unwrap();
-        let output = align(&self.python, &self.path("said.wav"), &self.path(file), &self.path("out.words.json"));
+        let output = align(&self.python, &self.path("speech.wav"), &self.path(file), &self.path("out.words.json"));
         if !output.status.success() {
             return Err(String::from_utf8_lossy(&output.stderr).into_owned());
         }
@@ -74,24 +75,24 @@ impl Speech {
     }
 }
 
-/// The Python of a new virtual environment in `dir` that has these packages: Python is run without PYTHONPATH.
+/// Creates a virtual environment with these packages in `dir`, as Python is run without PYTHONPATH; returns its Python.
 fn python_with(packages: &Path, dir: &Path) -> PathBuf {
     let environment = dir.join("environment");
-    let made = Command::new("python3").args(["-m", "venv", "--without-pip"]).arg(&environment).status().unwrap();
-    assert!(made.success(), "python3 -m venv");
+    let created = Command::new("python3").args(["-m", "venv", "--without-pip"]).arg(&environment).status().unwrap();
+    assert!(created.success(), "python3 -m venv");
     let version = std::fs::read_dir(environment.join("lib")).unwrap().next().unwrap().unwrap().path();
     std::fs::write(version.join("site-packages/aligner.pth"), packages.to_str().unwrap()).unwrap();
     environment.join("bin/python")
 }
 
-fn align(python: &Path, sound: &Path, text: &Path, out: &Path) -> Output {
+fn align(python: &Path, audio: &Path, text: &Path, out: &Path) -> Output {
     let mut command = Command::new(env!("CARGO_BIN_EXE_orator"));
-    command.arg("align").args([sound, text]).arg("--out").arg(out);
+    command.arg("align").args([audio, text]).arg("--out").arg(out);
     command.env("ORATOR_PYTHON", python).output().unwrap()
 }
 
-/// Errors of the boundaries of aligned words in seconds, in order of size; `known` of each word, `None` for a wrong one.
-fn errors(found: &Transcript, known: &[Option<(Option<f64>, Option<f64>)>]) -> Vec<f64> {
+/// Sorted absolute errors of the boundaries of aligned words, seconds; `known` is `None` for a mismatched word.
+fn boundary_errors(found: &Transcript, known: &[Option<(Option<f64>, Option<f64>)>]) -> Vec<f64> {
     assert_eq!(found.words.len(), known.len());
     let aligned = found.words.iter().zip(known).filter(|(word, _)| word.source == WordSource::Aligned);
     let mut errors: Vec<f64> = aligned
@@ -104,89 +105,92 @@ fn errors(found: &Transcript, known: &[Option<(Option<f64>, Option<f64>)>]) -> V
     errors
 }
 
-/// Share of the words of which `is_meant` that are marked as not fitting.
-fn marked(found: &Transcript, is_meant: impl Fn(usize) -> bool) -> f64 {
-    let meant: Vec<_> = (0..found.words.len()).filter(|&n| is_meant(n)).collect();
-    let marked = meant.iter().filter(|&&n| found.words[n].source == WordSource::Interpolated);
+/// Share of the words selected by `is_selected` that are marked as mismatched.
+fn marked_share(found: &Transcript, is_selected: impl Fn(usize) -> bool) -> f64 {
+    let selected: Vec<_> = (0..found.words.len()).filter(|&n| is_selected(n)).collect();
+    let marked = selected.iter().filter(|&&n| found.words[n].source == WordSource::Interpolated);
     assert!(marked.clone().all(|&n| found.words[n].confidence == Some(0.0)));
-    marked.count() as f64 / meant.len() as f64
+    marked.count() as f64 / selected.len() as f64
 }
 
 #[test]
-fn words_of_a_plain_text_get_their_times() {
+fn words_of_plain_text_are_aligned_to_the_audio() {
     let n_sentences = if std::env::var("ORATOR_LONG").is_ok() { 140 } else { 8 };
-    let Some(speech) = Speech::of(n_sentences) else { return };
+    let Some(speech) = Speech::synthesise(n_sentences) else { return };
     let text: Vec<&str> = speech.words.iter().map(|word| word.0.as_str()).collect();
     let found = speech.aligned("text.txt", text.join("\n")).unwrap();
     let known: Vec<_> = speech.words.iter().map(|(_, start, end)| Some((*start, *end))).collect();
-    let errors = errors(&found, &known);
-    let (median, most) = (errors[errors.len() / 2], errors[errors.len() * 95 / 100]);
-    let unfit = marked(&found, |_| true);
+    let errors = boundary_errors(&found, &known);
+    let (median, p95) = (errors[errors.len() / 2], errors[errors.len() * 95 / 100]);
+    let mismatched = marked_share(&found, |_| true);
     let secs = found.words.last().unwrap().end_secs;
     eprintln!(
         "{} words in {secs:.0} s: boundaries off by {:.0} ms (median), {:.0} ms (95 %); {:.1} % marked",
         text.len(),
         1000.0 * median,
-        1000.0 * most,
-        100.0 * unfit
+        1000.0 * p95,
+        100.0 * mismatched
     );
-    assert!(median <= 0.05 && most <= 0.2 && unfit <= 0.03, "{median} {most} {unfit}");
+    assert!(median <= 0.05 && p95 <= 0.2 && mismatched <= 0.03, "{median} {p95} {mismatched}");
     assert!(n_sentences < 100 || secs > 480.0, "{secs}");
 }
 
 #[test]
-fn wrong_words_are_marked_and_the_others_keep_their_times() {
-    let Some(speech) = Speech::of(8) else { return };
-    let other: Vec<&str> = OTHER.split_whitespace().collect();
+fn mismatched_words_are_marked_and_do_not_shift_the_others() {
+    let Some(speech) = Speech::synthesise(8) else { return };
+    let other: Vec<&str> = UNRELATED_TEXT.split_whitespace().collect();
     let words = &speech.words;
-    let is_wrong = |n: usize| n % 25 >= 20 && n / 25 < 3;
-    // A sentence of the sound is not in the text.
-    let kept: Vec<usize> = (0..words.len()).filter(|n| !(32..42).contains(n)).collect();
-    let text = kept.iter().map(|&n| if is_wrong(n) { other[(5 * n) % other.len()] } else { words[n].0.as_str() });
+    let is_replaced = |n: usize| n % 25 >= 20 && n / 25 < 3;
+    // One spoken sentence is missing in the text.
+    let chosen: Vec<usize> = (0..words.len()).filter(|n| !(32..42).contains(n)).collect();
+    let text = chosen.iter().map(|&n| if is_replaced(n) { other[(5 * n) % other.len()] } else { words[n].0.as_str() });
     let found = speech.aligned("text.txt", text.collect::<Vec<_>>().join(" ")).unwrap();
-    let known: Vec<_> = kept.iter().map(|&n| (!is_wrong(n)).then_some((words[n].1, words[n].2))).collect();
-    let errors = errors(&found, &known);
+    let known: Vec<_> = chosen.iter().map(|&n| (!is_replaced(n)).then_some((words[n].1, words[n].2))).collect();
+    let errors = boundary_errors(&found, &known);
     let far = errors.iter().filter(|error| **error > 0.2).count() as f64 / errors.len() as f64;
-    let (wrong, right) = (marked(&found, |n| is_wrong(kept[n])), marked(&found, |n| !is_wrong(kept[n])));
-    eprintln!("wrong words marked {wrong:.2}, right words marked {right:.2}, boundaries off by over 0.2 s {far:.3}");
-    assert!(wrong >= 0.7 && right <= 0.15 && far <= 0.05, "{wrong} {right} {far}");
+    let (mismatched, matching) =
+        (marked_share(&found, |n| is_replaced(chosen[n])), marked_share(&found, |n| !is_replaced(chosen[n])));
+    eprintln!(
+        "words marked: mismatched {mismatched:.2}, matching {matching:.2}; boundaries off by over 0.2 s: {far:.3}"
+    );
+    assert!(mismatched >= 0.7 && matching <= 0.15 && far <= 0.05, "{mismatched} {matching} {far}");
 
-    let refused = speech.aligned("other.txt", OTHER).unwrap_err();
-    assert!(refused.contains("fit the") && refused.contains("another sound"), "{refused}");
+    let error = speech.aligned("other.txt", UNRELATED_TEXT).unwrap_err();
+    assert!(error.contains("fit the") && error.contains("another sound"), "{error}");
 }
 
 #[test]
-fn sentences_of_subtitles_say_where_words_are_looked_for() {
-    let Some(speech) = Speech::of(8) else { return };
+fn subtitle_cues_limit_the_search_for_words() {
+    let Some(speech) = Speech::synthesise(8) else { return };
     let cue = |n: usize, words: &[(String, Option<f64>, Option<f64>)]| {
         let start = words.iter().find_map(|word| word.1).unwrap();
         let end = words.iter().rev().find_map(|word| word.2).unwrap();
         let time = |secs: f64| format!("00:00:{:02},{:03}", secs as u32, (secs * 1000.0) as u32 % 1000);
-        let said: Vec<&str> = words.iter().map(|word| word.0.as_str()).collect();
-        format!("{}\n{} --> {}\n{}\n\n", n + 1, time(start), time(end), said.join(" "))
+        let text: Vec<&str> = words.iter().map(|word| word.0.as_str()).collect();
+        format!("{}\n{} --> {}\n{}\n\n", n + 1, time(start), time(end), text.join(" "))
     };
     let srt: String = speech.words.chunks(12).enumerate().map(|(n, words)| cue(n, words)).collect();
     let found = speech.aligned("text.srt", srt).unwrap();
     let known: Vec<_> = speech.words.iter().map(|(_, start, end)| Some((*start, *end))).collect();
-    let errors = errors(&found, &known);
+    let errors = boundary_errors(&found, &known);
     assert!(errors[errors.len() / 2] <= 0.05 && errors[errors.len() * 95 / 100] <= 0.2);
-    assert!(marked(&found, |_| true) <= 0.05);
+    assert!(marked_share(&found, |_| true) <= 0.05);
 }
 
 #[test]
-fn what_cannot_be_aligned_is_refused_with_its_place() {
-    let Some(speech) = Speech::of(1) else { return };
-    let refused = |file: &str, text: &[u8]| speech.aligned(file, text).unwrap_err();
-    assert!(refused("text.txt", b"so\nsch\xf6n").contains("line 2: the byte 0xf6"));
-    assert!(refused("text.txt", b" \n").contains("contains no words"));
+fn unalignable_input_is_an_error_with_its_location() {
+    let Some(speech) = Speech::synthesise(1) else { return };
+    let error = |file: &str, text: &[u8]| speech.aligned(file, text).unwrap_err();
+    assert!(error("text.txt", b"so\nsch\xf6n").contains("line 2: the byte 0xf6"));
+    assert!(error("text.txt", b" \n").contains("contains no words"));
     assert!(
-        refused("text.txt", "\u{434}\u{430} \u{43d}\u{435}\u{442}".as_bytes())
+        error("text.txt", "\u{434}\u{430} \u{43d}\u{435}\u{442}".as_bytes())
             .contains("expected the English transcript")
     );
     let out = speech.path("silent.words.json");
     std::fs::write(speech.path("text.txt"), "Good evening").unwrap();
-    // Header of the spoken file, and silence behind it.
-    let mut silent = std::fs::read(speech.path("said.wav")).unwrap();
+    // The WAV header of the speech, followed by silence.
+    let mut silent = std::fs::read(speech.path("speech.wav")).unwrap();
     silent[44..].fill(0);
     std::fs::write(speech.path("silent.wav"), silent).unwrap();
     let output = align(&speech.python, &speech.path("silent.wav"), &speech.path("text.txt"), &out);
@@ -199,11 +203,11 @@ fn what_cannot_be_aligned_is_refused_with_its_place() {
 }
 
 #[test]
-fn a_python_without_the_package_is_told_what_to_install() {
+fn a_missing_python_package_is_an_error_with_its_install_command() {
     let dir = tempfile::tempdir().unwrap();
     let mut command = Command::new(env!("CARGO_BIN_EXE_orator"));
     command.args(["align", "a.wav", "a.txt", "--out", "a.words.json", "--python", "/nowhere/python"]);
     let output = command.current_dir(dir.path()).output().unwrap();
-    let said = String::from_utf8_lossy(&output.stderr);
-    assert!(said.contains("/nowhere/python") && said.contains("pip install pocketsphinx==5.1.1"), "{said}");
+    let stderr = String::from_utf8_lossy(&output.stderr);
+    assert!(stderr.contains("/nowhere/python") && stderr.contains("pip install pocketsphinx==5.1.1"), "{stderr}");
 }

@@ -1,5 +1,5 @@
-//! What programs of others read in a dataset: the Python `webdataset` reader and Hugging Face `datasets`. Both come from
-//! PyPI (`make readers`); ORATOR_READERS names the folder they are in.
+//! A dataset read by the Python package `webdataset` and by Hugging Face `datasets` has the values that were written.
+//! Both packages come from PyPI (`make readers`) and lie in the folder ORATOR_READERS.
 
 use crate::fixtures::gesture_dataset::with_posture;
 use crate::fixtures::samples::constant_sample;
@@ -10,25 +10,25 @@ use orator_test_support::skip::readers;
 use std::path::Path;
 use std::process::Command;
 
-fn written(dir: &Path, posed: bool) -> Vec<(Split, Sample)> {
+fn write_samples(dir: &Path, has_posture: bool) -> Vec<(Split, Sample)> {
     let mut samples = vec![
         (Split::Train, constant_sample("my-talk-0a1b2c3d-000000", 20, 1)),
         (Split::Train, constant_sample("my-talk-0a1b2c3d-000102", 15, 2)),
         (Split::Train, constant_sample("b_2-77777777-000000", 12, 5)),
         (Split::Test, constant_sample("walk-99999999-000007", 18, 3)),
     ];
-    if posed {
+    if has_posture {
         samples = samples.into_iter().map(|(split, sample)| (split, with_posture(sample, 0.4))).collect();
     }
     write_dataset(dir, "host", FrameRate::new(15, 1), &samples).unwrap();
     samples
 }
 
-/// Key, shapes, and sums of what is in a sample, as the Python side prints them.
+/// Key, shapes and sums of a sample's arrays, as the Python script prints them.
 fn line(sample: &Sample) -> String {
     let n = sample.n_frames();
     let pcm: i64 = sample.sound.samples.iter().map(|s| (s * 32_768.0) as i64).sum();
-    let seen = sample.motion.mask.iter().filter(|m| **m).count();
+    let n_observed = sample.motion.mask.iter().filter(|m| **m).count();
     let sum = |values: &mut dyn Iterator<Item = f64>| values.filter(|v| v.is_finite()).sum::<f64>();
     let pose3d = sum(&mut sample.motion.joints.iter().map(|v| f64::from(*v)));
     let pose2d = sum(&mut sample.pose2d.iter().map(|v| f64::from(*v)));
@@ -38,7 +38,7 @@ fn line(sample: &Sample) -> String {
         format!(" {n} 3 {head:.4} {n} 3 {trunk:.4}")
     });
     format!(
-        "{} {n} 49 3 {n} 59 3 {n} 49 {seen} {} {pcm} {first} {pose3d:.4} {pose2d:.4}{angles}",
+        "{} {n} 49 3 {n} 59 3 {n} 49 {n_observed} {} {pcm} {first} {pose3d:.4} {pose2d:.4}{angles}",
         sample.key,
         sample.sound.samples.len()
     )
@@ -79,15 +79,15 @@ assert load_dataset(os.getcwd(), split='test', cache_dir=sys.argv[1]).num_rows =
 
 fn read_with(package: &str, program: &str) {
     let Some(packages) = readers(package) else { return };
-    for posed in [false, true] {
-        read_dataset(&packages, program, posed);
+    for has_posture in [false, true] {
+        read_dataset(&packages, program, has_posture);
     }
 }
 
-fn read_dataset(packages: &Path, program: &str, posed: bool) {
+fn read_dataset(packages: &Path, program: &str, has_posture: bool) {
     let dir = tempfile::tempdir().unwrap();
     let cache = tempfile::tempdir().unwrap();
-    let samples = written(dir.path(), posed);
+    let samples = write_samples(dir.path(), has_posture);
     let output = Command::new("python3")
         .args(["-c", &format!("{SUMS}{program}")])
         .arg(cache.path())
@@ -108,11 +108,11 @@ fn read_dataset(packages: &Path, program: &str, posed: bool) {
 }
 
 #[test]
-fn webdataset_reads_the_same_numbers() {
+fn webdataset_reads_the_written_values() {
     read_with("webdataset", WEBDATASET);
 }
 
 #[test]
-fn hugging_face_datasets_reads_the_same_numbers() {
+fn hugging_face_datasets_reads_the_written_values() {
     read_with("datasets", DATASETS);
 }

@@ -1,4 +1,4 @@
-//! Our files opened by programs that others wrote.
+//! Output files read by external programs.
 
 pub(crate) mod aligned_words;
 pub(crate) mod blender;

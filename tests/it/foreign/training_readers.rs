@@ -1,5 +1,5 @@
-//! What programs of others read in a training folder: the numbers of the log in TensorBoard's own package, and a
-//! checkpoint's tensors in Python's `safetensors`. Both come from PyPI (`make readers`).
+//! A training folder read in Python: metrics of the log by the `tensorboard` package, tensors of a checkpoint by
+//! `safetensors`. Both come from PyPI (`make readers`).
 
 use candle_core::{Device, Tensor};
 use orator_gesture::train::log;
@@ -27,7 +27,7 @@ print(json.dumps([[tag, e.step, e.wall_time, e.value] for tag in log.Tags()['sca
 ";
 
 #[test]
-fn tensorboard_reads_every_number_of_the_log() {
+fn tensorboard_reads_every_metric_of_the_log() {
     let Some(readers) = readers("tensorboard") else { return };
     let folder = tempfile::tempdir().unwrap();
     let mut log = MetricsLog::open(folder.path(), 0).unwrap();
@@ -35,11 +35,11 @@ fn tensorboard_reads_every_number_of_the_log() {
         let x = i as f64;
         log.write(&json!({"step": 10 * i, "l1": x.sqrt() / 7.0, "adversarial": -1e-9 * x, "gradient_norm": 1e12 * x}))
             .unwrap();
-        let figures = json!({"pck": 1.0 / x, "frechet": if i == 2 { Value::Null } else { json!(x) }});
-        let validation = json!({"split": "validation", "generator": figures, "mean_pose": {"pck": 0.25}, "score": 2});
+        let metrics = json!({"pck": 1.0 / x, "frechet": if i == 2 { Value::Null } else { json!(x) }});
+        let validation = json!({"split": "validation", "generator": metrics, "mean_pose": {"pck": 0.25}, "score": 2});
         log.write(&json!({"step": 10 * i, "epoch": i, "validation": validation})).unwrap();
     }
-    // resumed: the lines behind step 1,000 go
+    // Resuming at step 1,000 removes the lines of later steps.
     MetricsLog::open(folder.path(), 1000).unwrap().write(&json!({"step": 1010, "l1": 0.5})).unwrap();
 
     let found: Vec<(String, u64, f64, f32)> = serde_json::from_str(&python(&readers, EVENTS, folder.path())).unwrap();
@@ -76,7 +76,7 @@ with safe_open(sys.argv[1], 'np') as file:
 "#;
 
 #[test]
-fn python_reads_a_checkpoint() {
+fn safetensors_for_python_reads_a_checkpoint() {
     let Some(readers) = readers("safetensors") else { return };
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("step-00000007.safetensors");

@@ -1,4 +1,4 @@
-//! Arrays: `.npy` and `.npz` of every kind.
+//! Readers of arrays: `.npy` and `.npz`.
 
 use crate::fixtures::fuzzing::harness::{corpus, fuzz_bytes, fuzz_file};
 use orator_base::types::time::FrameRate;
@@ -42,18 +42,18 @@ fn npz() {
 }
 
 #[test]
-fn npz_of_the_pipeline() {
+fn pipeline_npz() {
     let files = ["joints", "keypoints.npz", "timeline", "measures"].map(|name| corpus("arrays", name)).concat();
-    fuzz_file("npz_of_the_pipeline", &files, "a.npz", |path| {
+    fuzz_file("pipeline_npz", &files, "a.npz", |path| {
         let _ = (joints_npz::read(path), keypoints_npz::read_noting(path), keypoints_npz::read_extras(path));
         let _ = (Timeline::read(path), Measures::read(path), keypoints::read(path), motion_file::read(path, None));
     });
 }
 
 #[test]
-fn npz_of_captures() {
+fn mocap_npz() {
     let files = corpus("arrays", "capture");
-    fuzz_file("npz_of_captures", &files, "a.npz", |path| {
+    fuzz_file("mocap_npz", &files, "a.npz", |path| {
         let _ = (orator_formats::mocap::ted::read(path), upper_body::read(path), fingers::read(path));
     });
 }

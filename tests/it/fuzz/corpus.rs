@@ -1,5 +1,5 @@
-//! The valid files that are changed, as the program's own writers write them: `cargo test --test it -- --ignored
-//! fuzz::corpus` writes them anew.
+//! The valid files that the fuzz tests mutate, written by the program's own writers. `cargo test --test it -- --ignored
+//! fuzz::corpus` regenerates them.
 
 use crate::fixtures::figures::swinging;
 use crate::fixtures::fuzzing::harness::fixtures;
@@ -32,7 +32,7 @@ use std::process::Command;
 
 const FPS: FrameRate = FrameRate::new(15, 1);
 
-/// Path of a file of the corpus; its folder is made.
+/// Path of a file of the corpus; creates its folder.
 fn at(family: &str, name: &str) -> PathBuf {
     let path = fixtures(family).join(name);
     fs::create_dir_all(path.parent().unwrap()).unwrap();
@@ -85,7 +85,7 @@ fn arrays() {
     npz.finish().unwrap();
     let mut npz = NpzWriter::new_compressed(fs::File::create(at("arrays", "capture-cmu.npz")).unwrap());
     npz.add_array("fps", &Array1::from_elem(1, 60.0)).unwrap();
-    npz.add_array("walk", &Array3::from_shape_fn((4, 38, 3), |place| 900.0 * joint(place))).unwrap();
+    npz.add_array("walk", &Array3::from_shape_fn((4, 38, 3), |index| 900.0 * joint(index))).unwrap();
     npz.finish().unwrap();
 }
 
@@ -141,19 +141,18 @@ fn texts() {
     let split = RecordedSplit { name: "a".into(), split: Some(Split::Test), by: SplitBy::Share, blocks: Vec::new() };
     record.videos.insert("00aa".into(), split);
     record.write(&at("texts", "stage-splits.json")).unwrap();
-    result();
+    evaluation_result();
 }
 
-/// Output of an evaluation of two short clips.
-fn result() {
+/// Writes the JSON output of an evaluation of two short clips.
+fn evaluation_result() {
     let dir = tempfile::tempdir().unwrap();
     motion_folders::folders(dir.path(), &[3, 3]);
     let mut command = Command::new(env!("CARGO_BIN_EXE_orator"));
-    let words = "--json evaluate --truth truth --prediction prediction";
-    let output = command.current_dir(dir.path()).args(words.split(' ')).output().unwrap();
-    let found: Value = serde_json::from_slice(&output.stdout).unwrap();
-    // A few metrics of the many.
-    let mut found = found;
+    let args = "--json evaluate --truth truth --prediction prediction";
+    let output = command.current_dir(dir.path()).args(args.split(' ')).output().unwrap();
+    let mut found: Value = serde_json::from_slice(&output.stdout).unwrap();
+    // A few metrics suffice.
     if let Some(metrics) = found["metrics"].as_array_mut() {
         metrics.truncate(4);
     }

@@ -1,4 +1,4 @@
-//! A dataset's folder, loose shards, and the files beside them.
+//! Readers of a dataset folder, of separate shards, and of the files that accompany them.
 
 use crate::fixtures::fuzzing::harness::{corpus, fixtures, fuzz_file, fuzz_folder};
 use orator_base::stage::ledger::Ledger;
@@ -32,8 +32,8 @@ fn verification() {
 }
 
 #[test]
-fn loose_shards() {
-    fuzz_file("loose_shards", &corpus("dataset", "train"), "train-000.tar", |path| {
+fn separate_shards() {
+    fuzz_file("separate_shards", &corpus("dataset", "train"), "train-000.tar", |path| {
         for video in shards::open(&[path.to_owned()]).videos {
             video.samples.iter().for_each(|sample| drop(sample.read()));
         }

@@ -1,4 +1,4 @@
-//! Sound files: the header that the project writes, and any through ffmpeg.
+//! Readers of audio files: WAV with the program's own reader, and other formats with ffmpeg.
 
 use crate::fixtures::fuzzing::harness::{corpus, fuzz_bytes, fuzz_file};
 use orator_base::types::sound::SAMPLE_RATE;
@@ -15,8 +15,8 @@ fn wav_header() {
 }
 
 #[test]
-fn sound() {
-    fuzz_file("sound", &corpus("media", "a.wav"), "a.wav", |path| {
+fn audio_file() {
+    fuzz_file("audio_file", &corpus("media", "a.wav"), "a.wav", |path| {
         if probe::probe(path).is_ok() {
             let _ = audio::read_sound(path);
         }

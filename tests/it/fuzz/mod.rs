@@ -1,6 +1,6 @@
-//! Readers of files on bytes that nobody wrote: the files of `fixtures/fuzz`, changed at random, one reader a test. No panic, no
-//! long time, no memory out of proportion (`fixtures::fuzzing`). BOLERO_RANDOM_ITERATIONS is the number of
-//! executions of each, BOLERO_RANDOM_SEED repeats one.
+//! Fuzz tests of the file readers, one test per reader: random mutations of the files in `fixtures/fuzz` must not cause
+//! a panic, a long run time or excessive memory use (`fixtures::fuzzing`). BOLERO_RANDOM_ITERATIONS sets the number of
+//! executions per test, BOLERO_RANDOM_SEED reproduces one.
 
 pub(crate) mod arrays;
 pub(crate) mod corpus;

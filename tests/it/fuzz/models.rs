@@ -1,15 +1,15 @@
-//! Published models, each of the formats that are converted.
+//! Converters of published models to ONNX, one test per source format.
 
 use crate::fixtures::fuzzing::harness::fuzz_bytes;
 use crate::fixtures::source_models::run::SourceModel;
 use crate::fixtures::source_models::{ncnn_model, tfjs_models, tflite_model};
 
-/// Changes the file `which` of a model.
-fn fuzz_model(name: &str, model: &SourceModel, which: usize) {
-    let files = [model.files[which].clone()];
+/// Mutates the file at index `file` of a model.
+fn fuzz_model(name: &str, model: &SourceModel, file: usize) {
+    let files = [model.files[file].clone()];
     fuzz_bytes(name, &files, |bytes| {
         let mut changed = model.clone();
-        changed.files[which] = bytes.to_vec();
+        changed.files[file] = bytes.to_vec();
         if let Ok(onnx) = changed.convert() {
             let n_bytes: usize = changed.files.iter().map(Vec::len).sum();
             assert!(onnx.len() < 4 * n_bytes + (1 << 20), "{} bytes of {n_bytes}", onnx.len());
@@ -23,13 +23,13 @@ fn tflite() {
 }
 
 #[test]
-fn tfjs_of_movenet() {
-    fuzz_model("tfjs_of_movenet", &tfjs_models::movenet(), 0);
+fn movenet_tfjs() {
+    fuzz_model("movenet_tfjs", &tfjs_models::movenet(), 0);
 }
 
 #[test]
-fn tfjs_of_nanodet() {
-    fuzz_model("tfjs_of_nanodet", &tfjs_models::nanodet(), 0);
+fn nanodet_tfjs() {
+    fuzz_model("nanodet_tfjs", &tfjs_models::nanodet(), 0);
 }
 
 #[test]
@@ -38,6 +38,6 @@ fn ncnn() {
 }
 
 #[test]
-fn weights_of_ncnn() {
-    fuzz_model("weights_of_ncnn", &ncnn_model::small(), 1);
+fn ncnn_weights() {
+    fuzz_model("ncnn_weights", &ncnn_model::small(), 1);
 }

@@ -1,4 +1,4 @@
-//! Captured motion: BVH, the authors' text, labels of hands, and a take as an import reads it.
+//! Readers of motion capture: BVH, the authors' text format, hand labels, and the takes of an import.
 
 use crate::fixtures::fuzzing::harness::{corpus, fixtures, folder, fuzz_bytes, fuzz_file};
 use orator_base::types::time::FrameRate;
@@ -23,8 +23,8 @@ fn bvh() {
 }
 
 #[test]
-fn motion_of_bvh() {
-    fuzz_file("motion_of_bvh", &corpus("motion", "a.bvh"), "a.bvh", |path| {
+fn bvh_motion() {
+    fuzz_file("bvh_motion", &corpus("motion", "a.bvh"), "a.bvh", |path| {
         let _ = (motion_file::read(path, None), upper_body::read(path), fingers::read(path));
     });
 }
@@ -39,8 +39,8 @@ fn authors_text() {
 }
 
 #[test]
-fn labels_of_hands() {
-    fuzz_file("labels_of_hands", &corpus("motion", "labels"), "a.txt", |path| drop(fingers::read(path)));
+fn hand_labels() {
+    fuzz_file("hand_labels", &corpus("motion", "labels"), "a.txt", |path| drop(fingers::read(path)));
 }
 
 #[test]

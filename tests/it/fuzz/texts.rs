@@ -1,4 +1,4 @@
-//! Texts: transcripts, keypoints as JSON, configuration, manifest, tables, results, logs.
+//! Readers of text files: transcripts, JSON keypoints, configuration, manifest, tables, evaluation results, logs.
 
 use crate::fixtures::fuzzing::harness::{corpus, folder, fuzz_bytes, fuzz_file};
 use orator_formats::keypoints;
@@ -24,9 +24,9 @@ fn transcripts() {
 }
 
 #[test]
-fn keypoints_of_others() {
+fn external_keypoints() {
     let files = corpus("texts", "keypoints");
-    fuzz_file("keypoints_of_others", &files, "a.json", |path| drop(keypoints::read(path)));
+    fuzz_file("external_keypoints", &files, "a.json", |path| drop(keypoints::read(path)));
 }
 
 #[test]
@@ -55,8 +55,8 @@ fn manifest() {
 }
 
 #[test]
-fn table_of_sounds() {
-    fuzz_file("table_of_sounds", &corpus("texts", "sounds"), "sounds.csv", |path| {
+fn audio_table() {
+    fuzz_file("audio_table", &corpus("texts", "sounds"), "sounds.csv", |path| {
         for row in sounds::of_table(path).unwrap_or_default() {
             assert!(!row.name.starts_with('/') && !row.name.split('/').any(|part| part == ".."), "{}", row.name);
         }
@@ -64,15 +64,15 @@ fn table_of_sounds() {
 }
 
 #[test]
-fn result_of_an_evaluation() {
-    fuzz_file("result_of_an_evaluation", &corpus("texts", "result"), "result.json", |path| {
+fn evaluation_result() {
+    fuzz_file("evaluation_result", &corpus("texts", "result"), "result.json", |path| {
         let _ = StoredResult::read(path);
     });
 }
 
 #[test]
-fn log_of_a_training() {
-    fuzz_file("log_of_a_training", &corpus("texts", "log"), "log.jsonl", |path| {
+fn training_log() {
+    fuzz_file("training_log", &corpus("texts", "log"), "log.jsonl", |path| {
         let _ = orator_gesture::train::log::read(path.parent().unwrap());
     });
 }

@@ -1,4 +1,4 @@
-//! Weights: checkpoints of a speaker, lifters, spaces of movement.
+//! Readers of weights: speaker checkpoints, lifters, motion embeddings.
 
 use crate::fixtures::fuzzing::harness::{corpus, fuzz_bytes, fuzz_file};
 use orator_gesture::generate::model::{self, GenerationChoice};
@@ -26,8 +26,8 @@ fn lifters() {
 }
 
 #[test]
-fn spaces() {
-    fuzz_bytes("spaces", &corpus("weights", ""), |bytes| {
+fn motion_embeddings() {
+    fuzz_bytes("motion_embeddings", &corpus("weights", ""), |bytes| {
         let _ = (Basis::parse(bytes), embedding::parse(bytes));
     });
 }

@@ -1,4 +1,4 @@
-//! What is wrong with a file of another program is said with the file, the place and what was expected.
+//! An invalid keypoint file is an error that states the file, the location and what was expected.
 
 use crate::fixtures::media::foreign_keypoints as foreign;
 use crate::fixtures::media::foreign_keypoints::OpenPoseOrder;
@@ -12,8 +12,8 @@ use std::process::Command;
 
 const RATE: FrameRate = FrameRate::new(15, 1);
 
-/// The error's text, or the notes, with the folder's name taken out.
-fn said(dir: &Path, name: &str) -> String {
+/// The error message, or the notes, without the path of the folder.
+fn message(dir: &Path, name: &str) -> String {
     let path = dir.join(name);
     let text = match read(&path) {
         Ok(found) => format!("read: {:?}", found.notes),
@@ -29,7 +29,7 @@ fn write_into(dir: &Path, name: &str, text: &str) {
 }
 
 #[test]
-fn every_kind_of_damage_is_named() {
+fn every_kind_of_invalid_file_has_its_own_message() {
     let dir = tempfile::tempdir().unwrap();
     let write = |name: &str, text: &str| write_into(dir.path(), name, text);
     let person = |n: usize| json!({ "image_id": "0.jpg", "keypoints": vec![5.0; n], "score": 1.0 });
@@ -126,13 +126,13 @@ fn every_kind_of_damage_is_named() {
         ("missing.npy", "missing.npy: no person is visible in any frame"),
         ("signed.npy", "signed.npy: coordinates are between -1 and 1: expected pixels (OpenPose: --keypoint_scale 0)"),
     ] {
-        let said = said(dir.path(), name);
-        assert!(said.contains(expected), "{name}: {said}");
+        let message = message(dir.path(), name);
+        assert!(message.contains(expected), "{name}: {message}");
     }
 }
 
 #[test]
-fn gaps_and_numbers_that_are_none_are_points_not_seen() {
+fn missing_frames_and_non_finite_values_are_undetected_points() {
     let dir = tempfile::tempdir().unwrap();
     let sample = foreign::sample(8, RATE);
     let folder = dir.path().join("gap");
@@ -144,7 +144,7 @@ fn gaps_and_numbers_that_are_none_are_points_not_seen() {
     assert_eq!(found.notes, ["2 missing frames (the first is number 3): marked as not detected"]);
     assert_eq!((found.frames.len(), found.frames[3].len(), found.frames[5].len()), (8, 0, 1));
 
-    // Python writes a number that is none as NaN.
+    // Python's `json` writes non-finite numbers as NaN and Infinity.
     let path = dir.path().join("nan.json");
     foreign::alphapose(&path, &sample, 17);
     let text = std::fs::read_to_string(&path).unwrap().replacen("320.0,110.0,", "NaN,-Infinity,", 1);
@@ -155,7 +155,7 @@ fn gaps_and_numbers_that_are_none_are_points_not_seen() {
 }
 
 #[test]
-fn the_verb_asks_for_what_the_format_does_not_say() {
+fn lift_asks_for_values_that_the_format_does_not_state() {
     let dir = tempfile::tempdir().unwrap();
     let sample = foreign::sample(20, RATE);
     let (folder, npz, out) = (dir.path().join("op"), dir.path().join("mp.npy"), dir.path().join("j.npy"));
@@ -186,7 +186,7 @@ fn the_verb_asks_for_what_the_format_does_not_say() {
 proptest::proptest! {
     #![proptest_config(proptest::test_runner::Config::with_cases(200))]
     #[test]
-    fn no_bytes_panic(
+    fn arbitrary_bytes_do_not_panic(
         text in "\\{?\\[?(\"(people|instance_info|keypoints|image_id|frame_id|annotations|images|id)\" ?: ?)?[\\[{]{0,3}[0-9.,NaIfinty\"-]{0,12}[\\]}]{0,4}|.{0,40}",
         damage in proptest::collection::vec((0usize..4000, proptest::num::u8::ANY), 1..4),
     ) {

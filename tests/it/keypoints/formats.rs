@@ -1,4 +1,4 @@
-//! Every format: written by its own definition, read back, brought to another rate, one of several people followed.
+//! Every keypoint format is read as its program writes it, resampled to another rate, and reduced to one person.
 
 use crate::fixtures::media::foreign_keypoints as foreign;
 use crate::fixtures::media::foreign_keypoints::{HolisticOrder, OpenPoseOrder};
@@ -12,47 +12,47 @@ use std::path::Path;
 
 const RATE: FrameRate = FrameRate::new(15, 1);
 const SIZE: [u32; 2] = [640, 480];
-/// Points of the body that PATS does not have: ears, hips, knees, ankles.
+/// Body keypoints that PATS does not have: ears, hips, knees, ankles.
 const NOT_IN_PATS: [usize; 8] = [3, 4, 11, 12, 13, 14, 15, 16];
 
-/// What of the sample a format holds.
+/// The part of the sample that a format stores.
 #[derive(Clone, Copy, PartialEq)]
-enum Holds {
+enum Content {
     All,
-    BodyAlone,
-    /// All, with visibilities or places alone: scores are 1.
+    BodyOnly,
+    /// All points, with visibilities or coordinates only: scores are 1.
     NoScores,
-    /// All, with scores of the body alone.
+    /// All points, with scores of the body only.
     BodyScores,
 }
 
-fn taken(found: FoundKeypoints) -> ConvertedKeypoints {
+fn converted(found: FoundKeypoints) -> ConvertedKeypoints {
     convert(found, RATE, SIZE, RATE).unwrap()
 }
 
-fn same(what: &str, found: &Array3<f32>, expected: &Array3<f32>, scores: Option<f32>, left_out: &[usize]) {
-    assert_eq!(found.shape(), expected.shape(), "{what}");
+fn assert_close(label: &str, found: &Array3<f32>, expected: &Array3<f32>, scores: Option<f32>, absent: &[usize]) {
+    assert_eq!(found.shape(), expected.shape(), "{label}");
     for ((at, &value), &wanted) in found.indexed_iter().zip(expected) {
         let wanted = match scores {
-            _ if left_out.contains(&at.1) => 0.0,
+            _ if absent.contains(&at.1) => 0.0,
             Some(score) if at.2 == 2 => score,
             _ => wanted,
         };
-        assert!((value - wanted).abs() < 1e-3, "{what} {at:?}: {value}, expected {wanted}");
+        assert!((value - wanted).abs() < 1e-3, "{label} {at:?}: {value}, expected {wanted}");
     }
 }
 
-fn compare(what: &str, found: &Keypoints, expected: &Keypoints, holds: Holds) {
-    let left_out: Vec<usize> = if holds == Holds::BodyAlone { (0..21).collect() } else { Vec::new() };
-    let body_scores = (holds == Holds::NoScores).then_some(1.0);
-    let hand_scores = matches!(holds, Holds::NoScores | Holds::BodyScores).then_some(1.0);
-    same(&format!("{what}: body"), &found.body, &expected.body, body_scores, &[]);
-    same(&format!("{what}: left hand"), &found.left_hand, &expected.left_hand, hand_scores, &left_out);
-    same(&format!("{what}: right hand"), &found.right_hand, &expected.right_hand, hand_scores, &left_out);
+fn compare(label: &str, found: &Keypoints, expected: &Keypoints, content: Content) {
+    let absent: Vec<usize> = if content == Content::BodyOnly { (0..21).collect() } else { Vec::new() };
+    let body_scores = (content == Content::NoScores).then_some(1.0);
+    let hand_scores = matches!(content, Content::NoScores | Content::BodyScores).then_some(1.0);
+    assert_close(&format!("{label}: body"), &found.body, &expected.body, body_scores, &[]);
+    assert_close(&format!("{label}: left hand"), &found.left_hand, &expected.left_hand, hand_scores, &absent);
+    assert_close(&format!("{label}: right hand"), &found.right_hand, &expected.right_hand, hand_scores, &absent);
 }
 
 #[test]
-fn every_format_comes_back_as_it_was_written() {
+fn every_format_is_read_as_it_was_written() {
     let dir = tempfile::tempdir().unwrap();
     let sample = foreign::sample(6, RATE);
     let at = |name: &str| dir.path().join(name);
@@ -71,68 +71,72 @@ fn every_format_comes_back_as_it_was_written() {
     for order in [HolisticOrder::NoFace, HolisticOrder::PoseFirst, HolisticOrder::FaceFirst, HolisticOrder::Flat] {
         foreign::holistic(&at(&format!("{order:?}.npy")), &sample, order);
     }
-    for (name, format, holds) in [
-        ("body25", "OpenPose, 25 points", Holds::All),
-        ("coco18", "OpenPose, 18 points", Holds::All),
-        ("mm17.json", "MMPose, 17 points", Holds::BodyAlone),
-        ("mm133.json", "MMPose, 133 points", Holds::All),
-        ("list17.json", "MMPose, 17 points", Holds::BodyAlone),
-        ("list133.json", "MMPose, 133 points", Holds::All),
-        ("old17.json", "MMPose, 17 points", Holds::BodyAlone),
-        ("old133.json", "MMPose, 133 points", Holds::All),
-        ("alpha17.json", "AlphaPose, 17 points", Holds::BodyAlone),
-        ("alpha26.json", "AlphaPose, 26 points", Holds::BodyAlone),
-        ("alpha136.json", "AlphaPose, 136 points", Holds::All),
-        ("wholebody.json", "COCO-WholeBody, 17 points", Holds::NoScores),
-        ("mediapipe.npz", "MediaPipe, pose and hands", Holds::BodyScores),
-        ("NoFace.npy", "MediaPipe, pose and hands", Holds::NoScores),
-        ("PoseFirst.npy", "MediaPipe, pose and hands", Holds::NoScores),
-        ("FaceFirst.npy", "MediaPipe, pose and hands", Holds::NoScores),
-        ("Flat.npy", "MediaPipe, pose and hands", Holds::BodyScores),
+    for (name, format, content) in [
+        ("body25", "OpenPose, 25 points", Content::All),
+        ("coco18", "OpenPose, 18 points", Content::All),
+        ("mm17.json", "MMPose, 17 points", Content::BodyOnly),
+        ("mm133.json", "MMPose, 133 points", Content::All),
+        ("list17.json", "MMPose, 17 points", Content::BodyOnly),
+        ("list133.json", "MMPose, 133 points", Content::All),
+        ("old17.json", "MMPose, 17 points", Content::BodyOnly),
+        ("old133.json", "MMPose, 133 points", Content::All),
+        ("alpha17.json", "AlphaPose, 17 points", Content::BodyOnly),
+        ("alpha26.json", "AlphaPose, 26 points", Content::BodyOnly),
+        ("alpha136.json", "AlphaPose, 136 points", Content::All),
+        ("wholebody.json", "COCO-WholeBody, 17 points", Content::NoScores),
+        ("mediapipe.npz", "MediaPipe, pose and hands", Content::BodyScores),
+        ("NoFace.npy", "MediaPipe, pose and hands", Content::NoScores),
+        ("PoseFirst.npy", "MediaPipe, pose and hands", Content::NoScores),
+        ("FaceFirst.npy", "MediaPipe, pose and hands", Content::NoScores),
+        ("Flat.npy", "MediaPipe, pose and hands", Content::BodyScores),
     ] {
         let found = read(&at(name)).unwrap();
         assert_eq!((found.format.as_str(), found.notes.len()), (format, 0), "{name}: {:?}", found.notes);
-        let taken = taken(found);
-        compare(name, &taken.keypoints, &sample, holds);
-        assert_eq!((taken.notes.len(), taken.extras.n_people[3], taken.keypoints.image_size), (0, 1, SIZE), "{name}");
+        let converted = converted(found);
+        compare(name, &converted.keypoints, &sample, content);
+        assert_eq!(
+            (converted.notes.len(), converted.extras.n_people[3], converted.keypoints.image_size),
+            (0, 1, SIZE),
+            "{name}"
+        );
     }
-    let says = |name: &str| read(&at(name)).map(|found| (found.fps, found.image_size)).unwrap();
-    assert_eq!(says("mediapipe.npz"), (Some(RATE), Some(SIZE)));
-    assert_eq!((says("wholebody.json"), says("body25")), ((None, Some(SIZE)), (None, None)));
+    let header = |name: &str| read(&at(name)).map(|found| (found.fps, found.image_size)).unwrap();
+    assert_eq!(header("mediapipe.npz"), (Some(RATE), Some(SIZE)));
+    assert_eq!((header("wholebody.json"), header("body25")), ((None, Some(SIZE)), (None, None)));
 }
 
 #[test]
-fn pats_is_read_in_pixels_and_about_the_neck() {
+fn pats_is_read_in_pixels_and_relative_to_the_neck() {
     let dir = tempfile::tempdir().unwrap();
     let sample = foreign::sample(5, RATE);
     let path = dir.path().join("pats.npz");
     foreign::pats(&path, &sample, false);
     let found = read(&path).unwrap();
     assert_eq!((found.unit, found.fps), (CoordinateUnit::Pixels, Some(RATE)));
-    let pixels = taken(found).keypoints;
-    same("body", &pixels.body, &sample.body, None, &NOT_IN_PATS);
-    same("left hand", &pixels.left_hand, &sample.left_hand, None, &[]);
-    same("right hand", &pixels.right_hand, &sample.right_hand, None, &[]);
+    let pixels = converted(found).keypoints;
+    assert_close("body", &pixels.body, &sample.body, None, &NOT_IN_PATS);
+    assert_close("left hand", &pixels.left_hand, &sample.left_hand, None, &[]);
+    assert_close("right hand", &pixels.right_hand, &sample.right_hand, None, &[]);
     foreign::pats(&path, &sample, true);
     let found = read(&path).unwrap();
     assert_eq!(found.unit, CoordinateUnit::FromNeck);
-    let body = taken(found).keypoints.body;
+    let body = converted(found).keypoints.body;
     let to = |body: &Array3<f32>, a: usize, b: usize| [0, 1].map(|k| body[[2, b, k]] - body[[2, a, k]]);
-    let (moved, was) = (to(&body, 5, 9), to(&sample.body, 5, 9));
-    assert!((moved[0] - was[0]).abs() < 1e-3 && (moved[1] - was[1]).abs() < 1e-3);
+    let (moved, original) = (to(&body, 5, 9), to(&sample.body, 5, 9));
+    assert!((moved[0] - original[0]).abs() < 1e-3 && (moved[1] - original[1]).abs() < 1e-3);
     let neck = (body[[2, 5, 0]] + body[[2, 6, 0]]) / 2.0;
     assert!((neck - 320.0).abs() < 1e-3, "{neck}");
 }
 
 #[test]
-fn our_own_keypoints_are_one_more_format() {
+fn the_programs_own_keypoints_can_be_read_back() {
     let dir = tempfile::tempdir().unwrap();
-    let path = dir.path().join("ours.npz");
-    let first = taken(sample_found(dir.path()));
+    let path = dir.path().join("own.npz");
+    let first = converted(sample_found(dir.path()));
     keypoints_npz::write(&path, &first.keypoints, &first.extras).unwrap();
     let found = read(&path).unwrap();
     assert_eq!((found.fps, found.image_size, found.notes.len()), (Some(RATE), Some(SIZE), 0));
-    assert_eq!(taken(found).keypoints, first.keypoints);
+    assert_eq!(converted(found).keypoints, first.keypoints);
 }
 
 fn sample_found(dir: &Path) -> FoundKeypoints {
@@ -141,18 +145,18 @@ fn sample_found(dir: &Path) -> FoundKeypoints {
 }
 
 #[test]
-fn known_motion_stays_known_at_another_rate() {
+fn known_motion_is_preserved_at_another_rate() {
     let dir = tempfile::tempdir().unwrap();
     for (num, den) in [(30, 1), (25, 1), (30_000, 1001), (25, 2), (15, 1), (60, 1)] {
         let source = FrameRate::new(num, den);
         let n_frames = 4 * num as usize / den as usize;
         let folder = dir.path().join(format!("at{num}of{den}"));
         foreign::openpose(&folder, &foreign::sample(n_frames, source), OpenPoseOrder::Body25);
-        let taken = convert(read(&folder).unwrap(), source, SIZE, RATE).unwrap();
-        let keypoints = &taken.keypoints;
+        let converted = convert(read(&folder).unwrap(), source, SIZE, RATE).unwrap();
+        let keypoints = &converted.keypoints;
         assert_eq!(keypoints.n_frames(), RATE.frames_in(source.secs(n_frames)), "{source}");
-        assert!((taken.duration_secs - source.secs(n_frames)).abs() < 1e-9);
-        // The last frame may stand behind the source's last.
+        assert!((converted.duration_secs - source.secs(n_frames)).abs() < 1e-9);
+        // The last frame may lie after the last frame of the source.
         for t in 0..keypoints.n_frames() - 1 {
             let moved = (RATE.secs(t) * source.per_sec()) as f32;
             for array in [&keypoints.body, &keypoints.right_hand] {
@@ -165,7 +169,7 @@ fn known_motion_stays_known_at_another_rate() {
 }
 
 #[test]
-fn of_several_people_the_large_one_is_followed_and_the_others_are_counted() {
+fn the_largest_of_several_persons_is_tracked_and_the_others_counted() {
     let dir = tempfile::tempdir().unwrap();
     let sample = foreign::sample(30, RATE);
     let mut guest = sample.clone();
@@ -176,17 +180,20 @@ fn of_several_people_the_large_one_is_followed_and_the_others_are_counted() {
     }
     let folder = dir.path().join("two");
     foreign::openpose_folder(&folder, 30, |t| {
-        let mut people = vec![
+        let mut persons = vec![
             foreign::openpose_person(&sample, t, OpenPoseOrder::Body25),
             foreign::openpose_person(&guest, t, OpenPoseOrder::Body25),
         ];
-        people.rotate_left(t % 2);
-        people.truncate(if (20..22).contains(&t) { 1 + t % 2 } else { 2 });
-        people
+        persons.rotate_left(t % 2);
+        persons.truncate(if (20..22).contains(&t) { 1 + t % 2 } else { 2 });
+        persons
     });
-    let taken = taken(read(&folder).unwrap());
-    compare("two people", &taken.keypoints, &sample, Holds::All);
-    assert_eq!(taken.notes, ["up to 2 persons in a frame (several in 97 % of the frames); one of them is followed"]);
-    assert!(taken.extras.identity.iter().all(|number| *number == 0));
-    assert_eq!((taken.extras.n_people[0], taken.extras.n_people[20]), (2, 1));
+    let converted = converted(read(&folder).unwrap());
+    compare("two persons", &converted.keypoints, &sample, Content::All);
+    assert_eq!(
+        converted.notes,
+        ["up to 2 persons in a frame (several in 97 % of the frames); one of them is followed"]
+    );
+    assert!(converted.extras.identity.iter().all(|number| *number == 0));
+    assert_eq!((converted.extras.n_people[0], converted.extras.n_people[20]), (2, 1));
 }

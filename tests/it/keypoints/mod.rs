@@ -1,5 +1,5 @@
-//! Keypoints of other programs: their formats, what is wrong with them, their road to a dataset.
+//! Keypoints of other programs: their formats, error messages, and the dataset made from them.
 
 pub(crate) mod bad_input;
+pub(crate) mod dataset_from_keypoints;
 pub(crate) mod formats;
-pub(crate) mod road;

@@ -1,4 +1,4 @@
-//! Lifting against known truth: bodies and hands made by rule, filmed, lifted with the built-in weights.
+//! Lifting with the built-in weights against ground truth: projections of procedurally generated bodies and hands.
 
 use crate::fixtures::keypoints::{POINTS, keypoints, lifter};
 use ndarray::{Array3, s};
@@ -29,49 +29,49 @@ use std::process::{Command, Output};
 
 /// Mean distance of shoulders, elbows and wrists in mm, both scaled to the reference size.
 fn error_mm(motion: &Motion, truth: &[Pose]) -> f64 {
-    let grow = metres_per_unit(truth);
+    let scale = metres_per_unit(truth);
     let (mut sum, mut n) = (0.0, 0);
     for (t, pose) in truth.iter().enumerate() {
         for (point, _, joint) in POINTS {
             let Some(joint) = joint else { continue };
-            let square = |k: usize| (f64::from(motion.joints[[t, joint, k]]) - grow * pose[point][k]).powi(2);
-            let apart = (0..3).map(square).sum::<f64>().sqrt();
-            if apart.is_finite() {
-                sum += 1000.0 * apart;
+            let square = |k: usize| (f64::from(motion.joints[[t, joint, k]]) - scale * pose[point][k]).powi(2);
+            let distance = (0..3).map(square).sum::<f64>().sqrt();
+            if distance.is_finite() {
+                sum += 1000.0 * distance;
                 n += 1;
             }
         }
     }
-    assert!(n > truth.len() * 3, "most joints are told");
+    assert!(n > truth.len() * 3, "most joints are finite");
     sum / f64::from(u32::try_from(n).unwrap())
 }
 
 #[test]
-fn known_motion_is_found_again() {
+fn lifting_recovers_known_motion() {
     let mut rng = ChaCha8Rng::seed_from_u64(77);
     let lifter = lifter();
-    let (mut sum, mut mean_sum, n) = (0.0, 0.0, 20);
+    let (mut sum, mut constant_sum, n) = (0.0, 0.0, 20);
     for _ in 0..n {
         let scene = FilmedScene::from_rule(Filming::Drop, 90, &mut rng);
         let motion = lifter.lift(&keypoints(&scene, &mut rng)).unwrap();
         sum += error_mm(&motion, &scene.truth);
-        // a constant pose for comparison: the truth's first frame, better than any mean of strangers
+        // Baseline: the true pose of the first frame, held constant; better than a mean pose of other speakers.
         let mut constant = motion.clone();
-        let grow = metres_per_unit(&scene.truth);
+        let scale = metres_per_unit(&scene.truth);
         for (point, _, joint) in POINTS {
             let Some(joint) = joint else { continue };
-            let place = scene.truth[0][point].map(|v| (v * grow) as f32);
-            constant.joints.slice_mut(s![.., joint, ..]).assign(&ndarray::arr1(&place));
+            let position = scene.truth[0][point].map(|v| (v * scale) as f32);
+            constant.joints.slice_mut(s![.., joint, ..]).assign(&ndarray::arr1(&position));
         }
-        mean_sum += error_mm(&constant, &scene.truth);
+        constant_sum += error_mm(&constant, &scene.truth);
     }
-    let (error, constant) = (sum / f64::from(n), mean_sum / f64::from(n));
-    eprintln!("lifted {error:.0} mm, standing still as at first {constant:.0} mm");
+    let (error, constant) = (sum / f64::from(n), constant_sum / f64::from(n));
+    eprintln!("lifted {error:.0} mm, constant first pose {constant:.0} mm");
     assert!(error < 80.0 && error < 0.8 * constant, "{error} {constant}");
 }
 
 #[test]
-fn hands_hang_on_the_wrists_and_bones_keep_their_length() {
+fn hands_are_attached_to_the_wrists_and_bone_lengths_are_constant() {
     let mut rng = ChaCha8Rng::seed_from_u64(5);
     let scene = FilmedScene::from_rule(Filming::Clean, 60, &mut rng);
     let mut keypoints = keypoints(&scene, &mut rng);
@@ -95,7 +95,7 @@ fn hands_hang_on_the_wrists_and_bones_keep_their_length() {
         };
         assert!((0..30).all(|t| (bone(t) - bone(0)).abs() < 1e-5), "{}", skeleton::name(joint));
     }
-    // the shape was upright and open: fingers above the wrist, the thumb of each hand towards the other side
+    // The hands are upright and open: fingers above the wrist, thumbs towards the middle of the body.
     let at = |joint: usize, k: usize| motion.joints[[5, joint, k]];
     for (root, inward) in [(R_HAND, 1.0), (L_HAND, -1.0)] {
         assert!(at(root + 9, 1) < at(root, 1) - 0.04, "the middle knuckle is above the wrist");
@@ -104,7 +104,7 @@ fn hands_hang_on_the_wrists_and_bones_keep_their_length() {
 }
 
 #[test]
-fn intervals_are_lifted_apart_and_outside_is_nothing() {
+fn intervals_are_lifted_separately_and_other_frames_are_missing() {
     let mut rng = ChaCha8Rng::seed_from_u64(6);
     let keypoints = keypoints(&FilmedScene::from_rule(Filming::Training, 80, &mut rng), &mut rng);
     let intervals = [Interval { start: 5, end: 30 }, Interval { start: 40, end: 80 }];
@@ -127,7 +127,7 @@ fn intervals_are_lifted_apart_and_outside_is_nothing() {
 }
 
 #[test]
-fn a_finger_tip_never_seen_is_lifted_all_the_same() {
+fn a_finger_tip_that_is_never_detected_gets_a_plausible_length() {
     let mut rng = ChaCha8Rng::seed_from_u64(5);
     let mut k = keypoints(&FilmedScene::from_rule(Filming::Clean, 40, &mut rng), &mut rng);
     k.left_hand.slice_mut(s![.., 20, 2]).fill(0.0);
@@ -142,7 +142,7 @@ fn a_finger_tip_never_seen_is_lifted_all_the_same() {
     }
 }
 
-/// A talker with swinging arms, 6 s at `fps`.
+/// Keypoints of a speaker with swinging arms, 6 s at `fps`.
 fn swinging(fps: u32) -> Keypoints {
     let n = 6 * fps as usize;
     let mut body = Array3::zeros((n, 17, 3));
@@ -169,27 +169,27 @@ fn swinging(fps: u32) -> Keypoints {
 }
 
 #[test]
-fn the_frame_rate_does_not_change_the_motion() {
+fn motion_does_not_depend_on_the_frame_rate() {
     let lifter = lifter();
     let motion = |fps| lifter.lift(&swinging(fps)).unwrap().joints;
     let expected = motion(15);
     for fps in [10, 20, 30] {
         let joints = motion(fps);
-        // every fifth of a second is a frame at all these rates
-        let apart = |fifth: usize, joint: usize| {
+        // Multiples of 0.2 s are frame times at all these rates.
+        let distance = |fifth: usize, joint: usize| {
             let a = joints.slice(s![fifth * fps as usize / 5, joint, ..]);
             let square = (&a - &expected.slice(s![fifth * 3, joint, ..])).mapv(|v| v * v);
             square.sum().sqrt()
         };
-        let most = (0..30).flat_map(|fifth| (1..7).map(move |joint| (fifth, joint)));
-        let most = most.map(|(fifth, joint)| apart(fifth, joint)).fold(0.0, f32::max);
-        eprintln!("{fps} frames a second: at most {:.1} mm from 15", 1000.0 * most);
-        assert!(most < 0.010, "{fps} frames a second: {most} m");
+        let largest = (0..30).flat_map(|fifth| (1..7).map(move |joint| (fifth, joint)));
+        let largest = largest.map(|(fifth, joint)| distance(fifth, joint)).fold(0.0, f32::max);
+        eprintln!("{fps} fps: at most {:.1} mm from the motion at 15 fps", 1000.0 * largest);
+        assert!(largest < 0.010, "{fps} fps: {largest} m");
     }
 }
 
 #[test]
-fn odd_keypoints_do_no_harm() {
+fn non_finite_and_degenerate_keypoints_give_missing_or_finite_joints() {
     let mut rng = ChaCha8Rng::seed_from_u64(8);
     let mut k = keypoints(&FilmedScene::from_rule(Filming::Clean, 40, &mut rng), &mut rng);
     k.body.slice_mut(s![3..6, .., 0]).fill(f32::NAN);
@@ -200,8 +200,8 @@ fn odd_keypoints_do_no_harm() {
     assert!(motion.joints.slice(s![.., L_HAND + 1.., 0]).iter().take(20).all(|v| v.is_nan()));
     assert!(motion.joints.slice(s![.., ..7, ..]).iter().all(|v| v.is_finite()));
     k.body.slice_mut(s![.., .., 2]).fill(0.0);
-    let nobody = lifter().lift(&k).unwrap();
-    assert!(nobody.joints.iter().all(|v| v.is_nan()) && nobody.mask.iter().all(|m| !m));
+    let no_body = lifter().lift(&k).unwrap();
+    assert!(no_body.joints.iter().all(|v| v.is_nan()) && no_body.mask.iter().all(|m| !m));
     k.body = Array3::zeros((0, 17, 3));
     assert!(lifter().lift(&k).is_err(), "arrays of unequal length");
     (k.left_hand, k.right_hand) = (Array3::zeros((0, 21, 3)), Array3::zeros((0, 21, 3)));
@@ -213,7 +213,7 @@ fn orator(args: &[&Path]) -> Output {
 }
 
 #[test]
-fn the_verb_lifts_a_bare_body_and_says_what_is_wrong() {
+fn the_command_lifts_a_body_without_hands_and_reports_bad_input() {
     let dir = tempfile::tempdir().unwrap();
     let (npz, out) = (dir.path().join("k.npz"), dir.path().join("j.npy"));
     let mut rng = ChaCha8Rng::seed_from_u64(9);
@@ -225,16 +225,16 @@ fn the_verb_lifts_a_bare_body_and_says_what_is_wrong() {
     };
     write("body", &k.body);
     let done = orator(&[&npz, Path::new("--out"), &out]);
-    let said = String::from_utf8_lossy(&done.stdout).into_owned() + &String::from_utf8_lossy(&done.stderr);
-    assert!(done.status.success() && said.contains("40 frames") && said.contains("no `fps`"), "{said}");
+    let text = String::from_utf8_lossy(&done.stdout).into_owned() + &String::from_utf8_lossy(&done.stderr);
+    assert!(done.status.success() && text.contains("40 frames") && text.contains("no `fps`"), "{text}");
     let joints: Array3<f32> = read_npy(&out).unwrap();
     let before = std::fs::read(&out).unwrap();
     assert_eq!(joints.shape(), [40, 49, 3]);
 
-    let fails = |args: &[&Path], says: &str| {
+    let fails = |args: &[&Path], expected: &str| {
         let failed = orator(args);
-        let said = String::from_utf8_lossy(&failed.stderr).into_owned();
-        assert!(failed.status.code() == Some(1) && said.contains(says), "{said}");
+        let text = String::from_utf8_lossy(&failed.stderr).into_owned();
+        assert!(failed.status.code() == Some(1) && text.contains(expected), "{text}");
     };
     let to = Path::new("--out");
     fails(&[&npz, to, &dir.path().join("j.bvh")], ".npy");
@@ -247,11 +247,11 @@ fn the_verb_lifts_a_bare_body_and_says_what_is_wrong() {
     fails(&[&npz, to, &out], "no frames");
     std::fs::write(&npz, b"no zip").unwrap();
     fails(&[&npz, to, &out], "k.npz");
-    assert_eq!(std::fs::read(&out).unwrap(), before, "what was there stays");
+    assert_eq!(std::fs::read(&out).unwrap(), before, "the existing output is unchanged");
 }
 
 #[test]
-fn the_stage_writes_joints_and_bones() {
+fn the_stage_writes_joints_bones_and_ledger() {
     let dir = tempfile::tempdir().unwrap();
     let unit = Unit { speaker: "host".into(), video: "clip-00000000".into(), source: "clip.mp4".into() };
     let mut rng = ChaCha8Rng::seed_from_u64(12);
@@ -279,8 +279,8 @@ fn the_stage_writes_joints_and_bones() {
     keypoints_npz::write(&pose2d.join("keypoints.npz"), &keypoints, &extras).unwrap();
     let intervals = |n_frames| Intervals::new(keypoints.fps, n_frames, vec![Interval { start: 2, end: 68 }]);
     std::fs::write(segment.join("intervals.json"), serde_json::to_vec(&intervals(70)).unwrap()).unwrap();
-    let kept = Kept { start_secs: 0.0, end_secs: 4.4 };
-    let ledger = Ledger { duration_secs: 4.4, kept: vec![kept], ..Ledger::default() };
+    let accepted = Kept { start_secs: 0.0, end_secs: 4.4 };
+    let ledger = Ledger { duration_secs: 4.4, kept: vec![accepted], ..Ledger::default() };
     std::fs::write(segment.join("ledger.json"), serde_json::to_vec(&ledger).unwrap()).unwrap();
 
     let stage = LiftStage::new(&config::LiftConfig::default(), &config::SegmentConfig::default(), dir.path()).unwrap();
@@ -298,9 +298,9 @@ fn the_stage_writes_joints_and_bones() {
         serde_json::from_slice(&std::fs::read(dir.path().join("bones.json")).unwrap()).unwrap();
     let lengths: Vec<f64> = serde_json::from_value(bones["lengths_metres"].clone()).unwrap();
     assert_eq!((lengths.len(), bones["n_frames"].as_u64()), (48, Some(66)));
-    assert!((lengths[0] * 2.0 + lengths[1] + lengths[2] - 0.90).abs() < 1e-3, "the reference size");
+    assert!((lengths[0] * 2.0 + lengths[1] + lengths[2] - 0.90).abs() < 1e-3, "the reference body size");
     let phalanx = lengths[skeleton::L_HAND + 9] / lengths[2];
-    assert!((0.15..0.25).contains(&phalanx), "a phalanx a fifth of the forearm: {phalanx}");
+    assert!((0.15..0.25).contains(&phalanx), "a phalanx is about a fifth of the forearm: {phalanx}");
 
     std::fs::write(segment.join("intervals.json"), serde_json::to_vec(&intervals(71)).unwrap()).unwrap();
     let text = format!("{:#}", stage.run(&unit, dir.path(), &Silent).unwrap_err());
@@ -308,14 +308,14 @@ fn the_stage_writes_joints_and_bones() {
 }
 
 #[test]
-fn the_captured_gestures_face_forward_upright() {
+fn captured_gestures_are_upright_and_face_forward() {
     let Some(file) = real_data("data/mocap/cmu_gestures_joints38_mm.npz") else { return };
     let takes = upper_body::read_all(&[file]).unwrap();
     let (mut upright, mut ahead, mut n) = (0, 0, 0);
     for pose in takes.iter().flat_map(|take| take.poses.iter().step_by(60)) {
         n += 1;
         upright += usize::from(pose[NOSE][1] < 0.0 && pose[R_HIP][1] > 0.2);
-        // the face lies before the line of the shoulders, seen from above
+        // Seen from above, the nose is in front of the line of the shoulders.
         let [x, _, z] = [0, 1, 2].map(|k| pose[L_SHOULDER][k] - pose[R_SHOULDER][k]);
         ahead += usize::from(pose[NOSE][0] * z - pose[NOSE][2] * x > 0.0);
     }

@@ -1,4 +1,4 @@
-//! What comes out of lifting: bones of exactly one length, hands that come and go, motion that does not flicker.
+//! Properties of lifted joints: constant bone lengths, gaps in the hands, motion without jitter.
 
 use crate::fixtures::keypoints::{keypoints, lifter};
 use ndarray::{Array3, s};
@@ -13,8 +13,8 @@ use orator_lab::train::scene::hand_shape;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
-/// Standard deviation of a bone over its mean, of what is there in frames `frames`.
-fn spread(motion: &Motion, joint: usize, frames: std::ops::Range<usize>) -> f64 {
+/// Standard deviation of a bone's length divided by its mean, over those of `frames` that have it.
+fn relative_spread(motion: &Motion, joint: usize, frames: std::ops::Range<usize>) -> f64 {
     let parent = skeleton::parent(joint).unwrap();
     let at = |t: usize, j: usize, k: usize| f64::from(motion.joints[[t, j, k]]);
     let length = |t: usize| (0..3).map(|k| (at(t, joint, k) - at(t, parent, k)).powi(2)).sum::<f64>().sqrt();
@@ -24,7 +24,7 @@ fn spread(motion: &Motion, joint: usize, frames: std::ops::Range<usize>) -> f64 
     (lengths.iter().map(|l| (l - mean).powi(2)).sum::<f64>() / n).sqrt() / mean
 }
 
-/// Hands that open and close at the wrists of the scene, with noise.
+/// Replaces the hands by ones that open and close at the wrists of the scene, with noise.
 fn with_moving_hands(keypoints: &mut Keypoints, rng: &mut ChaCha8Rng) {
     let (open, closed) = (hand_shape::sample_shape(rng), hand_shape::sample_shape(rng));
     let mut noise = || 0.5 * hand_shape::normal(rng) as f32;
@@ -42,7 +42,7 @@ fn with_moving_hands(keypoints: &mut Keypoints, rng: &mut ChaCha8Rng) {
 }
 
 #[test]
-fn every_bone_has_one_length_to_the_last_digit() {
+fn every_bone_has_a_constant_length_within_rounding() {
     let mut rng = ChaCha8Rng::seed_from_u64(31);
     let lifter = lifter();
     let mut worst = 0.0f64;
@@ -53,13 +53,13 @@ fn every_bone_has_one_length_to_the_last_digit() {
         let lifted = lifter.lift_intervals(&keypoints, &intervals).unwrap();
         for (t, frame) in lifted.motion.joints.outer_iter().enumerate() {
             for (root, wrist) in [(L_HAND, skeleton::L_WRIST), (R_HAND, skeleton::R_WRIST)] {
-                let same = (0..3).all(|k| frame[[root, k]].to_bits() == frame[[wrist, k]].to_bits());
-                assert!(same, "frame {t}: the hand begins at the wrist");
+                let is_equal = (0..3).all(|k| frame[[root, k]].to_bits() == frame[[wrist, k]].to_bits());
+                assert!(is_equal, "frame {t}: the root of the hand is the wrist");
             }
         }
         for joint in (1..N_JOINTS).filter(|j| ![L_HAND, R_HAND].contains(j)) {
-            // the same over both intervals: one set a video
-            worst = worst.max(spread(&lifted.motion, joint, 0..120));
+            // Bone lengths are estimated once per video, so both intervals share them.
+            worst = worst.max(relative_spread(&lifted.motion, joint, 0..120));
         }
     }
     eprintln!("bones vary by at most {:.6} %", 100.0 * worst);
@@ -67,35 +67,35 @@ fn every_bone_has_one_length_to_the_last_digit() {
 }
 
 #[test]
-fn hands_that_go_and_come_back() {
+fn short_gaps_of_a_hand_are_filled_and_long_ones_stay_missing() {
     let mut rng = ChaCha8Rng::seed_from_u64(5);
     let lifter = lifter();
     let mut keypoints = keypoints(&FilmedScene::from_rule(Filming::Clean, 150, &mut rng), &mut rng);
     with_moving_hands(&mut keypoints, &mut rng);
-    let whole = lifter.lift(&keypoints).unwrap();
-    let told = |motion: &Motion, root: usize| -> Vec<bool> {
+    let complete = lifter.lift(&keypoints).unwrap();
+    let present = |motion: &Motion, root: usize| -> Vec<bool> {
         motion.joints.slice(s![.., root + 8, 0]).iter().map(|x| x.is_finite()).collect()
     };
     let hide = |hand: &mut Array3<f32>, frames: std::ops::Range<usize>| hand.slice_mut(s![frames, .., ..]).fill(0.0);
-    // left: gone for half a second, and late by as much; right: gone for three seconds, and late by two
+    // Left hand: two gaps of half a second, one at the start; right hand: gaps of two (at the start) and three seconds.
     hide(&mut keypoints.left_hand, 0..7);
     hide(&mut keypoints.left_hand, 40..48);
     hide(&mut keypoints.right_hand, 0..30);
     hide(&mut keypoints.right_hand, 70..115);
     let motion = lifter.lift(&keypoints).unwrap();
-    assert!(told(&motion, L_HAND).iter().all(|told| *told), "short gaps are filled");
-    for (t, told) in told(&motion, R_HAND).into_iter().enumerate() {
-        assert_eq!(told, !(t < 30 || (70..115).contains(&t)), "frame {t}: long gaps stay open");
+    assert!(present(&motion, L_HAND).iter().all(|present| *present), "short gaps are filled");
+    for (t, present) in present(&motion, R_HAND).into_iter().enumerate() {
+        assert_eq!(present, !(t < 30 || (70..115).contains(&t)), "frame {t}: long gaps stay missing");
     }
     for t in 0..150 {
         assert_eq!(
             motion.mask[[t, L_HAND + 8]],
             !(t < 7 || (40..48).contains(&t)),
-            "frame {t}: what is filled is masked"
+            "frame {t}: filled frames are masked"
         );
         assert_eq!(motion.mask[[t, R_HAND + 8]], !(t < 30 || (70..115).contains(&t)));
     }
-    // where it is seen the hand is what it was, nearly; in the gap it goes on without a jump
+    // The filled gap has no jump: a fingertip moves at most slightly faster than elsewhere.
     let step = |t: usize, motion: &Motion| {
         let square = |k: usize| {
             let from_wrist = |t: usize| motion.joints[[t, L_HAND + 8, k]] - motion.joints[[t, L_HAND, k]];
@@ -104,43 +104,42 @@ fn hands_that_go_and_come_back() {
         (0..3).map(square).sum::<f32>().sqrt()
     };
     let largest = |motion: &Motion, frames: std::ops::Range<usize>| frames.map(|t| step(t, motion)).fold(0.0, f32::max);
-    let (filled, usual) = (largest(&motion, 36..52), largest(&whole, 0..149));
-    assert!(
-        filled <= 1.2 * usual,
-        "a finger tip moves {filled} m in a frame beside the gap, {usual} at most elsewhere"
-    );
+    let (filled, usual) = (largest(&motion, 36..52), largest(&complete, 0..149));
+    assert!(filled <= 1.2 * usual, "a fingertip moves {filled} m per frame around the gap, at most {usual} elsewhere");
 }
 
 #[test]
-fn wrists_move_as_they_did_and_rest_when_they_rest() {
+fn wrist_velocity_is_accurate_and_resting_wrists_do_not_jitter() {
     let mut rng = ChaCha8Rng::seed_from_u64(78);
     let lifter = lifter();
     let (mut error, mut true_speed, mut n) = (0.0, 0.0, 0);
-    let mut still = Vec::new();
+    let mut at_rest = Vec::new();
     for _ in 0..20 {
         let scene = FilmedScene::from_rule(Filming::Training, 60, &mut rng);
         let joints = lifter.lift(&keypoints(&scene, &mut rng)).unwrap().joints;
-        let grow = metres_per_unit(&scene.truth);
+        let scale = metres_per_unit(&scene.truth);
         for (joint, point) in [(skeleton::R_WRIST, R_WRIST), (skeleton::L_WRIST, L_WRIST)] {
-            let truth = |t: usize, k: usize| 1000.0 * grow * scene.truth[t][point][k];
+            let truth = |t: usize, k: usize| 1000.0 * scale * scene.truth[t][point][k];
             let lifted = |t: usize, k: usize| 1000.0 * f64::from(joints[[t, joint, k]]);
             let norm = |v: [f64; 3]| v.iter().map(|v| v * v).sum::<f64>().sqrt();
             for t in 0..59 {
-                let moves = [0, 1, 2].map(|k| truth(t + 1, k) - truth(t, k));
-                let off = norm([0, 1, 2].map(|k| lifted(t + 1, k) - lifted(t, k) - moves[k]));
-                if off.is_finite() {
-                    (error, true_speed, n) = (error + off, true_speed + norm(moves), n + 1);
+                let true_step = [0, 1, 2].map(|k| truth(t + 1, k) - truth(t, k));
+                let step_error = norm([0, 1, 2].map(|k| lifted(t + 1, k) - lifted(t, k) - true_step[k]));
+                if step_error.is_finite() {
+                    (error, true_speed, n) = (error + step_error, true_speed + norm(true_step), n + 1);
                 }
-                if t > 0 && norm(moves) < 5.0 {
-                    still.push(norm([0, 1, 2].map(|k| lifted(t + 1, k) - 2.0 * lifted(t, k) + lifted(t - 1, k))));
+                if t > 0 && norm(true_step) < 5.0 {
+                    at_rest.push(norm([0, 1, 2].map(|k| lifted(t + 1, k) - 2.0 * lifted(t, k) + lifted(t - 1, k))));
                 }
             }
         }
     }
-    still.retain(|v| v.is_finite());
-    still.sort_by(f64::total_cmp);
+    at_rest.retain(|v| v.is_finite());
+    at_rest.sort_by(f64::total_cmp);
     let (error, true_speed) = (error / f64::from(n), true_speed / f64::from(n));
-    let jitter = still[still.len() / 2];
-    eprintln!("wrists: {error:.1} mm a frame off, of {true_speed:.1}; at rest they jump {jitter:.1} mm (median)");
+    let jitter = at_rest[at_rest.len() / 2];
+    eprintln!(
+        "wrists: error {error:.1} mm per frame, mean speed {true_speed:.1}; median jitter at rest {jitter:.1} mm"
+    );
     assert!(error < 24.0 && jitter < 8.0, "{error} {jitter}");
 }

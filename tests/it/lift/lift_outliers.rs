@@ -1,5 +1,5 @@
-//! What lifting refuses after the rules: bones far off their length, joints that stay open; and that ledger and intervals
-//! go with it.
+//! Frames that lifting rejects after segmentation: implausible bone lengths and gaps too long to fill. The ledger and
+//! the intervals are updated accordingly.
 
 use crate::fixtures::footage::{FPS, Footage, good, write};
 use ndarray::s;
@@ -16,7 +16,7 @@ use orator_formats::joints_npz;
 use orator_pipeline::lift::LiftStage;
 use orator_pipeline::segment::SegmentStage;
 
-/// Judged and lifted: intervals, ledger and joints.
+/// Runs `segment` and `lift`; returns intervals, ledger and joints.
 fn lifted(footage: &Footage) -> (Vec<(usize, usize)>, Ledger, Motion) {
     let dir = tempfile::tempdir().unwrap();
     let work = dir.path().join("work");
@@ -35,28 +35,28 @@ fn lifted(footage: &Footage) -> (Vec<(usize, usize)>, Ledger, Motion) {
     let ledger = Ledger::read(&out.join("ledger.json")).unwrap();
     assert_eq!(ledger.kept.len(), intervals.intervals.len());
     let motion = joints_npz::read(&out.join("joints.npz")).unwrap();
-    let kept = |t: usize| intervals.intervals.iter().any(|i| (i.start..i.end).contains(&t));
+    let is_accepted = |t: usize| intervals.intervals.iter().any(|i| (i.start..i.end).contains(&t));
     for (t, joints) in motion.joints.outer_iter().enumerate() {
-        assert!(joints.iter().all(|v| v.is_finite() == kept(t)), "frame {t}");
+        assert!(joints.iter().all(|v| v.is_finite() == is_accepted(t)), "frame {t}");
     }
     (intervals.intervals.iter().map(|i| (i.start, i.end)).collect(), ledger, motion)
 }
 
-/// The left forearm grows far out of the picture, its hand with it.
+/// Stretches the left forearm far beyond its length, and moves its hand along.
 fn stretch_arm(footage: &mut Footage, frames: std::ops::Range<usize>) {
     footage.keypoints.body.slice_mut(s![frames.clone(), coco::L_WRIST, 0]).mapv_inplace(|x| x + 400.0);
     footage.keypoints.left_hand.slice_mut(s![frames, .., 0]).mapv_inplace(|x| x + 400.0);
 }
 
 #[test]
-fn a_good_video_passes_whole() {
+fn a_good_video_is_accepted_completely() {
     let (intervals, ledger, _) = lifted(&good(200));
     assert_eq!(intervals, [(0, 200)]);
     assert!(ledger.refused.is_empty());
 }
 
 #[test]
-fn a_bone_off_its_length_is_refused_and_a_short_slip_is_filled_and_masked() {
+fn implausible_bone_lengths_are_rejected_and_short_errors_filled() {
     let mut footage = good(300);
     stretch_arm(&mut footage, 100..130);
     let (intervals, ledger, _) = lifted(&footage);
@@ -77,9 +77,9 @@ fn a_bone_off_its_length_is_refused_and_a_short_slip_is_filled_and_masked() {
 }
 
 #[test]
-fn gaps_that_add_up_to_more_than_lifting_fills_are_refused() {
+fn adjacent_gaps_longer_than_lifting_fills_are_rejected() {
     let mut footage = good(300);
-    // each let through by itself: the hand's score, then single points
+    // Each gap alone is accepted: first the score of all its points, then single points.
     footage.keypoints.left_hand.slice_mut(s![100..112, .., 2]).fill(0.0);
     footage.keypoints.left_hand.slice_mut(s![112..124, ..12, 2]).fill(0.0);
     let (intervals, ledger, _) = lifted(&footage);

@@ -1,4 +1,4 @@
-//! 2D to 3D.
+//! Lifting of 2D keypoints to 3D joints.
 
 pub(crate) mod lift;
 pub(crate) mod lift_bad_input;

@@ -1,4 +1,4 @@
-//! The extract stage on clips made here and on real ones: its files, its shots, its refusals.
+//! The extract stage on generated and on real clips: output files, shot boundaries, errors.
 
 use crate::fixtures::clips;
 use crate::fixtures::clips::write_numbered;
@@ -38,10 +38,10 @@ fn media(out: &Path) -> serde_json::Value {
 }
 
 #[test]
-fn a_clip_with_sound_gives_all_files_and_the_same_bytes_again() {
+fn a_clip_with_audio_gives_all_files_with_deterministic_bytes() {
     let dir = tempfile::tempdir().unwrap();
-    let sound = clips::tone(44_100, 2.0, 440.0);
-    let video = write_numbered(dir.path(), "in.mp4", 20, FrameRate::new(10, 1), Some(&sound));
+    let audio = clips::tone(44_100, 2.0, 440.0);
+    let video = write_numbered(dir.path(), "in.mp4", 20, FrameRate::new(10, 1), Some(&audio));
     let settings = config::ExtractConfig { keep_frames: true, ..Default::default() };
     let [a, b] = ["a", "b"].map(|name| dir.path().join(name));
     let report = run(&video, &a, &settings).unwrap();
@@ -54,8 +54,8 @@ fn a_clip_with_sound_gives_all_files_and_the_same_bytes_again() {
     assert!((source_secs[2] - 0.1).abs() < 1e-9 && (source_secs[29] - 1.9).abs() < 1e-9);
     let (scores, restarts) = (array::<f64>(&a, "shot_score"), array::<bool>(&a, "restart"));
     assert!(scores.len() == 30 && restarts.len() == 30 && (0..30).all(|t| !restarts[t] || scores[t] > 0.0));
-    let still = array::<f32>(&a, "still");
-    assert!((0..30).all(|t| (still[t] > 0.0) == (t > 0 && !repeated[t])), "{still:?}");
+    let difference = array::<f32>(&a, "still");
+    assert!((0..30).all(|t| (difference[t] > 0.0) == (t > 0 && !repeated[t])), "{difference:?}");
     let media = media(&a);
     assert_eq!(
         (&media["n_frames"], &media["codec"], &media["image_size"]),
@@ -74,7 +74,7 @@ fn a_clip_with_sound_gives_all_files_and_the_same_bytes_again() {
 }
 
 #[test]
-fn one_silent_frame_is_enough() {
+fn one_frame_without_audio_is_enough() {
     let dir = tempfile::tempdir().unwrap();
     let video = write_numbered(dir.path(), "in.mp4", 1, FrameRate::new(30, 1), None);
     let out = dir.path().join("out");
@@ -87,10 +87,10 @@ fn one_silent_frame_is_enough() {
 }
 
 #[test]
-fn a_truncated_video_keeps_what_it_holds_and_says_so() {
+fn a_truncated_video_gives_its_readable_part_and_a_damage_note() {
     let dir = tempfile::tempdir().unwrap();
-    let sound = clips::tone(16_000, 8.0, 440.0);
-    let video = write_numbered(dir.path(), "in.mp4", 240, FrameRate::new(30, 1), Some(&sound));
+    let audio = clips::tone(16_000, 8.0, 440.0);
+    let video = write_numbered(dir.path(), "in.mp4", 240, FrameRate::new(30, 1), Some(&audio));
     let bytes = fs::read(&video).unwrap();
     fs::write(&video, &bytes[..bytes.len() / 2]).unwrap();
     let out = dir.path().join("out");
@@ -98,11 +98,11 @@ fn a_truncated_video_keeps_what_it_holds_and_says_so() {
     let n_frames = media(&out)["n_frames"].as_u64().unwrap();
     assert!((20..110).contains(&n_frames) && report.facts["damage"].is_string(), "{}", report.line);
     let secs = media(&out)["audio_secs"].as_f64().unwrap();
-    assert!((2.0..6.0).contains(&secs), "{secs} s of sound");
+    assert!((2.0..6.0).contains(&secs), "{secs} s of audio");
 }
 
 #[test]
-fn a_file_that_is_no_video_is_an_error_that_names_it() {
+fn a_file_that_is_not_a_video_is_an_error_with_its_name() {
     let dir = tempfile::tempdir().unwrap();
     let video = dir.path().join("words.mp4");
     fs::write(&video, "These are words.").unwrap();
@@ -111,7 +111,7 @@ fn a_file_that_is_no_video_is_an_error_that_names_it() {
 }
 
 #[test]
-fn the_cuts_of_real_clips_are_found_and_no_others() {
+fn exactly_the_cuts_of_real_clips_are_detected() {
     let Some(videos) = real_data("data/videos") else { return };
     let dir = tempfile::tempdir().unwrap();
     let clips = files_under(&videos);
@@ -120,7 +120,7 @@ fn the_cuts_of_real_clips_are_found_and_no_others() {
     for (name, video) in &clips {
         for fps in if name.contains("tyson") { &[15, 10][..] } else { &[15] } {
             let settings = config::ExtractConfig { fps: *fps, ..Default::default() };
-            // 11.60 s and 16.97 s; every other clip is one shot.
+            // This clip has cuts at 11.60 s and 16.97 s; every other clip is one shot.
             let cut_secs: &[f64] = if name.contains("tyson") { &[11.60, 16.97] } else { &[] };
             let out = dir.path().join(format!("{}-{fps}", name.replace('/', "_")));
             run(video, &out, &settings).unwrap();

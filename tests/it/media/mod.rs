@@ -1,9 +1,9 @@
-//! Sound and pictures of a file, in step; shots.
+//! Audio and frames of a media file, their synchronisation, and shots.
 
+pub(crate) mod audio_tracks;
 pub(crate) mod extract;
+pub(crate) mod image_formats;
+pub(crate) mod media_audio;
 pub(crate) mod media_frames;
-pub(crate) mod media_sound;
-pub(crate) mod pictures;
 pub(crate) mod shots;
 pub(crate) mod sync;
-pub(crate) mod tracks;

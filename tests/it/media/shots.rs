@@ -1,5 +1,5 @@
-//! Where shots begin, on films put together here of the synthetic speaker and test pictures: what ends a shot, where,
-//! and what does not.
+//! Shot boundaries in videos composed of the synthetic speaker and test images: transitions that end a shot, their
+//! times, and changes that do not end one.
 
 use crate::fixtures::clips::ffmpeg;
 use ndarray::Array1;
@@ -13,7 +13,7 @@ use orator_test_support::skip::real_data;
 use std::fs::File;
 use std::path::{Path, PathBuf};
 
-/// Frames that begin a shot, at `fps`.
+/// Frames at `fps` that begin a shot.
 fn cuts(video: &Path, fps: u32) -> Vec<usize> {
     let out = video.with_extension(fps.to_string());
     std::fs::create_dir(&out).unwrap();
@@ -26,8 +26,8 @@ fn cuts(video: &Path, fps: u32) -> Vec<usize> {
     (0..scores.len()).filter(|n| scores[*n] >= threshold).collect()
 }
 
-/// A film of `inputs` through a filter graph whose result is `[v]`, in `dir`.
-fn film(dir: &Path, name: &str, inputs: &str, graph: &str) -> PathBuf {
+/// Writes a video of `inputs` through a filter graph with the output `[v]` to `dir`.
+fn write_video(dir: &Path, name: &str, inputs: &str, graph: &str) -> PathBuf {
     let out = dir.join(format!("{name}.mp4"));
     let args = format!(
         "{inputs} -filter_complex {graph} -map [v] -c:v libx264 -preset ultrafast -crf 20 -pix_fmt yuv420p {}",
@@ -37,19 +37,19 @@ fn film(dir: &Path, name: &str, inputs: &str, graph: &str) -> PathBuf {
     out
 }
 
-/// Films of one picture turning into another within `secs`, from 2 s on: by each kind, and at each rate.
-fn transitions(dir: &Path, inputs: &str, kinds: &[(&str, f64)], rates: &[u32]) {
-    let same = "fps=30,scale=320:240,setsar=1,settb=1/30,setpts=PTS-STARTPTS";
+/// Checks videos with a transition of each kind that starts at 2 s and takes `secs`, at each rate.
+fn check_transitions(dir: &Path, inputs: &str, kinds: &[(&str, f64)], rates: &[u32]) {
+    let fmt = "fps=30,scale=320:240,setsar=1,settb=1/30,setpts=PTS-STARTPTS";
     for (kind, secs) in kinds {
         let graph = format!(
-            "[0:v]{same},trim=0:4[a];[1:v]{same},trim=0:3.5[b];[a][b]xfade=transition={kind}:duration={secs}:offset=2[v]"
+            "[0:v]{fmt},trim=0:4[a];[1:v]{fmt},trim=0:3.5[b];[a][b]xfade=transition={kind}:duration={secs}:offset=2[v]"
         );
-        let video = film(dir, &format!("{kind}-{secs}"), inputs, &graph);
+        let video = write_video(dir, &format!("{kind}-{secs}"), inputs, &graph);
         for &fps in rates {
             let found = cuts(&video, fps);
             let [first, last] = [2.0, 2.0 + secs].map(|at| at * f64::from(fps));
             let slack = f64::from(fps) * (0.25 * secs + 0.15);
-            eprintln!("{kind} of {secs} s at {fps}: shots begin at {found:?}, it goes from {first:.0} to {last:.0}");
+            eprintln!("{kind} of {secs} s at {fps}: shots begin at {found:?}, transition {first:.0} to {last:.0}");
             assert!(!found.is_empty(), "{kind} of {secs} s at {fps}");
             let inside = |n: &usize| (first - slack..=last + slack + 1.0).contains(&(*n as f64));
             assert!(found.iter().all(inside), "{kind} of {secs} s at {fps}: {found:?}");
@@ -58,18 +58,18 @@ fn transitions(dir: &Path, inputs: &str, kinds: &[(&str, f64)], rates: &[u32]) {
 }
 
 #[test]
-fn dissolves_wipes_and_fades_end_a_shot_where_they_are() {
+fn dissolves_wipes_and_fades_end_a_shot_at_their_time() {
     let dir = tempfile::tempdir().unwrap();
     let speaker = speaker_clip(dir.path(), 5.0, 3);
     let inputs = format!("-i {} -f lavfi -i testsrc2=size=320x240:rate=30:duration=5", speaker.display());
     let kinds =
         [("fade", 0.4), ("fade", 1.0), ("dissolve", 0.6), ("wipeleft", 0.6), ("circleopen", 0.6), ("fadeblack", 1.0)];
-    transitions(dir.path(), &inputs, &kinds, &[15]);
-    transitions(dir.path(), &inputs, &kinds[1..4], &[10]);
+    check_transitions(dir.path(), &inputs, &kinds, &[15]);
+    check_transitions(dir.path(), &inputs, &kinds[1..4], &[10]);
 }
 
 #[test]
-fn real_pictures_that_turn_into_others_end_a_shot() {
+fn transitions_between_real_clips_end_a_shot() {
     let Some(videos) = real_data("data/videos") else { return };
     let dir = tempfile::tempdir().unwrap();
     let clip = |name: &str, from: f64| format!("-ss {from} -t 5 -i {}", videos.join(name).display());
@@ -80,11 +80,11 @@ fn real_pictures_that_turn_into_others_end_a_shot() {
     for (n, pair) in [[&tyson, &phone], [&phone, &seth], [&seth, &tyson]].into_iter().enumerate() {
         let dir = dir.path().join(n.to_string());
         std::fs::create_dir(&dir).unwrap();
-        transitions(&dir, &format!("{} {}", pair[0], pair[1]), &kinds[n..n + 2], &[15]);
+        check_transitions(&dir, &format!("{} {}", pair[0], pair[1]), &kinds[n..n + 2], &[15]);
     }
 }
 
-/// What a camera and a lamp do without ending a shot.
+/// Camera movements and light changes that do not end a shot.
 const MOVES: [(&str, &str); 9] = [
     ("pan", "scale=1280:960,crop=640:480:x=t*100:y=200,scale=320:240"),
     ("fast-pan", "scale=1280:960,crop=640:480:x=t*200:y=100+t*50,scale=320:240"),
@@ -97,9 +97,9 @@ const MOVES: [(&str, &str); 9] = [
     ("flash", "scale=320:240,eq=brightness=0.9*between(mod(n\\,30)\\,14\\,16):eval=frame"),
 ];
 
-fn moves(dir: &Path, input: &str, rates: &[u32]) {
+fn check_moves(dir: &Path, input: &str, rates: &[u32]) {
     for (name, filter) in MOVES {
-        let video = film(dir, name, input, &format!("[0:v]fps=30,{filter},setsar=1[v]"));
+        let video = write_video(dir, name, input, &format!("[0:v]fps=30,{filter},setsar=1[v]"));
         for &fps in rates {
             let found = cuts(&video, fps);
             assert!(found.is_empty(), "{name} of {input} at {fps}: {found:?}");
@@ -108,17 +108,17 @@ fn moves(dir: &Path, input: &str, rates: &[u32]) {
 }
 
 #[test]
-fn a_camera_that_moves_and_another_light_end_no_shot() {
+fn camera_movements_and_light_changes_do_not_end_a_shot() {
     let dir = tempfile::tempdir().unwrap();
     let speaker = speaker_clip(dir.path(), 3.0, 3);
-    moves(dir.path(), &format!("-i {}", speaker.display()), &[15, 10]);
+    check_moves(dir.path(), &format!("-i {}", speaker.display()), &[15, 10]);
 }
 
 #[test]
-fn real_pictures_that_pan_or_lighten_end_no_shot() {
+fn movements_and_light_changes_of_real_clips_do_not_end_a_shot() {
     let Some(videos) = real_data("data/videos") else { return };
     for name in ["talk_tyson_2cam_17s_720p.mp4", "talk_oliver_wan_3.5s_1080p.mp4", "talk_kim_7s_1080p.mp4"] {
         let dir = tempfile::tempdir().unwrap();
-        moves(dir.path(), &format!("-ss 1 -t 2.4 -i {}", videos.join(name).display()), &[15]);
+        check_moves(dir.path(), &format!("-ss 1 -t 2.4 -i {}", videos.join(name).display()), &[15]);
     }
 }

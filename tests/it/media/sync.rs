@@ -1,9 +1,9 @@
-//! Sound and picture in step, measured in what `extract` writes and on the clock by which shards are cut:
-//! |motion - sound| is at most 1 ms and half a period of the slower of the source's and the dataset's rate.
+//! Audio-video synchronisation of the output of `extract`, on the time axis by which shards are cut: |motion - audio|
+//! is at most 1 ms plus half a frame period of the slower of the source rate and the dataset rate.
 //!
-//! Two measures. A picture's: where the dataset puts it against where its moment is in the sound. An edge's: a flash
-//! goes on (or off) between the last picture without and the first with it, at best knowledge midway; so in the clip,
-//! where its chirp begins, and so in the dataset.
+//! Two errors are measured. For a frame: its time in the dataset against the time of its content in the audio. For the
+//! start or end of a flash: the midpoint between the last frame before and the first frame after it, against the
+//! begin of its chirp.
 
 use crate::fixtures::media::sync_clips::{Clip, Kind, PLAIN, Pace, chirp_begins, make, read_picture};
 use ndarray::Array1;
@@ -18,30 +18,30 @@ use orator_pipeline::extract::ExtractStage;
 use std::fs::{self, File};
 use std::path::Path;
 
-/// What a container may add to the times of pictures and of sound, seconds.
+/// Maximum rounding of frame and audio times by a container, seconds.
 const ROUNDING_SECS: f64 = 0.001;
 
-/// Worst figures of one clip, ms.
+/// Largest errors in one clip, ms.
 #[derive(Debug, Default)]
 struct Worst {
     n_edges: usize,
-    /// |motion - sound| and the bound where it comes nearest to its bound.
-    apart: f64,
+    /// |motion - audio| and its bound, where their ratio is largest.
+    offset: f64,
     bound: f64,
-    /// |time of a picture as extract says - truth|.
-    picture: f64,
+    /// |frame time reported by `extract` - truth|.
+    frame: f64,
     /// |begin of a chirp in audio.wav - truth|.
-    sound: f64,
-    /// Least and greatest begin of a chirp - truth.
-    sound_from: f64,
-    sound_to: f64,
+    audio: f64,
+    /// Smallest and largest value of begin of a chirp - truth.
+    audio_from: f64,
+    audio_to: f64,
 }
 
 impl Worst {
-    fn see(&mut self, apart_secs: f64, slower_secs: f64) {
-        let (apart, bound) = (1e3 * apart_secs.abs(), 1.0 + 500.0 * slower_secs);
-        if apart / bound > self.apart / self.bound.max(1e-9) {
-            (self.apart, self.bound) = (apart, bound);
+    fn update(&mut self, offset_secs: f64, slower_secs: f64) {
+        let (offset, bound) = (1e3 * offset_secs.abs(), 1.0 + 500.0 * slower_secs);
+        if offset / bound > self.offset / self.bound.max(1e-9) {
+            (self.offset, self.bound) = (offset, bound);
         }
     }
 }
@@ -64,20 +64,20 @@ fn measure(dir: &Path, kind: &Kind, clip: &Clip, fps: u32) -> Worst {
     compare(clip, rate, &shown, source_secs.as_slice().unwrap(), &samples)
 }
 
-/// `shown`: number and brightness of the picture of each dataset frame; `source_secs`: its time as extract says.
+/// `shown`: source number and brightness of each dataset frame; `source_secs`: its time reported by `extract`.
 fn compare(clip: &Clip, rate: FrameRate, shown: &[(usize, bool)], source_secs: &[f64], samples: &[f32]) -> Worst {
-    // The clock of the dataset begins at its first picture.
+    // Dataset time is 0 at the first frame.
     let zero = clip.pictures[shown[0].0];
     let dataset_secs = rate.secs(1);
-    // Where frame n begins in the sound, as shards are cut.
+    // Begin of frame n in the audio, as in a shard.
     let begins = |n: usize| sample_at(rate, SAMPLE_RATE, n) as f64 / f64::from(SAMPLE_RATE);
     let gap = |k: usize| clip.pictures[k] - clip.pictures[k - 1];
-    let mut worst = Worst { sound_from: f64::MAX, sound_to: f64::MIN, ..Worst::default() };
-    let whole = |on: f64, off: f64| on - zero > 0.1 && off - zero < begins(shown.len() - 1) - 0.1;
-    for flash in clip.flashes.iter().filter(|flash| whole(flash.on_secs, flash.off_secs)) {
+    let mut worst = Worst { audio_from: f64::MAX, audio_to: f64::MIN, ..Worst::default() };
+    let is_complete = |on: f64, off: f64| on - zero > 0.1 && off - zero < begins(shown.len() - 1) - 0.1;
+    for flash in clip.flashes.iter().filter(|flash| is_complete(flash.on_secs, flash.off_secs)) {
         let late = chirp_begins(samples, SAMPLE_RATE, flash.on_secs - zero) - (flash.on_secs - zero);
-        worst.sound = worst.sound.max(1e3 * late.abs());
-        (worst.sound_from, worst.sound_to) = (worst.sound_from.min(1e3 * late), worst.sound_to.max(1e3 * late));
+        worst.audio = worst.audio.max(1e3 * late.abs());
+        (worst.audio_from, worst.audio_to) = (worst.audio_from.min(1e3 * late), worst.audio_to.max(1e3 * late));
         let first = shown.iter().position(|(number, _)| *number >= flash.first).unwrap();
         let end = shown.iter().position(|(number, _)| *number >= flash.end).unwrap();
         assert!(
@@ -88,10 +88,10 @@ fn compare(clip: &Clip, rate: FrameRate, shown: &[(usize, bool)], source_secs: &
         );
         for (n, k, at) in [(first, flash.first, flash.on_secs), (end, flash.end, flash.off_secs)] {
             let motion = (begins(n - 1) + begins(n)) / 2.0;
-            worst.see(motion - (at - zero + late), dataset_secs.max(gap(k)));
+            worst.update(motion - (at - zero + late), dataset_secs.max(gap(k)));
             worst.n_edges += 1;
         }
-        // Pictures from a second before to a second after.
+        // Frames from a second before the flash to a second after it.
         let around = first.saturating_sub(rate.num as usize)..(end + rate.num as usize).min(shown.len());
         for n in around {
             let k = shown[n].0;
@@ -99,31 +99,31 @@ fn compare(clip: &Clip, rate: FrameRate, shown: &[(usize, bool)], source_secs: &
                 continue;
             }
             let truth = clip.pictures[k] - zero;
-            worst.picture = worst.picture.max(1e3 * (source_secs[n] - truth).abs());
-            worst.see(begins(n) - (truth + late), dataset_secs.max(gap(k)).max(gap(k + 1)));
+            worst.frame = worst.frame.max(1e3 * (source_secs[n] - truth).abs());
+            worst.update(begins(n) - (truth + late), dataset_secs.max(gap(k)).max(gap(k + 1)));
         }
     }
     worst
 }
 
-/// Makes and measures clips, each at its dataset rate; prints a line each and holds them to the bounds.
-fn in_step(kinds: &[(Kind, u32)]) {
+/// Writes and measures each clip at its dataset rate, prints its errors and checks their bounds.
+fn check_sync(kinds: &[(Kind, u32)]) {
     let dir = tempfile::tempdir().unwrap();
-    let mut wrong = Vec::new();
+    let mut failed = Vec::new();
     for (kind, fps) in kinds {
         let Some(clip) = make(dir.path(), kind) else { continue };
         let worst = measure(dir.path(), kind, &clip, *fps);
         eprintln!(
-            "{:24} -> {fps} fps: {:3} edges, |motion - sound| {:6.3} ms of {:6.3}; picture {:.3} ms, sound {:+.3} to {:+.3} ms",
-            kind.name, worst.n_edges, worst.apart, worst.bound, worst.picture, worst.sound_from, worst.sound_to
+            "{:24} -> {fps} fps: {:3} edges, |motion - audio| {:6.3} ms of {:6.3}; frame {:.3} ms, audio {:+.3} to {:+.3} ms",
+            kind.name, worst.n_edges, worst.offset, worst.bound, worst.frame, worst.audio_from, worst.audio_to
         );
         let rounding_ms = 1e3 * (ROUNDING_SECS + kind.jitter_secs);
         let enough = worst.n_edges >= 2 * (kind.secs / 2.37) as usize - 6;
-        if !enough || worst.apart > worst.bound || worst.picture > rounding_ms || worst.sound > rounding_ms {
-            wrong.push((kind.name, worst));
+        if !enough || worst.offset > worst.bound || worst.frame > rounding_ms || worst.audio > rounding_ms {
+            failed.push((kind.name, worst));
         }
     }
-    assert!(wrong.is_empty(), "{wrong:#?}");
+    assert!(failed.is_empty(), "{failed:#?}");
 }
 
 const fn at(num: u32, den: u32) -> Pace {
@@ -134,12 +134,12 @@ const X264_B: &str = "-c:v libx264 -preset faster -crf 20 -g 50 -bf 3";
 const X265: &str = "-c:v libx265 -preset ultrafast -crf 20 -x265-params log-level=none:bframes=3";
 
 const VP9: &str = "-c:v libvpx-vp9 -deadline realtime -cpu-used 8 -b:v 1M";
-/// ffmpeg's webm writer does not add the pre-skip of Opus that every reader must take away (CodecDelay in Matroska).
+/// ffmpeg's WebM muxer does not compensate the pre-skip of Opus, which every reader removes (CodecDelay in Matroska).
 const WEBM_EARLY_SECS: f64 = -312.0 / 48_000.0;
 
 #[test]
-fn constant_rates_slow_and_fast() {
-    in_step(&[
+fn constant_rates_are_synchronised() {
+    check_sync(&[
         (Kind { name: "25.mp4", pace: at(25, 1), ..PLAIN }, 15),
         (Kind { name: "30.mp4", ..PLAIN }, 15),
         (Kind { name: "29.97.mp4", pace: at(30_000, 1_001), sound_rate: 44_100, ..PLAIN }, 15),
@@ -150,9 +150,9 @@ fn constant_rates_slow_and_fast() {
 }
 
 #[test]
-fn variable_rates() {
+fn variable_rates_are_synchronised() {
     let variable = Kind { pace: Pace::Variable, secs: 40.0, ..PLAIN };
-    in_step(&[
+    check_sync(&[
         (Kind { name: "variable.mp4", ..variable }, 15),
         (Kind { name: "variable.mkv", ..variable }, 15),
         (Kind { name: "variable_b.mp4", video: X264_B, ..variable }, 25),
@@ -161,10 +161,10 @@ fn variable_rates() {
 }
 
 #[test]
-fn codecs_and_containers() {
+fn all_codecs_and_containers_are_synchronised() {
     let hevc = Kind { video: X265, ..PLAIN };
     let b = Kind { video: X264_B, sound_rate: 44_100, ..PLAIN };
-    in_step(&[
+    check_sync(&[
         (Kind { name: "hevc.mp4", ..hevc }, 15),
         (Kind { name: "hevc.mkv", ..hevc }, 15),
         (Kind { name: "hevc.mov", sound: "-c:a pcm_s16le", sound_rate: 44_100, ..hevc }, 15),
@@ -182,12 +182,12 @@ fn codecs_and_containers() {
 }
 
 #[test]
-fn offsets_and_edit_lists() {
+fn offsets_and_edit_lists_are_synchronised() {
     let b = Kind { video: X264_B, ..PLAIN };
     let late = Kind { before: ["", "-itsoffset 0.1"], sound_at: 0.1, ..PLAIN };
     let early = Kind { before: ["-itsoffset 0.3", ""], sound_at: -0.3, ..b };
     let cut = Kind { then: ["-ss 3.21", "-c copy"], ..b };
-    in_step(&[
+    check_sync(&[
         (Kind { name: "begins_at_3.5_s.mp4", container: "-output_ts_offset 3.5", ..PLAIN }, 15),
         (Kind { name: "begins_at_3.5_s.mkv", container: "-output_ts_offset 3.5", ..PLAIN }, 15),
         (Kind { name: "begins_at_1.4_s.ts", container: "-muxdelay 1.4", ..b }, 15),
@@ -205,7 +205,7 @@ fn offsets_and_edit_lists() {
 }
 
 #[test]
-fn gaps_and_clocks_that_run_apart() {
+fn audio_gaps_drift_and_jitter_are_compensated() {
     let lossy = Kind { then: ["", "-c copy -bsf:a noise=amount=-1:drop=eq(mod(n\\,113)\\,60)"], secs: 40.0, ..PLAIN };
     let pcm = Kind {
         sound: "-c:a pcm_s16le -af asetpts=PTS*1.0005",
@@ -216,7 +216,7 @@ fn gaps_and_clocks_that_run_apart() {
     };
     let fast = Kind { sound: "-c:a flac -af asetpts=PTS*0.9999", sound_pace: 0.9999, sound_rate: 44_100, ..pcm };
     let jitter = "-c:a pcm_s16le -af asetpts=PTS+(random(0)-0.5)*0.01/TB";
-    in_step(&[
+    check_sync(&[
         (Kind { name: "lost_packets.mp4", ..lossy }, 15),
         (Kind { name: "lost_packets.mkv", ..lossy }, 15),
         (Kind { name: "sound_500_ppm_slow.mkv", ..pcm }, 15),
@@ -226,9 +226,9 @@ fn gaps_and_clocks_that_run_apart() {
 }
 
 #[test]
-fn sound_rates() {
+fn all_audio_rates_are_synchronised() {
     let pcm = Kind { sound: "-c:a pcm_s16le", ..PLAIN };
-    in_step(&[
+    check_sync(&[
         (Kind { name: "8000.mov", sound_rate: 8_000, ..pcm }, 15),
         (Kind { name: "16000.mov", sound_rate: 16_000, ..pcm }, 15),
         (Kind { name: "22050.mov", sound_rate: 22_050, ..pcm }, 15),
@@ -238,12 +238,12 @@ fn sound_rates() {
     ]);
 }
 
-/// `ORATOR_LONG=1` (`make prove`): ten minutes; otherwise a short twin.
+/// `ORATOR_LONG=1` (`make prove`) tests ten minutes, otherwise 40 s.
 #[test]
 fn no_drift_over_ten_minutes() {
     let secs = if std::env::var("ORATOR_LONG").is_ok() { 600.0 } else { 40.0 };
     let long = Kind { secs, ..PLAIN };
-    in_step(&[
+    check_sync(&[
         (Kind { name: "long_29.97.mp4", pace: at(30_000, 1_001), sound_rate: 44_100, ..long }, 15),
         (Kind { name: "long_variable.mkv", pace: Pace::Variable, ..long }, 15),
     ]);

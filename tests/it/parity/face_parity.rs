@@ -1,5 +1,5 @@
-//! The face model, converted by the program, gives what TFLite's own interpreter gives on the published file
-//! (`fixtures/reference/face_reference.py`): points within 0.001 px of the 192 px input.
+//! The face model, converted by the program, gives the output of the TFLite interpreter on the published file
+//! (`fixtures/reference/face_reference.py`): landmarks within 0.001 px at an input size of 192 px.
 
 use crate::fixtures::onnx_models::models;
 
@@ -17,7 +17,7 @@ struct FaceValues {
     points: Vec<[f32; 3]>,
 }
 
-/// Grey level at a place of the smooth picture.
+/// Grey level of the smooth test image at a position.
 fn smooth(x: f64, y: f64) -> f64 {
     let spot = |cx: f64, cy: f64, rx: f64, ry: f64| (-((x - cx) / rx).powi(2) - ((y - cy) / ry).powi(2)).exp();
     let eyes = spot(70.0, 80.0, 9.0, 6.0) + spot(122.0, 80.0, 9.0, 6.0);
@@ -37,7 +37,7 @@ fn the_face_model_agrees_with_tflite() {
             *value = byte / 255.0;
         }
         let sum: f64 = model.input_mut().iter().map(|value| f64::from(*value)).sum();
-        assert!((sum - values.input_sum).abs() < 0.02, "the picture is another one: {sum}, {}", values.input_sum);
+        assert!((sum - values.input_sum).abs() < 0.02, "another input image: {sum}, {}", values.input_sum);
         let outputs = model.run().unwrap();
         let (points, score) = (outputs.floats("landmarks").unwrap().1, outputs.floats("face_score_logit").unwrap().1);
         assert!((score[0] - values.score_logit).abs() < 1e-3, "{} {}", score[0], values.score_logit);

@@ -1,5 +1,5 @@
-//! The heat-map hand lifter gives what the same networks in PyTorch give (`fixtures/reference/heatmap_reference.py`),
-//! weights and input being filled by one formula on both sides.
+//! The heat-map hand lifter agrees with the same network in PyTorch (`fixtures/reference/heatmap_reference.py`). Both
+//! sides compute weights and input from the same formula.
 
 use crate::fixtures::networks::fill;
 use candle_core::{DType, Device, Tensor};

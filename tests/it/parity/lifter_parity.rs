@@ -1,6 +1,6 @@
-//! The lifters give what the same networks in PyTorch give (`fixtures/reference/lifter_reference.py`), the temporal network
-//! (there in both its forms) in f32 as it is used, and its training pass with gradients in f64. The networks are small and
-//! filled by the formula: the built-in weights do not matter here.
+//! The lifters agree with the same networks in PyTorch (`fixtures/reference/lifter_reference.py`): the temporal network
+//! (in the reference in a dilated and a strided form) in f32 for inference, and in f64 for a training pass with
+//! gradients. The networks are small and have weights computed from a formula.
 
 use crate::fixtures::networks::{every_window, fill};
 use candle_core::{DType, Device, Result, Tensor};
@@ -55,17 +55,17 @@ fn a_training_pass_agrees_with_pytorch() -> anyhow::Result<()> {
     let mut rng = ChaCha8Rng::seed_from_u64(0);
     let y = net.forward(&pattern(&[4, 8, 45], 4.0)?, &mut Mode::Train(&mut rng))?;
     agree("train", &y)?;
-    let off = (y.reshape((4, 3, 3))? - pattern(&[4, 3, 3], 5.0)?)?;
+    let errors = (y.reshape((4, 3, 3))? - pattern(&[4, 3, 3], 5.0)?)?;
     let weights = Tensor::new(&[[0.5, 1.0, 1.5]], &Device::Cpu)?;
-    let loss = (off.sqr()?.sum(2)? + 1e-8)?.sqrt()?.broadcast_mul(&weights)?.mean_all()?;
+    let loss = (errors.sqr()?.sum(2)? + 1e-8)?.sqrt()?.broadcast_mul(&weights)?.mean_all()?;
     agree("loss", &loss.reshape(1)?)?;
     let gradients = loss.backward()?;
-    let of = |name: &str| params.all().find(|(own, _)| *own == name).map(|(_, var)| var.clone()).unwrap();
+    let var = |name: &str| params.all().find(|(own, _)| *own == name).map(|(_, var)| var.clone()).unwrap();
     for name in ["l.expand.conv.weight", "l.block1.over_time.norm.weight", "l.shrink.bias"] {
-        agree(&format!("gradient {name}"), gradients.get(&of(name)).unwrap())?;
+        agree(&format!("gradient {name}"), gradients.get(&var(name)).unwrap())?;
     }
-    let moved = "l.block0.mix.norm.running_var";
-    agree(&format!("after {moved}"), of(moved).as_tensor())
+    let running_var = "l.block0.mix.norm.running_var";
+    agree(&format!("after {running_var}"), var(running_var).as_tensor())
 }
 
 #[test]

@@ -1,4 +1,4 @@
-//! Numbers held to independent references: golden values from committed scripts, and real clips.
+//! Results compared with independent references: golden values from committed scripts, and real clips.
 
 pub(crate) mod face_parity;
 pub(crate) mod generator_parity;
@@ -7,5 +7,5 @@ pub(crate) mod heatmap_parity;
 pub(crate) mod lifter_parity;
 pub(crate) mod packages;
 pub(crate) mod pose_parity;
-pub(crate) mod real;
+pub(crate) mod real_clips;
 pub(crate) mod seq2seq_parity;

@@ -1,5 +1,5 @@
-//! The sequence-to-sequence networks and their losses give what PyTorch's own modules give, outputs and every gradient
-//! (`fixtures/reference/seq2seq_reference.py`); weights and inputs are filled by one formula on both sides.
+//! The sequence-to-sequence networks and their losses agree with PyTorch modules in outputs and all gradients
+//! (`fixtures/reference/seq2seq_reference.py`). Both sides compute weights and inputs from the same formula.
 
 use crate::fixtures::networks::{phase, value};
 use candle_core::{DType, Device, Result, Tensor, Var};
@@ -36,7 +36,7 @@ fn golden(name: &str) -> Golden {
     all.remove(name).unwrap()
 }
 
-/// Sizes of the reference; nothing is dropped.
+/// Sizes of the reference, without dropout.
 fn small() -> Config {
     Config {
         pose: 5,
@@ -68,7 +68,7 @@ fn inputs(words: Option<Tensor>, dtype: DType) -> Result<Segment> {
     })
 }
 
-/// Words of a segment, most rows padded with word 0.
+/// Word indices of the segments; most rows are padded with word 0.
 fn words_of_segments() -> Result<Tensor> {
     let word = |b: usize, w: usize| if w < 1 + b % 4 { (7 * b + 3 * w) % 9 } else { 0 };
     let all = (0..BATCH).flat_map(|b| (0..4).map(move |w| word(b, w) as u32));
@@ -82,11 +82,11 @@ fn words_of_poses() -> Result<Tensor> {
     Tensor::from_vec((0..BATCH).flat_map(of_row).collect::<Vec<u32>>(), (BATCH, n, 3), &Device::Cpu)
 }
 
-/// Every tensor by the formula, weights of norms around 1 as trained ones are.
+/// All tensors computed from the formula; weights of normalisation layers are around 1, as after training.
 fn filled(params: &Params) -> Result<BTreeMap<String, Tensor>> {
-    let of_norm = |name: &str| name.contains("norm.") && name.ends_with(".weight");
+    let is_norm_weight = |name: &str| name.contains("norm.") && name.ends_with(".weight");
     let tensors = params.all().map(|(name, var)| {
-        let tensor = match of_norm(name) {
+        let tensor = match is_norm_weight(name) {
             true => pattern(var.dims(), phase(name))?.affine(0.2, 1.0)?,
             false => value(name, var.dims())?,
         };
@@ -95,16 +95,16 @@ fn filled(params: &Params) -> Result<BTreeMap<String, Tensor>> {
     tensors.collect()
 }
 
-/// Largest difference over the largest number expected, 1e-3 at least.
-fn off(own: &Tensor, expected: &[f64]) -> Result<f64> {
+/// Largest error divided by the largest expected value, or by 1e-3 if that is larger.
+fn relative_error(own: &Tensor, expected: &[f64]) -> Result<f64> {
     let own = own.to_dtype(DType::F64)?.flatten_all()?.to_vec1::<f64>()?;
     assert_eq!(own.len(), expected.len());
     let most = expected.iter().fold(1e-3f64, |most, v| most.max(v.abs()));
     Ok(own.iter().zip(expected).map(|(own, expected)| (own - expected).abs() / most).fold(0.0, f64::max))
 }
 
-/// Largest difference of a gradient (f64) and central differences, relative to 1 + |gradient|, of three numbers of a tensor.
-fn by_differences(var: &Var, gradient: &Tensor, objective: impl Fn() -> Result<f64>) -> Result<f64> {
+/// Largest error of a gradient (f64) against central differences, relative to 1 + |gradient|, at three elements.
+fn gradient_check_error(var: &Var, gradient: &Tensor, objective: impl Fn() -> Result<f64>) -> Result<f64> {
     const STEP: f64 = 1e-6;
     let (values, gradient) = (var.flatten_all()?.to_vec1::<f64>()?, gradient.flatten_all()?.to_vec1::<f64>()?);
     let mut worst = 0.0f64;
@@ -122,23 +122,23 @@ fn by_differences(var: &Var, gradient: &Tensor, objective: impl Fn() -> Result<f
     Ok(worst)
 }
 
-/// Compares a network, `build` and `run` by their parts: outputs to 1e-5, gradients and running statistics to 1e-3 in f32,
-/// all to 1e-7 in f64; there gradients to 1e-5 with central differences too.
+/// Compares a network with the reference: outputs and running statistics to 1e-5 and gradients to 1e-3 in f32, all to
+/// 1e-7 in f64, where gradients are also compared with central differences to 1e-5.
 fn compare<N>(
     name: &str,
     build: impl Fn(&mut Params) -> Result<N>,
     run: impl Fn(&N, DType, &mut Mode) -> Result<Tensor>,
 ) -> anyhow::Result<()> {
     let golden = golden(name);
-    for (dtype, most_output, most_gradient) in [(DType::F32, 1e-5, 1e-3), (DType::F64, 1e-7, 1e-7)] {
+    for (dtype, max_output, max_gradient) in [(DType::F32, 1e-5, 1e-3), (DType::F64, 1e-7, 1e-7)] {
         let mut params = Params::with_dtype(0, dtype);
         let net = build(&mut params)?;
         params.load(&filled(&params)?)?;
-        let evaluated = off(&run(&net, dtype, &mut Mode::Eval)?, &golden.eval)?;
+        let evaluated = relative_error(&run(&net, dtype, &mut Mode::Eval)?, &golden.eval)?;
         let mut rng = ChaCha8Rng::seed_from_u64(0);
         let y = run(&net, dtype, &mut Mode::Train(&mut rng))?;
-        let trained = off(&y, &golden.train)?;
-        assert!(evaluated.max(trained) < most_output, "{name} {dtype:?}: outputs {evaluated:e} {trained:e}");
+        let trained = relative_error(&y, &golden.train)?;
+        assert!(evaluated.max(trained) < max_output, "{name} {dtype:?}: outputs {evaluated:e} {trained:e}");
         let gradients = (&y * pattern(y.dims(), 0.5)?.to_dtype(dtype)?)?.sum_all()?.backward()?;
         let names: Vec<&str> = params.trainables().map(|(own, _)| own).collect();
         assert_eq!(names, golden.gradients.keys().map(String::as_str).collect::<Vec<_>>(), "{name}");
@@ -146,13 +146,13 @@ fn compare<N>(
         for (own, var) in params.trainables() {
             let gradient = gradients.get(var).unwrap();
             assert_eq!(gradient.dims(), var.dims());
-            let off = off(gradient, &golden.gradients[own])?;
-            assert!(off < most_gradient, "{name} {dtype:?}: gradient of {own} {off:e}");
-            worst = worst.max(off);
+            let error = relative_error(gradient, &golden.gradients[own])?;
+            assert!(error < max_gradient, "{name} {dtype:?}: gradient of {own} {error:e}");
+            worst = worst.max(error);
         }
         for (own, var) in params.all().filter(|(own, _)| own.contains("running_")) {
-            let off = off(var.as_tensor(), &golden.running[own])?;
-            assert!(off < most_output, "{name} {dtype:?}: {own} {off:e}");
+            let error = relative_error(var.as_tensor(), &golden.running[own])?;
+            assert!(error < max_output, "{name} {dtype:?}: {own} {error:e}");
         }
         if dtype == DType::F64 {
             let objective = || -> Result<f64> {
@@ -160,8 +160,8 @@ fn compare<N>(
                 (&y * pattern(y.dims(), 0.5)?)?.sum_all()?.to_scalar()
             };
             for (own, var) in params.trainables() {
-                let off = by_differences(var, gradients.get(var).unwrap(), objective)?;
-                assert!(off < 1e-5, "{name}: gradient of {own} is {off:e} off central differences");
+                let error = gradient_check_error(var, gradients.get(var).unwrap(), objective)?;
+                assert!(error < 1e-5, "{name}: gradient of {own} differs from central differences by {error:e}");
             }
         }
         eprintln!("{name} {dtype:?}: outputs {:.1e}, gradients {worst:.1e}", evaluated.max(trained));
@@ -170,7 +170,7 @@ fn compare<N>(
 }
 
 #[test]
-fn the_network_of_words_is_that_of_pytorch() -> anyhow::Result<()> {
+fn the_words_network_agrees_with_pytorch() -> anyhow::Result<()> {
     let run =
         |net: &WordsSeq2Seq, dtype, mode: &mut Mode| net.forward(&inputs(Some(words_of_segments()?), dtype)?, mode);
     compare("words", |params| WordsSeq2Seq::new(params, &small()), run)?;
@@ -179,14 +179,14 @@ fn the_network_of_words_is_that_of_pytorch() -> anyhow::Result<()> {
 }
 
 #[test]
-fn the_contextual_network_is_that_of_pytorch() -> anyhow::Result<()> {
+fn the_contextual_network_agrees_with_pytorch() -> anyhow::Result<()> {
     let run =
         |net: &ContextSeq2Seq, dtype, mode: &mut Mode| net.forward(&inputs(Some(words_of_poses()?), dtype)?, mode);
     compare("contextual", |params| ContextSeq2Seq::new(params, &small()), run)
 }
 
 #[test]
-fn the_adversarial_networks_are_those_of_pytorch() -> anyhow::Result<()> {
+fn the_adversarial_networks_agree_with_pytorch() -> anyhow::Result<()> {
     let run = |net: &WordsSeq2Seq, dtype, mode: &mut Mode| net.forward(&inputs(None, dtype)?, mode);
     compare("adversarial", |params| WordsSeq2Seq::without_words(params, &small()), run)?;
     let score = |net: &SegmentDiscriminator, dtype, mode: &mut Mode| {
@@ -196,7 +196,7 @@ fn the_adversarial_networks_are_those_of_pytorch() -> anyhow::Result<()> {
 }
 
 #[test]
-fn the_audio_baseline_is_that_of_pytorch() -> anyhow::Result<()> {
+fn the_audio_baseline_agrees_with_pytorch() -> anyhow::Result<()> {
     let back = |net: &PoseAutoencoder, dtype, _: &mut Mode| {
         net.forward(&pattern(&[BATCH, 8, 5], 3.0)?.reshape((BATCH * 8, 5))?.to_dtype(dtype)?)
     };
@@ -206,26 +206,29 @@ fn the_audio_baseline_is_that_of_pytorch() -> anyhow::Result<()> {
 }
 
 #[test]
-fn the_losses_are_those_of_pytorch() -> anyhow::Result<()> {
+fn the_losses_agree_with_pytorch() -> anyhow::Result<()> {
     let real = &pattern(&[3, 6, 4], 5.0)?;
     type Loss<'a> = &'a dyn Fn(&Tensor) -> Result<Tensor>;
     let all: [(&str, Loss); 8] = [
-        ("l1", &|made| losses::l1(made, real)),
-        ("mse", &|made| candle_nn::loss::mse(made, real)),
+        ("l1", &|predicted| losses::l1(predicted, real)),
+        ("mse", &|predicted| candle_nn::loss::mse(predicted, real)),
         ("continuity_of_numbers", &losses::continuity_of_numbers),
         ("continuity_of_poses", &losses::continuity_of_poses),
         ("excursion", &losses::variance_loss_of_code),
         ("variance", &losses::variance_loss_of_paper),
-        ("discriminator", &|made| losses::discriminator(made, real)),
-        ("adversarial", &|made| generator_loss(AdversarialLoss::Log, made)),
+        ("discriminator", &|predicted| losses::discriminator(predicted, real)),
+        ("adversarial", &|predicted| generator_loss(AdversarialLoss::Log, predicted)),
     ];
     for (name, loss) in all {
         let golden = golden(&format!("loss {name}"));
-        let made = Var::from_tensor(&pattern(&[3, 6, 4], 4.0)?)?;
-        let value = loss(&made)?;
-        assert!(off(&value, &golden.train)? < 1e-7, "{name}");
+        let predicted = Var::from_tensor(&pattern(&[3, 6, 4], 4.0)?)?;
+        let value = loss(&predicted)?;
+        assert!(relative_error(&value, &golden.train)? < 1e-7, "{name}");
         let gradients = value.backward()?;
-        assert!(off(gradients.get(&made).unwrap(), &golden.gradients["made"])? < 1e-7, "gradient of {name}");
+        assert!(
+            relative_error(gradients.get(&predicted).unwrap(), &golden.gradients["made"])? < 1e-7,
+            "gradient of {name}"
+        );
     }
     Ok(())
 }

@@ -1,4 +1,4 @@
-//! The chain of 2D models.
+//! Keypoint detection with the chain of 2D models.
 
+pub(crate) mod footage_conditions;
 pub(crate) mod pose_chain;
-pub(crate) mod real_life;

@@ -1,4 +1,4 @@
-//! The 2D chain and its stage on what real life brings: odd sizes, nobody there, shots, repeated frames.
+//! The 2D chain and its stage on unusual input: image sizes, videos without a person, inconsistent files.
 
 use crate::fixtures::clips;
 use crate::fixtures::onnx_models::models;
@@ -22,9 +22,9 @@ fn noise(width: usize, height: usize) -> Image {
 }
 
 #[test]
-fn any_picture_gives_finite_numbers() {
+fn any_image_gives_finite_keypoints() {
     let Some((store, runtime)) = models() else { return };
-    // Without a person detector the whole picture is the person, so that every model runs on nonsense.
+    // Without a person detector the full image is the person box, so all models run on it.
     for person in ["person-rtmdet-nano", "person-yolox-nano", ""] {
         if store.manifest().get(person).is_ok_and(|entry| store.state(entry) != ModelState::Present) {
             skip(&format!("{person} is not among the fetched models"));
@@ -52,22 +52,23 @@ fn any_picture_gives_finite_numbers() {
 }
 
 #[test]
-fn settings_that_name_no_right_model_say_which() {
+fn settings_with_an_unsuitable_model_are_errors_with_the_key() {
     let Some((store, runtime)) = models() else { return };
-    let said = |settings: config::Pose2dConfig| format!("{:#}", Chain::new(&runtime, &store, &settings).err().unwrap());
-    let unknown = said(config::Pose2dConfig { body: "nothing".into(), ..config::Pose2dConfig::default() });
+    let error =
+        |settings: config::Pose2dConfig| format!("{:#}", Chain::new(&runtime, &store, &settings).err().unwrap());
+    let unknown = error(config::Pose2dConfig { body: "nothing".into(), ..config::Pose2dConfig::default() });
     assert!(unknown.contains("pose2d.body") && unknown.contains("body-tinypose-256x192"), "{unknown}");
     assert!(
-        said(config::Pose2dConfig { person: "hand-mediapipe-lite".into(), ..config::Pose2dConfig::default() })
+        error(config::Pose2dConfig { person: "hand-mediapipe-lite".into(), ..config::Pose2dConfig::default() })
             .contains("Hand")
     );
     assert!(
-        said(config::Pose2dConfig { hand: String::new(), ..config::Pose2dConfig::default() })
+        error(config::Pose2dConfig { hand: String::new(), ..config::Pose2dConfig::default() })
             .contains("has no hand keypoints")
     );
 }
 
-/// A unit with a video of `n` frames at 30 fps, its timeline at 15 fps, and the settings of a run in `dir`.
+/// A unit with a video of `n` frames at 30 fps, and the settings of a run in `dir`.
 fn unit(dir: &Path, n: usize, models: &Path) -> (Unit, Settings) {
     let source = clips::write_sized(dir, "nobody.mp4", n, FrameRate::new(30, 1), [160, 96], None);
     let unit = Unit { speaker: "host".into(), video: "nobody-00000000".into(), source };
@@ -94,7 +95,7 @@ fn write_timeline(settings: &Settings, unit: &Unit, restart: Vec<bool>) {
 }
 
 #[test]
-fn a_video_without_a_person_is_zeros_and_no_failure() {
+fn a_video_without_a_person_gives_zeros_and_not_a_failure() {
     let Some((store, _)) = models() else { return };
     let dir = tempfile::tempdir().unwrap();
     let (unit, settings) = unit(dir.path(), 20, store.dir());
@@ -102,7 +103,7 @@ fn a_video_without_a_person_is_zeros_and_no_failure() {
     let stage = Pose2dStage::new(&settings).unwrap();
     let roles: Vec<_> = stage.inputs(&unit).unwrap().into_iter().map(|input| input.role).collect();
     let all = ["video", "timeline", "media", "model:person", "model:body", "model:hand", "model:palm", "model:face"];
-    // The face model is the one that may be missing.
+    // Only the face model is optional.
     let has_face = store.path(store.manifest().get("face-mediapipe").unwrap()).is_file();
     assert_eq!(roles, all[..all.len() - usize::from(!has_face)]);
     assert!(stage.settings(&unit)["models"]["body"]["sha256"].is_string());
@@ -124,16 +125,16 @@ fn a_video_without_a_person_is_zeros_and_no_failure() {
 }
 
 #[test]
-fn a_timeline_of_another_video_and_a_missing_model_are_errors() {
+fn a_timeline_of_another_length_and_a_missing_model_are_errors() {
     let Some((store, _)) = models() else { return };
     let dir = tempfile::tempdir().unwrap();
     let (unit, mut settings) = unit(dir.path(), 20, store.dir());
     for n_frames in [3, 12] {
         write_timeline(&settings, &unit, vec![false; n_frames]);
-        let said = Pose2dStage::new(&settings).unwrap().run(&unit, dir.path(), &Silent).unwrap_err().to_string();
-        assert!(said.contains(&format!("its timeline {n_frames}")), "{said}");
+        let error = Pose2dStage::new(&settings).unwrap().run(&unit, dir.path(), &Silent).unwrap_err().to_string();
+        assert!(error.contains(&format!("its timeline {n_frames}")), "{error}");
     }
     settings.models.dir = dir.path().to_owned();
-    let said = Pose2dStage::new(&settings).unwrap().inputs(&unit).unwrap_err().to_string();
-    assert!(said.contains("person_rtmdet_nano_320.onnx") && said.contains("orator models fetch"), "{said}");
+    let error = Pose2dStage::new(&settings).unwrap().inputs(&unit).unwrap_err().to_string();
+    assert!(error.contains("person_rtmdet_nano_320.onnx") && error.contains("orator models fetch"), "{error}");
 }

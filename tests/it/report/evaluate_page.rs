@@ -1,11 +1,11 @@
-//! The page of an evaluation, as the program makes it and a browser shows it.
+//! The HTML page of an evaluation, as written and as displayed in a browser.
 
 use crate::fixtures::browser::Browser;
 use crate::fixtures::motion_folders::folders;
 use orator_test_support::project::Project;
 
 #[test]
-fn the_page_opens_plays_and_is_scrubbed_by_keys() {
+fn the_page_opens_plays_and_can_be_scrubbed_with_keys() {
     let project = Project::with_clips("judged-page", 0, 1.0);
     folders(project.dir(), &[14, 8, 9]);
     let args =
@@ -16,7 +16,7 @@ fn the_page_opens_plays_and_is_scrubbed_by_keys() {
     let html = std::fs::read_to_string(&page).unwrap();
     assert!(html.len() < 8_000_000 && !html.contains("://") && !html.contains(&*project.dir().to_string_lossy()));
     assert_eq!(project.answer(&args).code, 0);
-    assert_eq!(std::fs::read_to_string(&page).unwrap(), html, "the same again");
+    assert_eq!(std::fs::read_to_string(&page).unwrap(), html, "the output is deterministic");
     let Some(mut browser) = Browser::open(&page, [1280, 900]) else { return };
     let mut count = |selector: &str| browser.value(&format!("document.querySelectorAll('{selector}').length"));
     assert_eq!((count("#excerpt option"), count(".over-time:not([hidden])")), (3.into(), 1.into()));
@@ -28,7 +28,7 @@ fn the_page_opens_plays_and_is_scrubbed_by_keys() {
         let wide = browser.value("document.documentElement.scrollWidth").as_u64().unwrap();
         assert!(wide <= u64::from(width), "{wide} px wide in a window of {width} px");
     }
-    // both figures are drawn, and not the same
+    // Both figures are drawn, and they differ.
     let drawn = |side: &str| {
         format!(
             "(() => {{ const c = document.getElementById('{side}'); const d = c.getContext('2d')\
@@ -38,7 +38,7 @@ fn the_page_opens_plays_and_is_scrubbed_by_keys() {
     };
     let [truth, predicted] = ["truth", "predicted"].map(|side| browser.value(&drawn(side)).as_u64().unwrap());
     assert!(truth > 500 && predicted > 500 && truth != predicted, "{truth} {predicted}");
-    // the keys scrub
+    // Arrow keys scrub.
     browser.value("document.getElementById('at').focus()");
     for _ in 0..5 {
         browser.press("ArrowRight");
@@ -48,7 +48,7 @@ fn the_page_opens_plays_and_is_scrubbed_by_keys() {
     assert!((scrubbed - 5.0 / 15.0).abs() < 0.02, "{scrubbed}");
     let line = "Number(document.querySelector('.over-time:not([hidden]) line.at').getAttribute('x1'))";
     assert!(browser.value(line).as_f64().unwrap() > 5.0);
-    // playing moves on, pausing stands still
+    // The time advances when playing and stops when paused.
     browser.value("document.getElementById('play').click()");
     std::thread::sleep(std::time::Duration::from_millis(1200));
     let played = at(&mut browser);
@@ -57,7 +57,7 @@ fn the_page_opens_plays_and_is_scrubbed_by_keys() {
     let paused = at(&mut browser);
     std::thread::sleep(std::time::Duration::from_millis(300));
     assert_eq!(at(&mut browser), paused);
-    // another excerpt starts at its beginning, with its own lines
+    // Another excerpt starts at its beginning and has its own charts.
     let chosen = browser.value(
         "(() => { const s = document.getElementById('excerpt'); s.value = 2; s.dispatchEvent(new Event('change')); \
          return [document.getElementById('at').value, document.querySelector('.over-time:not([hidden])').dataset.excerpt]\

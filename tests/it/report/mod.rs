@@ -1,4 +1,4 @@
-//! Pages for people.
+//! HTML pages and contact sheets.
 
 pub(crate) mod evaluate_page;
 pub(crate) mod report;

@@ -1,5 +1,5 @@
-//! The report on a run: its numbers are those of the ledgers, no name becomes markup, a browser opens it without a complaint,
-//! and a slider says what a run with that threshold then keeps.
+//! The report on a run: its values are those of the ledgers, names are escaped, a browser opens it without errors, and
+//! a slider predicts the seconds that a run with that threshold accepts.
 
 use crate::fixtures::browser::Browser;
 use orator_test_support::project::{ProgramAnswer, Project};
@@ -7,7 +7,7 @@ use serde_json::Value;
 use std::path::Path;
 
 const NAME: &str = "a <b> & \"c\" 'd'.mp4";
-/// Strict enough to refuse parts of what the synthetic speaker does.
+/// Settings strict enough to reject parts of the synthetic speaker's videos.
 const STRICT: [&str; 4] = ["--set", "segment.max_body_gap_secs=0.1", "--set", "segment.min_frames=20"];
 
 fn report(project: &Project, args: &[&str]) -> (ProgramAnswer, String) {
@@ -22,7 +22,7 @@ fn secs(value: &Value) -> f64 {
 }
 
 #[test]
-fn a_page_opens_draws_and_its_sliders_tell_what_a_run_then_keeps() {
+fn the_page_is_drawn_and_its_sliders_predict_a_run() {
     let project = Project::with_clips("report", 1, 8.0);
     std::fs::rename(&project.clips()[0], project.video(NAME)).unwrap();
     std::fs::write(project.video("broken.mp4"), "no video").unwrap();
@@ -30,17 +30,20 @@ fn a_page_opens_draws_and_its_sliders_tell_what_a_run_then_keeps() {
     let (answer, html) = report(&project, &STRICT);
     let facts = &answer.json;
     assert_eq!((&facts["n_videos"], &facts["bytes"]), (&2.into(), &html.len().into()));
-    let refused: f64 = facts["rejected_secs"].as_object().unwrap().values().map(secs).sum();
-    let kept = secs(&facts["accepted_secs"]);
-    assert!(refused > 0.0 && kept > 0.0 && (refused + kept - secs(&facts["duration_secs"])).abs() < 1e-6, "{facts}");
+    let rejected: f64 = facts["rejected_secs"].as_object().unwrap().values().map(secs).sum();
+    let accepted = secs(&facts["accepted_secs"]);
+    assert!(
+        rejected > 0.0 && accepted > 0.0 && (rejected + accepted - secs(&facts["duration_secs"])).abs() < 1e-6,
+        "{facts}"
+    );
     assert!(html.len() < 1_000_000 && !html.contains("<b>") && !html.contains("://"));
-    assert!(!html.contains(&*project.dir().to_string_lossy()), "a folder of this machine is told");
-    assert_eq!(html, report(&project, &STRICT).1, "the same again");
-    look(&project, facts);
+    assert!(!html.contains(&*project.dir().to_string_lossy()), "the page contains a path of this machine");
+    assert_eq!(html, report(&project, &STRICT).1, "the output is deterministic");
+    check_in_browser(&project, facts);
 }
 
-/// What a browser sees of the page.
-fn look(project: &Project, facts: &Value) {
+/// Checks the page in a browser, and the prediction of a slider with a run.
+fn check_in_browser(project: &Project, facts: &Value) {
     let Some(mut browser) = Browser::open(&project.dir().join("deep/r.html"), [1200, 900]) else { return };
     let mut count = |selector: &str| browser.value(&format!("document.querySelectorAll('{selector}').length"));
     assert_eq!(count(".timeline > li"), facts["n_intervals"]);
@@ -53,7 +56,7 @@ fn look(project: &Project, facts: &Value) {
     assert!(facts["n_pictures"].as_u64().unwrap() > 0);
     let drawn = "[...document.querySelectorAll('canvas[data-preview]')].filter(c => c.getContext('2d')\
                  .getImageData(0, 0, c.width, c.height).data.some(v => v > 0)).length";
-    assert_eq!(browser.value(drawn), 1, "one video has kept motion, and it is drawn");
+    assert_eq!(browser.value(drawn), 1, "one video has accepted motion, which is drawn");
     let flat = "[...document.querySelectorAll('svg, .timeline > li, .bar')].filter(e => { const b = e.getBoundingClientRect(); \
                 return !(b.width > 0 && b.height > 0) }).length";
     let unread =
@@ -67,7 +70,7 @@ fn look(project: &Project, facts: &Value) {
         let wide = browser.value("document.documentElement.scrollWidth");
         assert!(wide.as_u64().unwrap() <= u64::from(width), "{wide} px wide in a window of {width} px");
     }
-    // the keys walk a line, and what a stretch says is shown
+    // Arrow keys step through a timeline and show the tooltip of a segment.
     browser.value("document.querySelector('.timeline').focus()");
     browser.press("ArrowRight");
     let tip = browser.value("document.getElementById('tip').hidden ? '' : document.getElementById('tip').textContent");
@@ -79,38 +82,38 @@ fn look(project: &Project, facts: &Value) {
                  return [document.getElementById('now').dataset.secs, document.getElementById('toml').textContent, \
                  document.querySelector('#by-video td.num').textContent].join('|') })()";
     let moved = browser.value(moved);
-    let [then, toml, video] = moved.as_str().unwrap().split('|').collect::<Vec<_>>()[..] else { panic!("{moved}") };
-    let then: f64 = then.parse().unwrap();
-    assert!(then > now && video == format!("{then:.1} s"), "{moved}, {now} s before");
+    let [seconds, toml, video] = moved.as_str().unwrap().split('|').collect::<Vec<_>>()[..] else { panic!("{moved}") };
+    let predicted: f64 = seconds.parse().unwrap();
+    assert!(predicted > now && video == format!("{predicted:.1} s"), "{moved}, {now} s before");
     assert!(browser.problems.is_empty(), "{:?}", browser.problems);
-    // a run with the line that the page gives keeps what the page says
+    // A run with the setting shown on the page accepts the predicted seconds.
     let set = toml.replace("[segment]\n", "segment.").replace(" = ", "=");
     assert!(set.starts_with("segment.max_body_gap_secs=0.2"), "{toml}");
     let set = ["--set", STRICT[3], "--set", &set];
     project.run(&[&["--to", "lift"], &set[..]].concat());
-    let kept = secs(&report(project, &set).0.json["accepted_secs"]);
-    assert!((kept - then).abs() < 1e-3, "the page says {then} s, the run keeps {kept} s");
+    let accepted = secs(&report(project, &set).0.json["accepted_secs"]);
+    assert!((accepted - predicted).abs() < 1e-3, "predicted {predicted} s, accepted {accepted} s");
 }
 
 #[test]
-fn what_is_missing_is_said_on_the_page() {
+fn the_page_lists_missing_files_and_unprocessed_videos() {
     let project = Project::with_clips("nothing-done", 1, 1.0);
     let clip = project.clips().remove(0);
-    let gone = project.video("gone.mp4");
-    project.name_videos(&[&clip.to_string_lossy(), &gone.to_string_lossy(), "none-*.mp4"]);
+    let missing = project.video("gone.mp4");
+    project.name_videos(&[&clip.to_string_lossy(), &missing.to_string_lossy(), "none-*.mp4"]);
     let (answer, html) = report(&project, &[]);
     assert_eq!((&answer.json["n_videos"], &answer.json["accepted_secs"]), (&2.into(), &0.0.into()));
-    for words in [
+    for text in [
         "The video file is missing",
         "Not processed yet: run `orator run`.",
         "none-*.mp4: no matching file",
         "no motion to show",
     ] {
-        assert!(html.contains(words), "{words}");
+        assert!(html.contains(text), "{text}");
     }
     if let Some(browser) = Browser::open(Path::new(&project.dir().join("deep/r.html")), [800, 600]) {
         assert!(browser.problems.is_empty(), "{:?}", browser.problems);
     }
-    let wrong = project.answer(&["report", "--speaker", "nobody"]);
-    assert!(wrong.code == 1 && wrong.errors.contains("unknown speaker nobody"), "{}", wrong.errors);
+    let unknown = project.answer(&["report", "--speaker", "nobody"]);
+    assert!(unknown.code == 1 && unknown.errors.contains("unknown speaker nobody"), "{}", unknown.errors);
 }

@@ -1,5 +1,5 @@
-//! Contact sheets: a page holds what it should, the same again is the same, and files that do not belong together are
-//! refused with the reason.
+//! Contact sheets: number and size of the pages, deterministic output, and errors with the cause for files that do not
+//! belong together.
 
 use crate::fixtures::clips::write_sized;
 use crate::fixtures::figures::{FPS, swinging};
@@ -19,9 +19,9 @@ use std::path::Path;
 
 const SIZE: [usize; 2] = [320, 240];
 
-/// Keypoints of the motion seen from the front, 150 px a metre, hands as they are.
+/// Orthographic front view of the motion with its hands, 150 px per metre.
 fn keypoints(motion: &Motion) -> Keypoints {
-    let see = |points: &mut Array3<f32>, point: usize, joint: usize| {
+    let project = |points: &mut Array3<f32>, point: usize, joint: usize| {
         for t in 0..motion.n_frames() {
             let [x, y] = [0, 1].map(|axis| motion.joints[[t, joint, axis]] * 150.0);
             points.slice_mut(s![t, point, ..]).assign(&ndarray::arr1(&[x + 160.0, y + 80.0, 0.9]));
@@ -29,11 +29,11 @@ fn keypoints(motion: &Motion) -> Keypoints {
     };
     let mut body = Array3::zeros((motion.n_frames(), 17, 3));
     for (point, joint) in [(5, 4), (7, 5), (9, 6), (6, 1), (8, 2), (10, 3)] {
-        see(&mut body, point, joint);
+        project(&mut body, point, joint);
     }
     let [left_hand, right_hand] = [7, 28].map(|root| {
         let mut hand = Array3::zeros((motion.n_frames(), 21, 3));
-        (0..21).for_each(|point| see(&mut hand, point, root + point));
+        (0..21).for_each(|point| project(&mut hand, point, root + point));
         hand
     });
     let image_size = SIZE.map(|px| px as u32);
@@ -52,7 +52,7 @@ fn pages(video: &Path, keypoints: &Keypoints, motion: &Motion, every_secs: f64) 
 }
 
 #[test]
-fn pages_hold_ten_moments_each_and_repeat_to_the_byte() {
+fn pages_have_ten_moments_each_and_are_deterministic() {
     let dir = tempfile::tempdir().unwrap();
     let video = write_sized(dir.path(), "a.mp4", 75, FrameRate::new(30, 1), SIZE, None);
     let mut motion = swinging(3, 38);
@@ -65,40 +65,41 @@ fn pages_hold_ten_moments_each_and_repeat_to_the_byte() {
     assert!(drawn[0].height > drawn[1].height && drawn[0].width <= 2400);
     assert_eq!(drawn, pages(&video, &keypoints, &motion, 0.2).unwrap());
     assert_eq!(pages(&video, &keypoints, &motion, 60.0).unwrap().len(), 1);
-    let figures = quality::measure(&motion, &keypoints).unwrap();
-    assert!(figures.right.wrist_off_mm < 1.0 && figures.left.missing > 0.2, "{figures:?}");
+    let quality = quality::measure(&motion, &keypoints).unwrap();
+    assert!(quality.right.wrist_off_mm < 1.0 && quality.left.missing > 0.2, "{quality:?}");
 }
 
 #[test]
-fn what_does_not_belong_together_is_refused() {
+fn files_that_do_not_belong_together_are_an_error() {
     let dir = tempfile::tempdir().unwrap();
     let video = write_sized(dir.path(), "a.mp4", 60, FrameRate::new(30, 1), SIZE, None);
     let motion = swinging(1, 30);
-    let seen = keypoints(&motion);
-    let says = |keypoints: &Keypoints, motion: &Motion, every: f64, words: &str| {
+    let points = keypoints(&motion);
+    let fails = |keypoints: &Keypoints, motion: &Motion, every: f64, expected: &str| {
         let error = format!("{:#}", pages(&video, keypoints, motion, every).unwrap_err());
-        assert!(error.contains(words), "{error}");
+        assert!(error.contains(expected), "{error}");
     };
-    says(&seen, &swinging(1, 29), 1.0, "29 frames, the keypoints have 30");
-    says(&keypoints(&swinging(1, 0)), &swinging(1, 0), 1.0, "no frames");
-    says(&seen, &Motion { fps: FrameRate::new(25, 1), ..motion.clone() }, 1.0, "25 fps, the keypoints at 15 fps");
+    fails(&points, &swinging(1, 29), 1.0, "29 frames, the keypoints have 30");
+    fails(&keypoints(&swinging(1, 0)), &swinging(1, 0), 1.0, "no frames");
+    fails(&points, &Motion { fps: FrameRate::new(25, 1), ..motion.clone() }, 1.0, "25 fps, the keypoints at 15 fps");
     let fast = FrameRate::new(60, 1);
-    let (seen_fast, motion_fast) = (Keypoints { fps: fast, ..seen.clone() }, Motion { fps: fast, ..motion.clone() });
-    says(&seen_fast, &motion_fast, 1.0, "expected the same clip");
+    let (points_fast, motion_fast) =
+        (Keypoints { fps: fast, ..points.clone() }, Motion { fps: fast, ..motion.clone() });
+    fails(&points_fast, &motion_fast, 1.0, "expected the same clip");
     let long = swinging(1, 300);
-    says(&keypoints(&long), &long, 1.0, "20.00 s");
+    fails(&keypoints(&long), &long, 1.0, "20.00 s");
     for every in [0.0, -1.0, f64::NAN, f64::INFINITY, 0.01] {
-        says(&seen, &motion, every, "at least 0.067 s");
+        fails(&points, &motion, every, "at least 0.067 s");
     }
-    let nothing = Keypoints { body: Array3::zeros((30, 17, 3)), ..seen };
-    assert_eq!(pages(&video, &nothing, &Motion::from_joints(FPS, motion.joints * f32::NAN), 1.0).unwrap().len(), 1);
+    let undetected = Keypoints { body: Array3::zeros((30, 17, 3)), ..points };
+    assert_eq!(pages(&video, &undetected, &Motion::from_joints(FPS, motion.joints * f32::NAN), 1.0).unwrap().len(), 1);
 }
 
 #[test]
-fn the_verb_draws_loose_files_and_says_what_is_missing() {
+fn the_command_draws_separate_files_and_reports_missing_ones() {
     let project = Project::with_clips("sheet", 1, 2.0);
     let dir = project.dir();
-    let video = write_sized(dir, "loose.mp4", 30, FPS, SIZE, None);
+    let video = write_sized(dir, "separate.mp4", 30, FPS, SIZE, None);
     let motion = swinging(2, 30);
     let extras = Extras {
         time_secs: Array1::zeros(30),
@@ -112,21 +113,21 @@ fn the_verb_draws_loose_files_and_says_what_is_missing() {
     npy::write(&dir.join("j.npy"), &motion).unwrap();
     joints_npz::write(&dir.join("j.npz"), &motion).unwrap();
     let video = video.to_string_lossy().into_owned();
-    let loose = ["sheet", "--video", &video, "--keypoints", "k.npz", "--joints"];
+    let separate = ["sheet", "--video", &video, "--keypoints", "k.npz", "--joints"];
     for joints in ["j.npy", "j.npz"] {
-        let answer = project.answer(&[&loose[..], &[joints, "--out", "deep/s.png", "--every", "0.1"]].concat());
+        let answer = project.answer(&[&separate[..], &[joints, "--out", "deep/s.png", "--every", "0.1"]].concat());
         assert_eq!(answer.code, 0, "{}", answer.errors);
         assert!(dir.join("deep/s_000.png").exists() && dir.join("deep/s_001.png").exists());
         let metrics = &answer.json["clips"][0]["metrics"];
         assert_eq!(metrics["left"]["missing_percent"], 0.0, "{metrics}");
     }
-    let fails = |args: &[&str], words: &str| {
+    let fails = |args: &[&str], expected: &str| {
         let answer = project.answer(args);
-        assert!(answer.code == 1 && answer.errors.contains(words), "{}", answer.errors);
+        assert!(answer.code == 1 && answer.errors.contains(expected), "{}", answer.errors);
     };
     fails(&["sheet"], "not lifted yet; run `orator run --to lift");
     fails(&["sheet", "--video", "nobody"], "no video is named nobody");
-    fails(&[&loose[..], &["k.npz"]].concat(), "no array `pose3d`");
-    fails(&[&loose[..], &["j.npy", "--out", "sheet.jpg"]].concat(), "ends in .png");
+    fails(&[&separate[..], &["k.npz"]].concat(), "no array `pose3d`");
+    fails(&[&separate[..], &["j.npy", "--out", "sheet.jpg"]].concat(), "ends in .png");
     fails(&["sheet", "--keypoints", "k.npz"], "--joints");
 }

@@ -1,5 +1,5 @@
-//! Every threshold changed: what a slider of the report says would be kept is what `segment` and `lift` keep when they
-//! run again.
+//! For a change of every threshold, the seconds that a slider of the report predicts as accepted are those that
+//! `segment` and `lift` accept when run with it.
 
 use crate::fixtures::footage::{Footage, good, write};
 use ndarray::s;
@@ -17,8 +17,8 @@ use orator_report::videos::thresholds::THRESHOLDS;
 use orator_report::videos::what_if::{JudgedVideo, open_frames};
 use std::path::Path;
 
-/// Half a minute with a cut, a small step aside, a quiet part, a hand that leaves the picture for a while, and a wrist
-/// that is found far away for 20 frames.
+/// Half a minute with a cut, a small step aside, a quiet part, a hand that is out of frame for a while, and a wrist
+/// that is detected far away for 20 frames.
 fn footage() -> Footage {
     let mut footage = good(450);
     footage.shot[130..].fill(1);
@@ -33,7 +33,7 @@ fn footage() -> Footage {
     footage
 }
 
-/// What is left of the video when both stages run.
+/// Runs both stages; returns the ledger of `lift`.
 fn run(work: &Path, unit: &Unit, rules: &SegmentConfig, lift: &config::LiftConfig) -> Ledger {
     let stages: [Box<dyn Stage>; 2] =
         [Box::new(SegmentStage::new(rules, work)), Box::new(LiftStage::new(lift, rules, work).unwrap())];
@@ -46,7 +46,7 @@ fn run(work: &Path, unit: &Unit, rules: &SegmentConfig, lift: &config::LiftConfi
 }
 
 #[test]
-fn a_slider_says_what_a_run_keeps() {
+fn a_slider_predicts_the_accepted_seconds_of_a_run() {
     let dir = tempfile::tempdir().unwrap();
     let unit = Unit { speaker: "host".into(), video: "talk-00000000".into(), source: dir.path().join("talk.mp4") };
     write(dir.path(), &unit, &footage(), "a");
@@ -71,9 +71,9 @@ fn a_slider_says_what_a_run_keeps() {
     let mut n_changed = 0;
     let mut compare = |key: &str, value: f64, rules: &SegmentConfig, lift: &config::LiftConfig| {
         let (slider, again) = (judged(lift.max_bone_change).kept_secs(rules), run(dir.path(), &unit, rules, lift));
-        let kept = again.kept_secs();
-        assert!((slider - kept).abs() < 1e-3, "{key} = {value}: the slider says {slider} s, a run keeps {kept} s");
-        n_changed += usize::from((kept - now.kept_secs()).abs() > 1e-3);
+        let accepted = again.kept_secs();
+        assert!((slider - accepted).abs() < 1e-3, "{key} = {value}: predicted {slider} s, accepted {accepted} s");
+        n_changed += usize::from((accepted - now.kept_secs()).abs() > 1e-3);
     };
     for threshold in &THRESHOLDS {
         let (grid, _) = threshold.grid(&rules);
@@ -84,5 +84,5 @@ fn a_slider_says_what_a_run_keeps() {
     for max_bone_change in [0.2, 2.0] {
         compare("max_bone_change", max_bone_change, &rules, &config::LiftConfig { max_bone_change, ..lift.clone() });
     }
-    assert!(n_changed >= 6, "only {n_changed} of the changes changed what is kept");
+    assert!(n_changed >= 6, "only {n_changed} of the changes have an effect");
 }

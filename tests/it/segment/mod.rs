@@ -1,6 +1,6 @@
-//! What is kept and what is refused.
+//! Segmentation: accepted intervals and rejected seconds.
 
-pub(crate) mod redecide;
+pub(crate) mod changed_thresholds;
 pub(crate) mod rendered_voices;
 pub(crate) mod segment;
 pub(crate) mod speech;

@@ -1,6 +1,6 @@
-//! Rendered people, whose lips and voices are exact, seen by the models for real people: who of two speaks is followed,
-//! own voices are told from others, shifts are found. `ORATOR_PEOPLE` (`make prove-people`): a folder of rendered people
-//! and the work folder of a run on it with the face model, all of whose clips are measured.
+//! Rendered persons with exactly synchronised lips and voices, processed with the models for real people: the speaking
+//! one of two is tracked, own voices are distinguished from others, audio shifts are estimated. `ORATOR_PEOPLE` (`make
+//! prove-people`) names the work folder of a run with the face model on rendered persons; all its clips are measured.
 
 use crate::fixtures::clips::ffmpeg;
 use crate::fixtures::media::voices::{TalkingClip, WINDOW_SECS, area};
@@ -16,33 +16,33 @@ use std::path::Path;
 const FPS: FrameRate = FrameRate::new(15, 1);
 const SECS: f64 = 7.0;
 
-/// Prints and returns the area under the curve of own voices against those of others, and the share of shifts that are
-/// found within a frame.
-fn measured(clips: &[TalkingClip]) -> [f64; 2] {
+/// Prints and returns the area under the ROC curve of own voices against other voices, and the share of shifts that are
+/// estimated within one frame.
+fn measure(clips: &[TalkingClip]) -> [f64; 2] {
     let (mut own, mut other, mut errors) = (Vec::new(), Vec::new(), Vec::new());
-    for (at, clip) in clips.iter().enumerate() {
+    for (index, clip) in clips.iter().enumerate() {
         own.extend(clip.windows(&clip.voice, 0.0, clip.offset().secs));
-        let others = (1..clips.len().min(5)).map(|away| &clips[(at + away * 7) % clips.len()]);
-        let strangers = others.filter(|stranger| stranger.name != clip.name);
-        strangers.for_each(|stranger| other.extend(clip.windows(&stranger.voice, 0.0, 0.0)));
+        let others = (1..clips.len().min(5)).map(|step| &clips[(index + step * 7) % clips.len()]);
+        let other_clips = others.filter(|other_clip| other_clip.name != clip.name);
+        other_clips.for_each(|other_clip| other.extend(clip.windows(&other_clip.voice, 0.0, 0.0)));
         errors.extend(clip.shift_errors(8.0, 6.0).into_iter().map(|error| error * clip.source_fps));
     }
-    let n_found = errors.iter().filter(|frames| **frames <= 1.0 + 1e-9).count();
-    let found = n_found as f64 / errors.len().max(1) as f64;
+    let n_within = errors.iter().filter(|frames| **frames <= 1.0 + 1e-9).count();
+    let share = n_within as f64 / errors.len().max(1) as f64;
     let area = area(&own, &other);
     eprintln!(
-        "{} clips: area under the curve at {WINDOW_SECS} s {area:.3} ({} own, {} other windows); {n_found} of {} shifts \
-         of -400 to 400 ms found within a frame",
+        "{} clips: area under the curve at {WINDOW_SECS} s {area:.3} ({} own, {} other windows); {n_within} of {} \
+         shifts of -400 to 400 ms within a frame",
         clips.len(),
         own.len(),
         other.len(),
         errors.len()
     );
-    [area, found]
+    [area, share]
 }
 
 #[test]
-fn of_two_the_one_who_speaks_is_followed_and_the_voices_are_told_apart() {
+fn the_speaking_person_is_tracked_and_voices_are_distinguished() {
     let (Some(models), Some(_)) = (fetched_models(), fetched_model("face_landmark_192.onnx")) else { return };
     let project = Project::with_clips("two", 0, 0.0);
     for seed in [3, 8] {
@@ -50,11 +50,11 @@ fn of_two_the_one_who_speaks_is_followed_and_the_voices_are_told_apart() {
         let scene = PersonScene::new(Condition::Front, seeds, SECS, FPS, None);
         scene.film(&project.dir().join(format!("{seed}.mp4")), &Silent).unwrap();
     }
-    // Side by side, one two thirds as large; the voice is of one or of the other.
+    // Side by side, one at two thirds of the size of the other; the audio is that of one of them.
     let sizes = "[0:v]scale=-2:480[a];[1:v]scale=-2:320,pad=iw:480:0:160[b];[a][b]hstack[v]";
-    for (who, name) in [(0, "large"), (1, "small")] {
-        let how = format!("-i 3.mp4 -i 8.mp4 -filter_complex {sizes} -map [v] -map {who}:a videos/host/{name}.mp4");
-        if !ffmpeg(project.dir(), &how) {
+    for (voice, name) in [(0, "large"), (1, "small")] {
+        let args = format!("-i 3.mp4 -i 8.mp4 -filter_complex {sizes} -map [v] -map {voice}:a videos/host/{name}.mp4");
+        if !ffmpeg(project.dir(), &args) {
             return;
         }
     }
@@ -69,28 +69,28 @@ fn of_two_the_one_who_speaks_is_followed_and_the_voices_are_told_apart() {
         let file = project.written("pose2d", name, "keypoints.npz");
         let extras = keypoints_npz::read_extras(&file).unwrap();
         assert!(extras.n_people.iter().filter(|n| **n == 2).count() > 60, "{name}: {:?}", extras.n_people);
-        assert!(extras.identity.iter().all(|who| *who == 0), "{name}: {:?}", extras.identity);
+        assert!(extras.identity.iter().all(|identity| *identity == 0), "{name}: {:?}", extras.identity);
         let middle = extras.person.column(0).mean().unwrap() + extras.person.column(2).mean().unwrap() / 2.0;
         let clip = TalkingClip::read(&file, &project.written("extract", name, "audio.wav"), FPS.per_sec()).unwrap();
         (middle, clip)
     });
-    assert!(clips[0].0 + 150.0 < clips[1].0, "followed at {} and {} px", clips[0].0, clips[1].0);
-    let [area, found] = measured(&clips.map(|(_, clip)| clip));
+    assert!(clips[0].0 + 150.0 < clips[1].0, "tracked at {} and {} px", clips[0].0, clips[1].0);
+    let [area, found] = measure(&clips.map(|(_, clip)| clip));
     assert!(area > 0.9 && found == 1.0, "{area} {found}");
 }
 
 #[test]
-fn voices_of_a_rendered_set_are_told_apart() {
+fn voices_of_a_rendered_set_are_distinguished() {
     let Some(work) = std::env::var_os("ORATOR_PEOPLE") else { return };
     let is_keypoints = |(name, _): &(String, _)| name.starts_with("pose2d/") && name.ends_with("keypoints.npz");
     let files = files_under(Path::new(&work)).into_iter().filter(is_keypoints);
     let clips: Vec<TalkingClip> = files
         .filter_map(|(name, path)| {
             let clip = Path::new(&name).parent()?.strip_prefix("pose2d").ok()?;
-            let sound = Path::new(&work).join("extract").join(clip).join("audio.wav");
-            TalkingClip::read(&path, &sound, FPS.per_sec())
+            let audio = Path::new(&work).join("extract").join(clip).join("audio.wav");
+            TalkingClip::read(&path, &audio, FPS.per_sec())
         })
         .collect();
-    let [area, found] = measured(&clips);
+    let [area, found] = measure(&clips);
     assert!(area > 0.95 && found > 0.97, "{area} {found}");
 }

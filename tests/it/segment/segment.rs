@@ -1,4 +1,4 @@
-//! The rules of what is kept: each reason on a track that deserves it, what is let through, and that no second is lost.
+//! Rules of segmentation: every reason of rejection, gaps that are accepted, and that all seconds are accounted for.
 
 use crate::fixtures::footage::{FPS, Footage, good, write};
 use ndarray::s;
@@ -14,7 +14,7 @@ use orator_pipeline::segment::{Measures, SegmentStage, judge};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-/// The measures as the stage takes them, only that the sound is as loud everywhere.
+/// Measures as the stage computes them, but with a constant sound level.
 fn measures(footage: &Footage) -> Measures {
     let mut measures = Measures::from_keypoints(&footage.keypoints);
     let n_frames = footage.shot.len();
@@ -38,30 +38,30 @@ fn judged(footage: &Footage) -> (Intervals, Ledger) {
     judged_measures(&measures(footage), footage.duration_secs)
 }
 
-/// The intervals, and the reasons in the order of time.
+/// Accepted intervals, and the reasons of rejection in order of time.
 fn verdict(footage: &Footage) -> (Vec<(usize, usize)>, Vec<String>) {
     let (intervals, ledger) = judged(footage);
     assert!(ledger.is_whole());
-    for refused in &ledger.refused {
-        assert!(refused.measured.is_finite() && refused.message.len() > 20, "{refused:?}");
+    for rejected in &ledger.refused {
+        assert!(rejected.measured.is_finite() && rejected.message.len() > 20, "{rejected:?}");
     }
     let intervals = intervals.intervals.iter().map(|i| (i.start, i.end)).collect();
     (intervals, ledger.refused.iter().map(|r| r.reason.clone()).collect())
 }
 
-fn kept_whole(footage: &Footage) -> bool {
+fn is_fully_accepted(footage: &Footage) -> bool {
     verdict(footage) == (vec![(0, footage.shot.len())], vec![])
 }
 
-fn spoil(keypoints: &mut Keypoints, joints: &[usize], frames: std::ops::Range<usize>) {
+fn hide(keypoints: &mut Keypoints, joints: &[usize], frames: std::ops::Range<usize>) {
     for &joint in joints {
         keypoints.body.slice_mut(s![frames.clone(), joint, 2]).fill(0.1);
     }
 }
 
 #[test]
-fn a_good_video_is_kept_whole_with_its_windows_counted() {
-    assert!(kept_whole(&good(200)));
+fn a_good_video_is_accepted_completely_and_its_windows_counted() {
+    assert!(is_fully_accepted(&good(200)));
     let (intervals, ledger) = judged(&good(200));
     assert_eq!((intervals.windows_64.stride_5, intervals.windows_64.disjoint), (28, 3));
     assert_eq!(ledger.kept_secs(), 200.0 / 15.0);
@@ -72,87 +72,87 @@ fn a_good_video_is_kept_whole_with_its_windows_counted() {
 }
 
 #[test]
-fn short_gaps_are_let_through_and_longer_ones_are_not() {
+fn short_gaps_are_accepted_and_longer_ones_rejected() {
     let mut footage = good(200);
-    spoil(&mut footage.keypoints, &[coco::L_ELBOW], 50..55);
+    hide(&mut footage.keypoints, &[coco::L_ELBOW], 50..55);
     footage.keypoints.left_hand.slice_mut(s![80..95, .., ..]).fill(0.0);
     footage.keypoints.right_hand.slice_mut(s![185..200, .., ..]).fill(0.0);
-    assert!(kept_whole(&footage));
-    spoil(&mut footage.keypoints, &[coco::L_ELBOW], 50..56);
+    assert!(is_fully_accepted(&footage));
+    hide(&mut footage.keypoints, &[coco::L_ELBOW], 50..56);
     assert_eq!(verdict(&footage), (vec![(56, 200)], vec!["too short".into(), "arms".into()]));
     footage.keypoints.left_hand.slice_mut(s![80..96, .., ..]).fill(0.0);
     let (intervals, reasons) = verdict(&footage);
     assert_eq!(intervals, [(96, 200)]);
     assert_eq!(reasons, ["too short", "arms", "too short", "hands"]);
-    // a gap that leads out of the video has nothing to be filled from
+    // A gap at the start or end of the video cannot be interpolated.
     let mut footage = good(100);
-    spoil(&mut footage.keypoints, &[coco::NOSE], 0..2);
+    hide(&mut footage.keypoints, &[coco::NOSE], 0..2);
     assert_eq!(verdict(&footage), (vec![(2, 100)], vec!["face".into()]));
 }
 
 #[test]
 fn every_reason_is_found() {
-    let whole = |change: &dyn Fn(&mut Footage)| {
+    let rejected = |change: &dyn Fn(&mut Footage)| {
         let mut footage = good(100);
         change(&mut footage);
         let (intervals, reasons) = verdict(&footage);
         assert!(intervals.is_empty(), "{reasons:?}");
         reasons.join(" ")
     };
-    assert_eq!(whole(&|f| f.sound = None), "no sound");
-    assert_eq!(whole(&|f| f.sound = Some(vec![])), "no sound");
-    assert_eq!(whole(&|f| f.sound = Some(vec![3; 106_667])), "quiet");
-    assert_eq!(whole(&|f| f.keypoints.body.fill(0.0)), "no person");
-    assert_eq!(whole(&|f| f.keypoints.body.slice_mut(s![.., .., ..2]).mapv_inplace(|v| v * 0.3)), "too small");
-    assert_eq!(whole(&|f| spoil(&mut f.keypoints, &[coco::L_EYE, coco::R_EYE], 0..100)), "face");
-    assert_eq!(whole(&|f| spoil(&mut f.keypoints, &[coco::R_ELBOW], 0..100)), "arms");
-    // talk_kim: the picture ends above the wrists
+    assert_eq!(rejected(&|f| f.sound = None), "no sound");
+    assert_eq!(rejected(&|f| f.sound = Some(vec![])), "no sound");
+    assert_eq!(rejected(&|f| f.sound = Some(vec![3; 106_667])), "quiet");
+    assert_eq!(rejected(&|f| f.keypoints.body.fill(0.0)), "no person");
+    assert_eq!(rejected(&|f| f.keypoints.body.slice_mut(s![.., .., ..2]).mapv_inplace(|v| v * 0.3)), "too small");
+    assert_eq!(rejected(&|f| hide(&mut f.keypoints, &[coco::L_EYE, coco::R_EYE], 0..100)), "face");
+    assert_eq!(rejected(&|f| hide(&mut f.keypoints, &[coco::R_ELBOW], 0..100)), "arms");
+    // As in the clip talk_kim, where the image ends above the wrists.
     let no_hands = |f: &mut Footage| {
-        spoil(&mut f.keypoints, &[coco::L_WRIST, coco::R_WRIST, coco::L_HIP, coco::R_HIP], 0..100);
+        hide(&mut f.keypoints, &[coco::L_WRIST, coco::R_WRIST, coco::L_HIP, coco::R_HIP], 0..100);
         f.keypoints.left_hand.fill(0.0);
         f.keypoints.right_hand.fill(0.0);
     };
-    assert_eq!(whole(&no_hands), "hands");
-    // never missing for long, but seldom there
+    assert_eq!(rejected(&no_hands), "hands");
+    // Only short gaps, but detected in too few frames.
     let seldom = |f: &mut Footage| {
         (0..100).filter(|t| t % 3 != 0).for_each(|t| f.keypoints.left_hand.slice_mut(s![t, .., ..]).fill(0.0));
     };
-    assert_eq!(whole(&seldom), "hands");
-    assert_eq!(whole(&|f| f.shot[50..].fill(1)), "cut cut");
-    assert_eq!(whole(&|f| *f = good(63)), "too short");
+    assert_eq!(rejected(&seldom), "hands");
+    assert_eq!(rejected(&|f| f.shot[50..].fill(1)), "cut cut");
+    assert_eq!(rejected(&|f| *f = good(63)), "too short");
     let jump = |f: &mut Footage| f.keypoints.body.slice_mut(s![50.., .., 0]).mapv_inplace(|x| x + 70.0);
-    assert_eq!(whole(&jump), "too short jump too short");
-    assert_eq!(whole(&|f| *f = good(0)), "");
+    assert_eq!(rejected(&jump), "too short jump too short");
+    assert_eq!(rejected(&|f| *f = good(0)), "");
 }
 
-/// Measures of 200 good frames, spoilt by `change`: what is kept, and the reasons in the order of time.
-fn spoilt(change: impl Fn(&mut Measures)) -> (Vec<(usize, usize)>, Vec<String>) {
+/// Judges the measures of 200 good frames after `change`: accepted intervals, and reasons in order of time.
+fn judged_with(change: impl Fn(&mut Measures)) -> (Vec<(usize, usize)>, Vec<String>) {
     let mut measures = measures(&good(200));
     change(&mut measures);
     let (intervals, ledger) = judged_measures(&measures, 200.0 / 15.0);
     assert!(ledger.is_whole());
-    let kept = intervals.intervals.iter().map(|i| (i.start, i.end)).collect();
-    (kept, ledger.refused.into_iter().map(|r| r.reason).collect())
+    let accepted = intervals.intervals.iter().map(|i| (i.start, i.end)).collect();
+    (accepted, ledger.refused.into_iter().map(|r| r.reason).collect())
 }
 
 #[test]
-fn a_gap_says_whether_the_other_hand_was_taken_for_the_missing_one() {
+fn gaps_where_the_other_hand_was_detected_have_their_own_reason() {
     let gap = |measures: &mut Measures, share: f32| {
         measures.left_hand[70..100].fill(0.0);
         measures.left_other[70..100].fill(share);
     };
-    let kept = vec![(0, 70), (100, 200)];
-    assert_eq!(spoilt(|m| gap(m, 0.5)), (kept.clone(), vec!["other hand".into()]));
-    assert_eq!(spoilt(|m| gap(m, 0.2)), (kept, vec!["hands".into()]));
+    let accepted = vec![(0, 70), (100, 200)];
+    assert_eq!(judged_with(|m| gap(m, 0.5)), (accepted.clone(), vec!["other hand".into()]));
+    assert_eq!(judged_with(|m| gap(m, 0.2)), (accepted, vec!["hands".into()]));
 }
 
 #[test]
-fn hands_that_rest_on_each_other_may_hide_each_other() {
+fn hands_that_rest_on_each_other_may_occlude_each_other() {
     let mut measures = measures(&good(200));
     measures.left_hand[20..180].fill(0.0);
     measures.rest[18..170].fill(0.05);
     let (intervals, ledger) = judged_measures(&measures, 200.0 / 15.0);
-    assert_eq!(intervals.intervals, [Interval { start: 0, end: 200 }], "ten frames more are a short gap");
+    assert_eq!(intervals.intervals, [Interval { start: 0, end: 200 }], "the remaining ten frames are a short gap");
     assert_eq!(intervals.resting, [Interval { start: 18, end: 170 }]);
     assert!(ledger.is_whole() && (ledger.resting_secs() - 152.0 / 15.0).abs() < 1e-9);
     measures.rest[18..170].fill(0.15);
@@ -161,41 +161,41 @@ fn hands_that_rest_on_each_other_may_hide_each_other() {
 }
 
 #[test]
-fn pauses_and_short_stands_are_kept_and_longer_ones_are_not() {
-    assert_eq!(spoilt(|m| m.sound_db[80..125].fill(-60.0)), (vec![(0, 200)], vec![]));
-    assert_eq!(spoilt(|m| m.sound_db[80..126].fill(-60.0)), (vec![(0, 80), (126, 200)], vec!["quiet".into()]));
-    assert_eq!(spoilt(|m| m.frame_difference[90..97].fill(0.0)), (vec![(0, 200)], vec![]));
-    assert_eq!(spoilt(|m| m.frame_difference[90..98].fill(0.0)), (vec![(0, 90), (98, 200)], vec!["still".into()]));
-    // 10 frames a second shown at 15
+fn short_quiet_or_static_parts_are_accepted_and_longer_ones_rejected() {
+    assert_eq!(judged_with(|m| m.sound_db[80..125].fill(-60.0)), (vec![(0, 200)], vec![]));
+    assert_eq!(judged_with(|m| m.sound_db[80..126].fill(-60.0)), (vec![(0, 80), (126, 200)], vec!["quiet".into()]));
+    assert_eq!(judged_with(|m| m.frame_difference[90..97].fill(0.0)), (vec![(0, 200)], vec![]));
+    assert_eq!(judged_with(|m| m.frame_difference[90..98].fill(0.0)), (vec![(0, 90), (98, 200)], vec!["still".into()]));
+    // A source of 10 fps resampled to 15 fps.
     assert_eq!(
-        spoilt(|m| (0..200).filter(|t| t % 3 == 1).for_each(|t| m.frame_difference[t] = 0.0)),
+        judged_with(|m| (0..200).filter(|t| t % 3 == 1).for_each(|t| m.frame_difference[t] = 0.0)),
         (vec![(0, 200)], vec![])
     );
 }
 
 #[test]
-fn a_body_turned_away_is_refused() {
-    assert_eq!(spoilt(|m| m.facing[80..85].fill(0.2)), (vec![(0, 200)], vec![]));
-    assert_eq!(spoilt(|m| m.facing[80..86].fill(0.2)), (vec![(0, 80), (86, 200)], vec!["turned".into()]));
-    assert_eq!(spoilt(|m| m.facing[80..].fill(-2.0)), (vec![(0, 80)], vec!["turned".into()]));
-    assert_eq!(spoilt(|m| m.nose_off[..120].fill(1.4)), (vec![(120, 200)], vec!["turned".into()]));
-    assert_eq!(spoilt(|m| m.nose_off.fill(f32::NAN)), (vec![(0, 200)], vec![]));
+fn a_body_turned_away_is_rejected() {
+    assert_eq!(judged_with(|m| m.facing[80..85].fill(0.2)), (vec![(0, 200)], vec![]));
+    assert_eq!(judged_with(|m| m.facing[80..86].fill(0.2)), (vec![(0, 80), (86, 200)], vec!["turned".into()]));
+    assert_eq!(judged_with(|m| m.facing[80..].fill(-2.0)), (vec![(0, 80)], vec!["turned".into()]));
+    assert_eq!(judged_with(|m| m.nose_off[..120].fill(1.4)), (vec![(120, 200)], vec!["turned".into()]));
+    assert_eq!(judged_with(|m| m.nose_off.fill(f32::NAN)), (vec![(0, 200)], vec![]));
 }
 
 #[test]
-fn another_person_ends_the_interval_and_a_crowd_is_refused() {
-    assert_eq!(spoilt(|m| m.identity[90] = 1.0), (vec![(0, 90), (90, 200)], vec![]));
-    assert_eq!(spoilt(|m| m.identity[30] = 1.0), (vec![(30, 200)], vec!["other person".into()]));
-    assert_eq!(spoilt(|m| m.n_people[..60].fill(9.0)), (vec![(0, 200)], vec![]));
-    assert_eq!(spoilt(|m| m.n_people[..61].fill(9.0)), (vec![], vec!["crowd".into()]));
+fn another_person_ends_the_interval_and_a_crowd_is_rejected() {
+    assert_eq!(judged_with(|m| m.identity[90] = 1.0), (vec![(0, 90), (90, 200)], vec![]));
+    assert_eq!(judged_with(|m| m.identity[30] = 1.0), (vec![(30, 200)], vec!["other person".into()]));
+    assert_eq!(judged_with(|m| m.n_people[..60].fill(9.0)), (vec![(0, 200)], vec![]));
+    assert_eq!(judged_with(|m| m.n_people[..61].fill(9.0)), (vec![], vec!["crowd".into()]));
 }
 
 #[test]
-fn a_cut_divides_and_the_sounds_end_ends_the_last_interval() {
+fn a_cut_splits_intervals_and_the_end_of_the_audio_ends_the_last() {
     let mut footage = good(300);
     footage.shot[100..].fill(1);
     assert_eq!(verdict(&footage), (vec![(0, 100), (100, 300)], vec![]));
-    // another camera may see the speaker elsewhere
+    // The speaker may have another position after a cut.
     footage.keypoints.body.slice_mut(s![100.., .., 0]).mapv_inplace(|x| x + 150.0);
     assert_eq!(verdict(&footage), (vec![(0, 100), (100, 300)], vec![]));
     if let Some(sound) = &mut footage.sound {
@@ -205,7 +205,7 @@ fn a_cut_divides_and_the_sounds_end_ends_the_last_interval() {
 }
 
 #[test]
-fn no_second_is_lost_or_counted_twice() {
+fn every_second_is_counted_exactly_once() {
     let mut rng = ChaCha8Rng::seed_from_u64(11);
     let rules = config::SegmentConfig::default();
     for _ in 0..400 {
@@ -221,7 +221,7 @@ fn no_second_is_lost_or_counted_twice() {
                 2 => footage.shot[start..].iter_mut().for_each(|shot| *shot += 1),
                 3 => footage.keypoints.body.slice_mut(s![start.., .., 0]).mapv_inplace(|x| x + 80.0),
                 4 => footage.keypoints.body.slice_mut(s![start..end, .., ..]).fill(0.0),
-                _ => spoil(&mut footage.keypoints, &joints[rng.random_range(0..5)..][..1], start..end),
+                _ => hide(&mut footage.keypoints, &joints[rng.random_range(0..5)..][..1], start..end),
             }
         }
         footage.duration_secs -= rng.random_range(0.0..0.06);
@@ -231,14 +231,14 @@ fn no_second_is_lost_or_counted_twice() {
         }
         let (intervals, ledger) = judged(&footage);
         assert!(ledger.is_whole());
-        let refused: f64 = ledger.refused_secs().values().sum();
-        assert!((ledger.kept_secs() + refused - footage.duration_secs).abs() < 1e-9);
+        let rejected: f64 = ledger.refused_secs().values().sum();
+        assert!((ledger.kept_secs() + rejected - footage.duration_secs).abs() < 1e-9);
         assert_eq!(intervals.intervals.len(), ledger.kept.len());
-        for (&Interval { start, end }, kept) in intervals.intervals.iter().zip(&ledger.kept) {
+        for (&Interval { start, end }, accepted) in intervals.intervals.iter().zip(&ledger.kept) {
             assert!(end - start >= rules.min_frames && end <= n_frames);
             assert!(footage.shot[start..end].iter().all(|&shot| shot == footage.shot[start]));
-            assert_eq!(kept.start_secs, FPS.secs(start));
-            assert_eq!(kept.end_secs, if end == n_frames { footage.duration_secs } else { FPS.secs(end) });
+            assert_eq!(accepted.start_secs, FPS.secs(start));
+            assert_eq!(accepted.end_secs, if end == n_frames { footage.duration_secs } else { FPS.secs(end) });
         }
         let text = serde_json::to_vec(&ledger).unwrap();
         assert!(serde_json::from_slice::<Ledger>(&text).unwrap().is_whole());

@@ -1,5 +1,5 @@
-//! Speech activity: the model gives the probabilities of its own package, made sounds that are not speech count as none,
-//! and without the model loudness is the rule, which is said once.
+//! Speech activity: the model gives the probabilities of its own package, synthetic non-speech sounds are rejected, and
+//! without the model speech is detected by loudness, with a single note.
 
 use crate::fixtures::footage::{FPS, good, write};
 use crate::fixtures::onnx_models::speech_model;
@@ -26,7 +26,7 @@ use std::path::Path;
 
 const RATE: usize = 16_000;
 
-/// Samples of a wav file as they are, at most `n`.
+/// At most the first `n` samples of a WAV file.
 fn utterance(name: &str, n: usize) -> Option<Vec<f32>> {
     let path = real_data(&format!("data/audio/{name}"))?;
     let mut wav = hound::WavReader::open(path).unwrap();
@@ -37,7 +37,7 @@ fn times(secs: usize) -> impl Iterator<Item = f64> {
     (0..secs * RATE).map(|i| i as f64 / RATE as f64)
 }
 
-/// A buzz of 120 Hz with harmonics that falls silent four times a second, and for two seconds in the middle.
+/// A 120 Hz tone with harmonics, silent in half of every 0.25 s and for two seconds in the middle.
 fn syllables() -> Vec<f32> {
     let of = |t: f64| {
         let buzz: f64 = (1..20).map(|k| (TAU * 120.0 * f64::from(k) * t).sin() / f64::from(k)).sum();
@@ -51,7 +51,7 @@ fn steady_noise() -> Vec<f32> {
     (0..6 * RATE as u64).map(|i| ((((i * 7919) % 100_003) as f64 / 100_003.0 - 0.5) * 0.2) as f32).collect()
 }
 
-/// Chords, a melody over them, and a drum.
+/// Chords with a melody and a drum.
 fn music(secs: usize) -> Vec<f32> {
     let note = |frequency: f64, since: f64, length: f64| -> f64 {
         let tone: f64 = (1..7).map(|k| (TAU * frequency * f64::from(k) * since).sin() / f64::from(k).powf(1.5)).sum();
@@ -68,7 +68,7 @@ fn music(secs: usize) -> Vec<f32> {
     times(secs).map(of).collect()
 }
 
-/// Sixty claps a second, each a burst of noise that dies away.
+/// Sixty claps per second, each a decaying burst of noise.
 fn applause(secs: usize) -> Vec<f32> {
     let mut rng = ChaCha8Rng::seed_from_u64(2);
     let mut sound = vec![0.0_f32; secs * RATE];
@@ -81,7 +81,7 @@ fn applause(secs: usize) -> Vec<f32> {
     sound
 }
 
-/// Voiced bursts of falling pitch, five a second.
+/// Five voiced bursts of falling pitch per second.
 fn laughter(secs: usize) -> Vec<f32> {
     let of = |t: f64| {
         let (since, pitch) = (t % 0.2, 260.0 - 40.0 * (t % 2.4));
@@ -98,7 +98,7 @@ fn probabilities(model: &mut SpeechModel, sound: &[f32]) -> Vec<f32> {
 }
 
 #[test]
-fn the_package_gives_the_same_probabilities_on_five_sounds() {
+fn probabilities_agree_with_the_package_on_five_signals() {
     let golden = include_str!("../../../fixtures/reference/speech_activity_golden.json");
     let golden: BTreeMap<String, Vec<f32>> = serde_json::from_str(golden).unwrap();
     let Some((entry, dir, runtime)) = speech_model() else { return };
@@ -113,68 +113,71 @@ fn the_package_gives_the_same_probabilities_on_five_sounds() {
         let mut model = SpeechModel::open(&runtime, &entry, &dir).unwrap();
         let found = probabilities(&mut model, &sound);
         assert_eq!(found.len(), expected.len(), "{name}");
-        let furthest = found.iter().zip(&expected).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
-        assert!(furthest <= 1e-4, "{name}: {furthest}");
+        let largest_error = found.iter().zip(&expected).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
+        assert!(largest_error <= 1e-4, "{name}: {largest_error}");
     }
 }
 
-/// Footage with this sound, judged with and without the model.
+/// Ledgers of footage with this audio, judged with and without the model.
 fn ledgers(sound: &[f32], settings: &Settings) -> [Ledger; 2] {
     let dir = tempfile::tempdir().unwrap();
     let unit = Unit { speaker: "host".into(), video: "talk-00000000".into(), source: dir.path().join("talk.mp4") };
     let mut footage = good(sound.len() * 15 / RATE);
     footage.sound = Some(sound.iter().map(|sample| (sample.clamp(-1.0, 0.999) * 32_768.0) as i16).collect());
     write(dir.path(), &unit, &footage, "a");
-    let listener = SpeechDetector::find(settings).unwrap();
-    [listener, None].map(|listener| {
-        let stage = SegmentStage::new(&settings.segment, dir.path()).with_speech(listener);
+    let detector = SpeechDetector::find(settings).unwrap();
+    [detector, None].map(|detector| {
+        let stage = SegmentStage::new(&settings.segment, dir.path()).with_speech(detector);
         let out = unit.dir(&dir.path().join(stage.name()));
         fs::create_dir_all(&out).unwrap();
         stage.run(&unit, &out, &Silent).unwrap();
         let first = fs::read(Artifact::Measures.within(&out)).unwrap();
         stage.run(&unit, &out, &Silent).unwrap();
-        assert!(fs::read(Artifact::Measures.within(&out)).unwrap() == first, "another run, other bytes");
+        assert!(fs::read(Artifact::Measures.within(&out)).unwrap() == first, "the output is deterministic");
         Ledger::read(&Artifact::SegmentLedger.path(dir.path(), &unit)).unwrap()
     })
 }
 
-fn kept_share(ledger: &Ledger) -> f64 {
+fn accepted_share(ledger: &Ledger) -> f64 {
     ledger.kept_secs() / ledger.duration_secs
 }
 
 #[test]
-fn music_noise_and_applause_are_no_speech_and_speech_over_music_is() {
+fn music_noise_and_applause_are_rejected_and_speech_over_music_is_not() {
     let Some((_, dir, _)) = speech_model() else { return };
     let mut settings = Settings::default();
     settings.models.dir = dir.clone();
     for (name, sound) in [("music", music(10)), ("noise", steady_noise()), ("applause", applause(10))] {
-        let [heard, loud] = ledgers(&sound, &settings);
-        assert!(kept_share(&loud) > 0.99, "{name} is loud");
-        assert_eq!(kept_share(&heard), 0.0, "{name}");
-        let refused = &heard.refused[0];
-        assert_eq!(refused.reason, "no speech");
-        assert!(refused.measured < 0.1 && refused.threshold == 0.4, "{refused:?}");
-        assert!(refused.message.starts_with("no speech: ") && refused.message.contains("at least 40 %"), "{refused:?}");
+        let [by_model, loud] = ledgers(&sound, &settings);
+        assert!(accepted_share(&loud) > 0.99, "{name} is loud enough");
+        assert_eq!(accepted_share(&by_model), 0.0, "{name}");
+        let rejected = &by_model.refused[0];
+        assert_eq!(rejected.reason, "no speech");
+        assert!(rejected.measured < 0.1 && rejected.threshold == 0.4, "{rejected:?}");
+        assert!(
+            rejected.message.starts_with("no speech: ") && rejected.message.contains("at least 40 %"),
+            "{rejected:?}"
+        );
     }
-    // Measured, not judged: laughter made of voiced bursts has hardly a window of speech.
-    let [heard, _] = ledgers(&laughter(10), &settings);
-    assert!(kept_share(&heard) < 0.5, "{heard:?}");
+    // Synthetic laughter of voiced bursts is mostly rejected.
+    let [by_model, _] = ledgers(&laughter(10), &settings);
+    assert!(accepted_share(&by_model) < 0.5, "{by_model:?}");
     let Some(speech) = utterance("ljspeech_LJ001-0003.wav", 9 * RATE) else { return };
     let power = |sound: &[f32]| (sound.iter().map(|s| f64::from(*s).powi(2)).sum::<f64>() / sound.len() as f64).sqrt();
     let music = music(9);
-    // Ten decibels below the voice.
+    // Music ten decibels below the voice.
     let gain = (power(&speech) / power(&music) / 10f64.sqrt()) as f32;
     let mixed: Vec<f32> = speech.iter().zip(&music).map(|(speech, music)| speech + gain * music).collect();
     for sound in [&speech, &mixed] {
-        let [heard, loud] = ledgers(sound, &settings);
-        assert!((kept_share(&heard) - kept_share(&loud)).abs() < 1e-9, "{:?}", heard.refused);
+        let [by_model, loud] = ledgers(sound, &settings);
+        assert!((accepted_share(&by_model) - accepted_share(&loud)).abs() < 1e-9, "{:?}", by_model.refused);
     }
 }
 
 #[test]
-fn the_model_gives_the_same_in_any_thread_and_streams() {
+fn streamed_results_do_not_depend_on_the_thread() {
     let Some((entry, dir, runtime)) = speech_model() else { return };
-    let sound = [syllables(), applause(4)].concat();
+    let audio = [syllables(), applause(4)].concat();
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("audio.wav");
     let spec = hound::WavSpec {
@@ -184,7 +187,7 @@ fn the_model_gives_the_same_in_any_thread_and_streams() {
         sample_format: hound::SampleFormat::Int,
     };
     let mut wav = hound::WavWriter::create(&path, spec).unwrap();
-    sound.iter().for_each(|sample| wav.write_sample((sample * 32_768.0) as i16).unwrap());
+    audio.iter().for_each(|sample| wav.write_sample((sample * 32_768.0) as i16).unwrap());
     wav.finalize().unwrap();
     let shares = || {
         let mut model = SpeechModel::open(&runtime, &entry, &dir).unwrap();
@@ -196,15 +199,15 @@ fn the_model_gives_the_same_in_any_thread_and_streams() {
         threads.into_iter().map(|thread| thread.join().unwrap()).collect()
     });
     assert!(all.iter().all(|shares| *shares == first));
-    // Ten seconds of sound at 15 frames a second; behind its end nothing is known.
+    // Ten seconds of audio at 15 fps; frames after its end are unknown.
     assert!(f32::from_bits(first[149]).is_finite() && f32::from_bits(first[151]).is_nan());
     let mut model = SpeechModel::open(&runtime, &entry, &dir).unwrap();
-    let nothing = speech_activity::shares(Path::new("no.wav"), &mut model, FPS, 3).unwrap();
-    assert!(nothing.iter().all(|share| share.is_nan()));
+    let unreadable = speech_activity::shares(Path::new("no.wav"), &mut model, FPS, 3).unwrap();
+    assert!(unreadable.iter().all(|share| share.is_nan()));
 }
 
 #[test]
-fn pauses_are_kept_and_longer_stretches_without_speech_are_not() {
+fn pauses_are_accepted_and_longer_parts_without_speech_rejected() {
     let judged = |speech: &dyn Fn(usize) -> f32| {
         let footage = good(600);
         let mut measures = Measures::from_keypoints(&footage.keypoints);
@@ -212,41 +215,45 @@ fn pauses_are_kept_and_longer_stretches_without_speech_are_not() {
         measures.sound_db = vec![-20.0; 600];
         judge(&measures, &MediaInfo::new(40.0, 600, FPS), &config::SegmentConfig::default())
     };
-    let n = |pause: usize| judged(&|t| if (300..300 + pause).contains(&t) { 0.12 } else { 0.8 });
-    let (intervals, ledger) = n(45);
+    let with_pause = |pause: usize| judged(&|t| if (300..300 + pause).contains(&t) { 0.12 } else { 0.8 });
+    let (intervals, ledger) = with_pause(45);
     assert_eq!((intervals.intervals.len(), ledger.refused.len()), (1, 0), "a pause of 3 s");
-    let (intervals, ledger) = n(63);
+    let (intervals, ledger) = with_pause(63);
     assert_eq!((intervals.intervals.len(), ledger.refused.len()), (2, 1));
-    let refused = &ledger.refused[0];
-    assert_eq!(refused.message, "no speech: 12 % of the sound is speech, at least 40 % are needed");
-    assert!((refused.end_secs - refused.start_secs - 4.2).abs() < 1e-9);
+    let rejected = &ledger.refused[0];
+    assert_eq!(rejected.message, "no speech: 12 % of the sound is speech, at least 40 % are needed");
+    assert!((rejected.end_secs - rejected.start_secs - 4.2).abs() < 1e-9);
     let slider = THRESHOLDS.iter().find(|threshold| threshold.key == "min_speech").unwrap();
     let lower = slider.with(&config::SegmentConfig::default(), 0.1);
     let mut measures = Measures::from_keypoints(&good(600).keypoints);
     measures.speech = vec![0.12; 600];
-    let kept = |rules| judge(&measures, &MediaInfo::new(40.0, 600, FPS), rules).1.kept_secs();
-    assert_eq!((kept(&config::SegmentConfig::default()), kept(&lower)), (0.0, 40.0), "the slider of the report");
-    assert_eq!(judged(&|_| f32::NAN).1.refused.len(), 0, "where loudness is the rule nothing is known of speech");
+    let accepted = |rules| judge(&measures, &MediaInfo::new(40.0, 600, FPS), rules).1.kept_secs();
+    assert_eq!(
+        (accepted(&config::SegmentConfig::default()), accepted(&lower)),
+        (0.0, 40.0),
+        "the slider of the report"
+    );
+    assert_eq!(judged(&|_| f32::NAN).1.refused.len(), 0, "without the model no frame is rejected for missing speech");
 }
 
 #[test]
-fn without_the_model_loudness_is_the_rule_and_is_said_once() {
+fn without_the_model_loudness_is_used_and_reported_once() {
     let project = Project::with_clips("speech", 2, 6.0);
     assert!(fs::read_to_string(project.dir().join("pipeline.toml")).unwrap().contains("speech = \"loudness\""));
     let plain = project.run(&[]);
     assert_eq!(plain.code, 0, "{}", plain.errors);
     assert!(!plain.errors.contains("models fetch"), "{}", plain.errors);
-    let made = |stage: &str| -> Vec<Vec<u8>> {
+    let stage_files = |stage: &str| -> Vec<Vec<u8>> {
         files_under(&project.work().join(stage)).into_iter().map(|(_, path)| fs::read(path).unwrap()).collect()
     };
-    let lifted = made("lift");
+    let lifted = stage_files("lift");
     let auto = project.run(&["--set", "segment.speech=auto"]);
     assert_eq!(auto.code, 0, "{}", auto.errors);
     assert_eq!(auto.errors.matches("speech is detected by loudness only").count(), 1, "{}", auto.errors);
     assert!(auto.errors.contains("`orator models fetch`"), "{}", auto.errors);
     let facts = auto.json["units"].as_array().unwrap().iter().find(|unit| unit["stage"] == "segment").unwrap();
     assert_eq!(facts["speech"].as_str().or(facts["facts"]["speech"].as_str()), Some("loudness"), "{facts}");
-    assert!(made("lift") == lifted);
+    assert!(stage_files("lift") == lifted);
     let card = fs::read_to_string(project.work().join("dataset/host/README.md")).unwrap();
     assert!(card.contains("Speech was detected by loudness only"), "{card}");
     let vad = project.run(&["--set", "segment.speech=vad"]);
@@ -259,7 +266,7 @@ fn without_the_model_loudness_is_the_rule_and_is_said_once() {
 }
 
 #[test]
-fn the_rule_follows_the_configuration_and_the_folder() {
+fn the_rule_depends_on_the_configuration_and_the_installed_model() {
     let dir = tempfile::tempdir().unwrap();
     let mut settings = Settings::default();
     settings.models.dir = dir.path().to_path_buf();
@@ -276,7 +283,7 @@ fn the_rule_follows_the_configuration_and_the_folder() {
     let found = SpeechDetector::find(&settings).unwrap().unwrap();
     assert_eq!(found.used().id, "speech-silero");
     assert!(SpeechDetector::advice(&settings).unwrap().is_none());
-    // The model is in the fingerprint: with it segment runs again.
+    // The model is part of the fingerprint, so installing it makes the stage stale.
     let unit = Unit { speaker: "host".into(), video: "talk".into(), source: dir.path().join("talk.mp4") };
     let with = |speech| SegmentStage::new(&settings.segment, dir.path()).with_speech(speech).settings(&unit);
     assert_ne!(with(Some(found)), with(None));
@@ -284,7 +291,7 @@ fn the_rule_follows_the_configuration_and_the_folder() {
 }
 
 #[test]
-fn a_damaged_model_is_no_model() {
+fn a_damaged_model_is_an_error() {
     let Some((entry, models, runtime)) = speech_model() else { return };
     let dir = tempfile::tempdir().unwrap();
     let mut bytes = fs::read(models.join(&entry.file)).unwrap();

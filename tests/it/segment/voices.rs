@@ -1,5 +1,5 @@
-//! Own voice against the voices of others on real clips, and how well a shifted sound is found. `ORATOR_LONG=1` (`make
-//! prove`): all clips; otherwise two of them. Clips whose lips a model made are measured apart.
+//! Own voices are distinguished from other voices on real clips, and audio shifts are estimated. `ORATOR_LONG=1` (`make
+//! prove`) uses all clips, otherwise two of them. Clips with generated lips are measured separately.
 
 use crate::fixtures::media::voices::{TalkingClip, WINDOW_SECS, area, openness};
 use orator_base::audio::openness::Openness;
@@ -8,7 +8,7 @@ use orator_test_support::skip::{fetched_model, fetched_models, real_data};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-/// Clips of people who talk, with the frames a second of the file.
+/// Clips of talking persons, with the frame rate of the file.
 const TALKING: [(&str, f64); 5] = [
     ("talk_tyson_2cam_17s_720p", 30.0),
     ("talk_kim_7s_1080p", 30.0),
@@ -16,7 +16,7 @@ const TALKING: [(&str, f64); 5] = [
     ("talk_oliver_wan_3.5s_1080p", 30.0),
     ("talk_phoneman_33s_1080p_UNSURE", 30.0),
 ];
-/// Whose lips are certainly not a model's.
+/// Clips whose lips are certainly not generated.
 const REAL: [&str; 2] = ["talk_tyson_2cam_17s_720p", "talk_kim_7s_1080p"];
 const GENERATED: [&str; 10] = [
     "mdd_long_chemistry",
@@ -30,32 +30,33 @@ const GENERATED: [&str; 10] = [
     "mdd_showcase_seth1",
     "mdd_showcase_seth2",
 ];
-/// Sounds of a speaker who is in no clip.
-const SOUNDS: [&str; 2] = ["beat2_2_scott_0_2_2_16k.wav", "beat2_2_scott_0_4_4_16k.wav"];
+/// Recordings of a speaker who is in none of the clips.
+const VOICES: [&str; 2] = ["beat2_2_scott_0_2_2_16k.wav", "beat2_2_scott_0_4_4_16k.wav"];
 
-/// Who talks in a clip of that name.
+/// Speaker of the clip of that name.
 fn speaker(name: &str) -> &str {
     let name = name.trim_start_matches("talk_").trim_start_matches("mdd_");
     let name = name.trim_start_matches("long_").trim_start_matches("showcase_");
     name.split('_').next().unwrap().trim_end_matches(|c: char| c.is_ascii_digit())
 }
 
-/// The area over all clips, and the middle 95 % of it over clips drawn anew.
+/// Area under the curve over all clips, and its bootstrap 95 % interval over clips.
 fn with_interval(clips: &[(Vec<f64>, Vec<f64>)], rng: &mut ChaCha8Rng) -> [f64; 3] {
-    let of = |drawn: &[usize]| {
+    let roc = |drawn: &[usize]| {
         let own: Vec<f64> = drawn.iter().flat_map(|k| clips[*k].0.clone()).collect();
         let others: Vec<f64> = drawn.iter().flat_map(|k| clips[*k].1.clone()).collect();
         area(&own, &others)
     };
-    let mut drawn: Vec<f64> =
-        (0..400).map(|_| of(&(0..clips.len()).map(|_| rng.random_range(0..clips.len())).collect::<Vec<_>>())).collect();
+    let mut drawn: Vec<f64> = (0..400)
+        .map(|_| roc(&(0..clips.len()).map(|_| rng.random_range(0..clips.len())).collect::<Vec<_>>()))
+        .collect();
     drawn.sort_by(f64::total_cmp);
-    [of(&(0..clips.len()).collect::<Vec<_>>()), drawn[10], drawn[389]]
+    [roc(&(0..clips.len()).collect::<Vec<_>>()), drawn[10], drawn[389]]
 }
 
 #[test]
-fn own_voices_are_told_from_others_and_shifts_are_found() {
-    let (Some(videos), Some(sounds), Some(models), Some(_)) =
+fn own_voices_are_distinguished_from_others_and_shifts_estimated() {
+    let (Some(videos), Some(audio), Some(models), Some(_)) =
         (real_data("data/videos"), real_data("data/audio"), fetched_models(), fetched_model("face_landmark_192.onnx"))
     else {
         return;
@@ -75,24 +76,24 @@ fn own_voices_are_told_from_others_and_shifts_are_found() {
     let answer = project.run(&["--to", "segment"]);
     assert_eq!(answer.code, 0, "{}", answer.errors);
     let work = files_under(&project.work());
-    let made = |name: &str, ending: &str| {
+    let output = |name: &str, ending: &str| {
         let slug = name.rsplit('/').next().unwrap().to_lowercase().replace(['_', '.'], "-");
-        let is_it = |file: &&(String, std::path::PathBuf)| file.0.contains(&slug) && file.0.ends_with(ending);
-        work.iter().find(is_it).unwrap_or_else(|| panic!("no {ending} of {name}")).1.clone()
+        let is_match = |file: &&(String, std::path::PathBuf)| file.0.contains(&slug) && file.0.ends_with(ending);
+        work.iter().find(is_match).unwrap_or_else(|| panic!("no {ending} of {name}")).1.clone()
     };
     let clips: Vec<TalkingClip> = named
         .iter()
         .map(|(name, source_fps)| {
-            let ledger = std::fs::read_to_string(made(name, "ledger.json")).unwrap();
-            assert!(!ledger.contains("voice of another"), "{name}: an own voice is refused");
+            let ledger = std::fs::read_to_string(output(name, "ledger.json")).unwrap();
+            assert!(!ledger.contains("voice of another"), "{name}: the own voice is rejected");
             let mut clip =
-                TalkingClip::read(&made(name, "keypoints.npz"), &made(name, "audio.wav"), *source_fps).unwrap();
+                TalkingClip::read(&output(name, "keypoints.npz"), &output(name, "audio.wav"), *source_fps).unwrap();
             clip.name = name.trim_start_matches("generated/").to_owned();
             clip
         })
         .collect();
-    let strangers: Vec<(Openness, f64)> =
-        SOUNDS.iter().map(|name| sounds.join(name)).filter(|path| path.is_file()).map(|path| openness(&path)).collect();
+    let recorded: Vec<(Openness, f64)> =
+        VOICES.iter().map(|name| audio.join(name)).filter(|path| path.is_file()).map(|path| openness(&path)).collect();
 
     let mut rng = ChaCha8Rng::seed_from_u64(1);
     let (mut scored, mut n_found, mut n_shifts) = (Vec::new(), [0, 0], [0, 0]);
@@ -100,13 +101,13 @@ fn own_voices_are_told_from_others_and_shifts_are_found() {
         let offset = clip.offset();
         let own = clip.windows(&clip.voice, 0.0, offset.secs);
         let of_clips = clips.iter().filter(|other| speaker(&other.name) != speaker(&clip.name));
-        let others = of_clips.map(|other| (&other.voice, other.secs)).chain(strangers.iter().map(|(v, s)| (v, *s)));
+        let others = of_clips.map(|other| (&other.voice, other.secs)).chain(recorded.iter().map(|(v, s)| (v, *s)));
         let mut other = Vec::new();
         for (voice, secs) in others {
             for _ in 0..4 {
-                let room = secs - clip.secs;
-                let later = if room > 0.0 { rng.random_range(0.0..room) } else { rng.random_range(room..0.0) };
-                other.extend(clip.windows(voice, later, 0.0));
+                let slack = secs - clip.secs;
+                let shift = if slack > 0.0 { rng.random_range(0.0..slack) } else { rng.random_range(slack..0.0) };
+                other.extend(clip.windows(voice, shift, 0.0));
             }
         }
         let is_generated = clip.name.starts_with("mdd");
@@ -118,8 +119,8 @@ fn own_voices_are_told_from_others_and_shifts_are_found() {
         }
         let area = area(&own, &other);
         eprintln!(
-            "{:<38} {offset}, correlation {:.2}, confidence {:.4}; area {area:.3} ({} own, {} other windows); shifts of \
-             10 s within {:.0} ms",
+            "{:<38} {offset}, correlation {:.2}, confidence {:.4}; area {area:.3} ({} own, {} other windows); shifts \
+             of 10 s within {:.0} ms",
             clip.name,
             offset.correlation,
             offset.confidence,
@@ -134,26 +135,26 @@ fn own_voices_are_told_from_others_and_shifts_are_found() {
     };
     let is_generated = |name: &str| name.starts_with("mdd");
     let groups: [(&str, Vec<_>); 3] = [
-        ("surely real lips", group(&|name| REAL.contains(&name))),
+        ("clips with certainly real lips", group(&|name| REAL.contains(&name))),
         ("talking clips", group(&|name| !is_generated(name))),
         ("generated clips", group(&is_generated)),
     ];
     for (name, clips) in groups.iter().filter(|(_, clips)| !clips.is_empty()) {
         let [area, low, high] = with_interval(clips, &mut rng);
         eprintln!("{name}: area under the curve at {WINDOW_SECS} s {area:.3} (95 %: {low:.3} to {high:.3})");
-        // Two clips alone have few others to be told from.
-        let least = if *name == "generated clips" { 0.85 } else { 0.95 };
-        assert!(area >= if is_long { least } else { 0.9 }, "{name}: {area}");
+        // With two clips alone there are few other voices.
+        let min_area = if *name == "generated clips" { 0.85 } else { 0.95 };
+        assert!(area >= if is_long { min_area } else { 0.9 }, "{name}: {area}");
     }
     check_shifts(n_found, n_shifts);
 }
 
-/// Shifts of talking and of generated clips that are found within a frame of the source.
+/// Checks the shares of talking and of generated clips whose shifts are estimated within one source frame.
 fn check_shifts(n_found: [usize; 2], n_shifts: [usize; 2]) {
     for (name, k) in [("talking", 0), ("generated", 1)] {
         let share = n_found[k] as f64 / n_shifts[k].max(1) as f64;
         eprintln!(
-            "{name}: {} of {} shifts found within a frame of the source ({:.1} %)",
+            "{name}: {} of {} shifts estimated within a frame of the source ({:.1} %)",
             n_found[k],
             n_shifts[k],
             100.0 * share

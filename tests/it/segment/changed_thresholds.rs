@@ -1,67 +1,67 @@
-//! Thresholds changed after a run: `status --why` names the key and says which stages would run, `run` runs those and
-//! never pose2d; and the account of seconds in `status` adds up, with failures in it.
+//! Thresholds changed after a run: `status --why` names the key and the stages that would run, and `run` runs exactly
+//! those, never pose2d. Also the time budget of `status`, which adds up even with failures.
 
 use orator_test_support::project::{ProgramAnswer, Project, files_under};
 use serde_json::Value;
 use std::collections::BTreeMap;
 use std::fs;
 
-/// Of each stage how many units stay fresh, how many would run, and why.
+/// For each stage the number of fresh units, the number of units that would run, and the reasons.
 fn plan(answer: &ProgramAnswer) -> BTreeMap<String, (u64, u64, String)> {
     let of = |stage: &Value| {
-        let why = stage["reasons"].as_array().unwrap().iter().map(|why| why.as_str().unwrap());
-        let n = |key: &str| stage[key].as_u64().unwrap();
+        let reasons = stage["reasons"].as_array().unwrap().iter().map(|reason| reason.as_str().unwrap());
+        let count = |key: &str| stage[key].as_u64().unwrap();
         let name = stage["stage"].as_str().unwrap().to_owned();
-        (name, (n("up_to_date"), n("would_run"), why.collect::<Vec<_>>().join("; ")))
+        (name, (count("up_to_date"), count("would_run"), reasons.collect::<Vec<_>>().join("; ")))
     };
     answer.json["plan"].as_array().unwrap().iter().map(of).collect()
 }
 
 /// Every file of a stage with its content.
-fn made(project: &Project, stage: &str) -> Vec<(String, Vec<u8>)> {
+fn stage_files(project: &Project, stage: &str) -> Vec<(String, Vec<u8>)> {
     let files = files_under(&project.work().join(stage));
     files.into_iter().map(|(name, path)| (name, fs::read(path).unwrap())).collect()
 }
 
 #[test]
-fn a_changed_threshold_runs_segment_and_what_follows_and_never_pose2d() {
+fn a_changed_threshold_runs_only_the_stages_that_depend_on_it() {
     let project = Project::with_clips("redecide", 1, 6.0);
     assert_eq!(project.run(&[]).code, 0);
-    let (extract, pose2d) = (made(&project, "extract"), made(&project, "pose2d"));
+    let (extract, pose2d) = (stage_files(&project, "extract"), stage_files(&project, "pose2d"));
     let changes = [
-        // (key, was, now, the first stage it concerns, units that lift does again: none where the verdict is the same)
+        // (key, old value, new value, first stage that uses it, units that lift runs: 0 if the intervals are unchanged)
         ("shot_threshold", "0.2", "0.3", "segment", 0),
         ("min_frames", "64", "70", "segment", 1),
         ("max_bone_change", "0.4", "0.45", "lift", 1),
         ("min_sound_db", "-50.0", "-1.0", "segment", 1),
     ];
     let mut set: Vec<String> = Vec::new();
-    for (key, was, now, first, n_lifted) in changes {
+    for (key, old, new, first, n_lifted) in changes {
         let section = first;
-        set.extend(["--set".to_owned(), format!("{section}.{key}={now}")]);
+        set.extend(["--set".to_owned(), format!("{section}.{key}={new}")]);
         let set: Vec<&str> = set.iter().map(String::as_str).collect();
-        let told = plan(&project.answer(&[&["status", "--why"], &set[..]].concat()));
-        let expected = format!("{section}.{key} changed from {was} to {now}");
+        let planned = plan(&project.answer(&[&["status", "--why"], &set[..]].concat()));
+        let expected = format!("{section}.{key} changed from {old} to {new}");
         for fresh in ["extract", "pose2d"] {
-            assert_eq!((told[fresh].0, told[fresh].1), (1, 0), "{key}: {told:?}");
+            assert_eq!((planned[fresh].0, planned[fresh].1), (1, 0), "{key}: {planned:?}");
         }
-        assert_eq!((told[first].1, told[first].2.as_str()), (1, expected.as_str()), "{key}");
-        assert_eq!(told["segment"].1, u64::from(first == "segment"), "{key}");
+        assert_eq!((planned[first].1, planned[first].2.as_str()), (1, expected.as_str()), "{key}");
+        assert_eq!(planned["segment"].1, u64::from(first == "segment"), "{key}");
         for after in ["lift", "dataset"] {
-            assert_eq!(told[after].1, 1, "{key}: {told:?}");
+            assert_eq!(planned[after].1, 1, "{key}: {planned:?}");
         }
         let answer = project.run(&set);
-        // at -1 dB all is too quiet, and there is no dataset
+        // At -1 dB everything is too quiet, so there is no dataset.
         assert_eq!(answer.code, if key == "min_sound_db" { 2 } else { 0 }, "{}", answer.errors);
         let done = |stage: &str| answer.json["stages"][stage]["done"].as_u64().unwrap();
         assert_eq!((done("extract"), done("pose2d"), done("segment")), (0, 0, u64::from(first == "segment")), "{key}");
-        assert_eq!((done("lift"), made(&project, "pose2d") == pose2d), (n_lifted, true), "{key}");
+        assert_eq!((done("lift"), stage_files(&project, "pose2d") == pose2d), (n_lifted, true), "{key}");
     }
-    assert!(made(&project, "extract") == extract);
+    assert!(stage_files(&project, "extract") == extract);
 }
 
 #[test]
-fn every_second_is_in_the_account() {
+fn every_second_is_in_the_time_budget() {
     let project = Project::with_clips("account", 2, 6.0);
     let clips = project.clips();
     fs::write(project.video("text.mp4"), "this is no video\n").unwrap();
@@ -77,10 +77,10 @@ fn every_second_is_in_the_account() {
     assert!((secs(&before, "waiting_secs") - 12.0).abs() < 0.2 && before["unknown_durations"] == 1, "{before}");
     assert_eq!(project.run(&[]).code, 2);
     let after = status();
-    let refused: f64 = after["rejected_secs"].as_object().unwrap().values().map(|v| v.as_f64().unwrap()).sum();
-    assert!((secs(&after, "accepted_secs") + refused - 12.0).abs() < 0.2, "{after}");
+    let rejected: f64 = after["rejected_secs"].as_object().unwrap().values().map(|v| v.as_f64().unwrap()).sum();
+    assert!((secs(&after, "accepted_secs") + rejected - 12.0).abs() < 0.2, "{after}");
     assert!(secs(&after, "waiting_secs") == 0.0 && after["unknown_durations"] == 1, "{after}");
-    // a stage that fails takes its whole video: the length is known from the stage before
+    // A failed stage counts its full video, whose duration is known from the preceding stage.
     let keypoints = files_under(&project.work().join("pose2d")).into_iter().find(|(name, _)| name.ends_with(".npz"));
     fs::remove_file(keypoints.unwrap().1).unwrap();
     let models = project.dir().join("models");
@@ -91,7 +91,7 @@ fn every_second_is_in_the_account() {
 }
 
 #[test]
-fn after_a_run_of_two_speakers_nothing_is_stale() {
+fn after_a_run_of_two_speakers_all_units_are_fresh() {
     let project = Project::with_clips("speakers", 1, 5.0);
     let other = project.dir().join("videos/guest.mp4");
     fs::copy(&project.clips()[0], other).unwrap();

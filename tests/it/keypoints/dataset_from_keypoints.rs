@@ -1,5 +1,5 @@
-//! From keypoints of another program to a dataset: the synthetic speaker's own keypoints, written as OpenPose writes them,
-//! give nearly the joints that its video gave. And what the configuration must say beside them.
+//! A dataset made from keypoint files: the keypoints of the synthetic speaker, written in the format of OpenPose, give
+//! nearly the joints of its video. Also the configuration keys that keypoint files require.
 
 use crate::fixtures::media::foreign_keypoints as foreign;
 use crate::fixtures::media::foreign_keypoints::OpenPoseOrder;
@@ -21,8 +21,8 @@ fn orator(dir: &Path, args: &[&str]) -> (Option<i32>, String) {
     (output.status.code(), text)
 }
 
-/// The one file of that name under the folder of a stage.
-fn made(dir: &Path, stage: &str, name: &str) -> PathBuf {
+/// Path of the only file of that name in the output folder of a stage.
+fn stage_file(dir: &Path, stage: &str, name: &str) -> PathBuf {
     let speaker = dir.join("work").join(stage).join("host");
     let videos = std::fs::read_dir(&speaker).unwrap().map(|entry| entry.unwrap().path());
     let found: Vec<PathBuf> = videos.filter(|path| path.is_dir()).map(|path| path.join(name)).collect();
@@ -35,46 +35,46 @@ fn configure(dir: &Path, keys: &str) {
     std::fs::write(dir.join("pipeline.toml"), text).unwrap();
 }
 
-/// Mean distance of joints that both have, mm.
-fn apart_mm(a: &Motion, b: &Motion) -> f64 {
+/// Mean distance of the joints that both motions have, mm.
+fn mean_distance_mm(a: &Motion, b: &Motion) -> f64 {
     assert_eq!(a.joints.shape(), b.joints.shape());
     let pairs = a.joints.rows().into_iter().zip(b.joints.rows());
-    let far = pairs.map(|(a, b)| (0..3).map(|k| f64::from(a[k] - b[k]).powi(2)).sum::<f64>().sqrt());
-    let far: Vec<f64> = far.filter(|distance| distance.is_finite()).collect();
-    assert!(far.len() > a.joints.len() / 6, "{} distances", far.len());
-    1000.0 * far.iter().sum::<f64>() / far.len() as f64
+    let distances = pairs.map(|(a, b)| (0..3).map(|k| f64::from(a[k] - b[k]).powi(2)).sum::<f64>().sqrt());
+    let distances: Vec<f64> = distances.filter(|distance| distance.is_finite()).collect();
+    assert!(distances.len() > a.joints.len() / 6, "{} distances", distances.len());
+    1000.0 * distances.iter().sum::<f64>() / distances.len() as f64
 }
 
 #[test]
-fn keypoints_lead_to_nearly_the_joints_of_their_video() {
+fn keypoint_files_give_nearly_the_joints_of_their_video() {
     let project = Project::with_clips("keypoints", 1, 8.0);
     let ran = project.run(&[]);
     assert_eq!(ran.code, 0, "{}", ran.errors);
-    let of_video = joints_npz::read(&made(project.dir(), "lift", "joints.npz")).unwrap();
-    let keypoints = keypoints_npz::read(&made(project.dir(), "pose2d", "keypoints.npz")).unwrap();
+    let from_video = joints_npz::read(&stage_file(project.dir(), "lift", "joints.npz")).unwrap();
+    let keypoints = keypoints_npz::read(&stage_file(project.dir(), "pose2d", "keypoints.npz")).unwrap();
 
     let dir = tempfile::tempdir().unwrap();
-    let sound = dir.path().join("sound");
-    std::fs::create_dir(&sound).unwrap();
-    std::fs::copy(made(project.dir(), "extract", "audio.wav"), sound.join("clip.wav")).unwrap();
+    let audio = dir.path().join("sound");
+    std::fs::create_dir(&audio).unwrap();
+    std::fs::copy(stage_file(project.dir(), "extract", "audio.wav"), audio.join("clip.wav")).unwrap();
     foreign::openpose(&dir.path().join("kp/clip"), &keypoints, OpenPoseOrder::Body25);
     let size = format!("{}x{}", keypoints.image_size[0], keypoints.image_size[1]);
     configure(dir.path(), &format!("keypoints = \"kp\"\naudio = \"sound\"\nfps = 15\nsize = \"{size}\""));
     let (code, text) = orator(dir.path(), &["run"]);
     assert_eq!(code, Some(0), "{text}");
-    let joints = joints_npz::read(&made(dir.path(), "lift", "joints.npz")).unwrap();
-    let mm = apart_mm(&of_video, &joints);
-    eprintln!("{mm:.3} mm between the roads at the same rate");
+    let joints = joints_npz::read(&stage_file(dir.path(), "lift", "joints.npz")).unwrap();
+    let mm = mean_distance_mm(&from_video, &joints);
+    eprintln!("{mm:.3} mm between the two sets of joints at the same rate");
     assert!(mm < 1.0, "{mm} mm");
 
-    // Status, report and card say what was not judged; the dataset names no model.
+    // Status, report and card list the checks that keypoint files do not allow; the dataset lists no model.
     let (_, status) = orator(dir.path(), &["status"]);
-    let not_judged = "cuts, static images and printed or on-screen persons are not checked";
-    assert!(status.contains("OpenPose, 25 points at 15 fps") && status.contains(not_judged), "{status}");
+    let unchecked = "cuts, static images and printed or on-screen persons are not checked";
+    assert!(status.contains("OpenPose, 25 points at 15 fps") && status.contains(unchecked), "{status}");
     let dataset = dir.path().join("work/dataset/host");
     let card = std::fs::read_to_string(dataset.join("README.md")).unwrap();
     assert!(card.contains("1 video made from keypoints (OpenPose, 25 points at 15 fps)"), "{card}");
-    assert!(card.contains(not_judged) && !card.contains("with the models"), "{card}");
+    assert!(card.contains(unchecked) && !card.contains("with the models"), "{card}");
     assert!(Dataset::open(&dataset).unwrap().info().models.is_empty());
     let (code, text) = orator(dir.path(), &["dataset", "verify", "work/dataset/host"]);
     assert_eq!(code, Some(0), "{text}");
@@ -82,9 +82,9 @@ fn keypoints_lead_to_nearly_the_joints_of_their_video() {
     let (code, text) = orator(dir.path(), &["report", "--out", &page.to_string_lossy()]);
     assert_eq!(code, Some(0), "{text}");
     let page = std::fs::read_to_string(page).unwrap();
-    assert!(page.contains(not_judged) && !page.contains("No pictures available"));
+    assert!(page.contains(unchecked) && !page.contains("No pictures available"));
 
-    // Nothing is done again; another frame is another video.
+    // A second run does no work; a changed frame counts as a changed video.
     let (_, again) = orator(dir.path(), &["run", "--to", "lift"]);
     assert!(!again.contains("frames at 15 fps"), "{again}");
     let frame = dir.path().join("kp/clip/clip_000000000060_keypoints.json");
@@ -92,7 +92,7 @@ fn keypoints_lead_to_nearly_the_joints_of_their_video() {
     let (_, changed) = orator(dir.path(), &["status", "--why"]);
     assert!(changed.contains("the video changed"), "{changed}");
 
-    // Twice the rate on the way and back again: the same within what lies between two frames.
+    // Resampled to twice the rate and back, the joints differ by no more than the interpolation error.
     let found = orator_formats::keypoints::read(&dir.path().join("kp/clip")).unwrap();
     let twice = convert(found, RATE, keypoints.image_size, FrameRate::new(30, 1)).unwrap().keypoints;
     foreign::openpose(&dir.path().join("fast/clip"), &twice, OpenPoseOrder::Coco18);
@@ -101,14 +101,14 @@ fn keypoints_lead_to_nearly_the_joints_of_their_video() {
     assert_eq!(code, Some(0), "{text}");
     std::fs::rename(dir.path().join("work"), dir.path().join("first_work")).unwrap();
     std::fs::rename(dir.path().join("fast_work"), dir.path().join("work")).unwrap();
-    let joints = joints_npz::read(&made(dir.path(), "lift", "joints.npz")).unwrap();
-    let mm = apart_mm(&of_video, &joints);
-    eprintln!("{mm:.3} mm between the roads over twice the rate");
+    let joints = joints_npz::read(&stage_file(dir.path(), "lift", "joints.npz")).unwrap();
+    let mm = mean_distance_mm(&from_video, &joints);
+    eprintln!("{mm:.3} mm between the two sets of joints after resampling to twice the rate");
     assert!(mm < 5.0, "{mm} mm");
 }
 
 #[test]
-fn what_the_files_do_not_say_is_asked_for_by_its_key() {
+fn errors_name_the_configuration_key_of_a_missing_value() {
     let dir = tempfile::tempdir().unwrap();
     foreign::openpose(&dir.path().join("kp/clip"), &foreign::sample(30, RATE), OpenPoseOrder::Body25);
     std::fs::write(dir.path().join("other.wav"), "").unwrap();

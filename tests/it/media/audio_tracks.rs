@@ -1,4 +1,4 @@
-//! Which of several sound tracks is taken.
+//! Selection of one of several audio tracks.
 
 use crate::fixtures::clips::{ffmpeg, write_numbered};
 use orator_base::stage::progress::Silent;
@@ -16,15 +16,15 @@ fn run(video: &Path, out: &Path, audio_track: usize) -> anyhow::Result<Report> {
     ExtractStage::new(&settings).run(&unit, out, &Silent)
 }
 
-/// Hertz by the sign changes of a sound.
+/// Pitch of a pure tone from its sign changes, Hz.
 fn pitch(path: &Path) -> f64 {
-    let sound = audio::read_mono(path, 16_000).unwrap().unwrap();
-    let n = sound.samples.windows(2).filter(|pair| (pair[0] < 0.0) != (pair[1] < 0.0)).count();
-    n as f64 / 2.0 / sound.secs()
+    let audio = audio::read_mono(path, 16_000).unwrap().unwrap();
+    let n = audio.samples.windows(2).filter(|pair| (pair[0] < 0.0) != (pair[1] < 0.0)).count();
+    n as f64 / 2.0 / audio.secs()
 }
 
 #[test]
-fn the_default_track_is_taken_or_the_one_asked_for() {
+fn the_configured_track_is_used_or_else_the_default_track() {
     let dir = tempfile::tempdir().unwrap();
     write_numbered(dir.path(), "in.mp4", 60, FrameRate::new(30, 1), None);
     let tones = "-f lavfi -i sine=frequency=300:duration=2 -f lavfi -i sine=frequency=900:duration=2";
@@ -41,18 +41,18 @@ fn the_default_track_is_taken_or_the_one_asked_for() {
         for (track, expected) in hertz.into_iter().enumerate() {
             let out = dir.path().join(format!("{name}-{track}"));
             let report = run(&video, &out, track).unwrap();
-            let heard = pitch(&out.join("audio.wav"));
-            assert!((heard - expected).abs() < 20.0, "{name}, track {track}: {heard} Hz");
-            let taken = if expected == 300.0 { 1 } else { 2 };
+            let found = pitch(&out.join("audio.wav"));
+            assert!((found - expected).abs() < 20.0, "{name}, track {track}: {found} Hz");
+            let number = if expected == 300.0 { 1 } else { 2 };
             let tracks = &report.facts["audio_tracks"];
-            assert_eq!((&tracks["n_tracks"], &tracks["taken"]), (&2.into(), &taken.into()), "{tracks}");
-            let words = format!("2 audio tracks (deu, eng): number {taken} is used (extract.audio_track)");
-            assert!(report.line.contains(&words), "{}", report.line);
+            assert_eq!((&tracks["n_tracks"], &tracks["taken"]), (&2.into(), &number.into()), "{tracks}");
+            let note = format!("2 audio tracks (deu, eng): number {number} is used (extract.audio_track)");
+            assert!(report.line.contains(&note), "{}", report.line);
         }
         let error = format!("{:#}", run(&video, &dir.path().join("gone"), 3).unwrap_err());
         assert!(error.contains("no audio track 3, the file has 2") && error.contains(name), "{error}");
     }
-    // One track leaves no choice.
+    // A single track is used regardless of the setting, without a note.
     if ffmpeg(dir.path(), &format!("-i in.mp4 {tones} -map 0:v -map 1:a -c:v copy one.mkv")) {
         let report = run(&dir.path().join("one.mkv"), &dir.path().join("one"), 2).unwrap();
         assert!(

@@ -1,4 +1,4 @@
-//! Pictures that are not plain: other sizes inside a file, HDR, interlaced fields; and that plain ones are left alone.
+//! Videos that need image processing: a changing image size, HDR, interlacing. Plain videos are not changed.
 
 use crate::fixtures::clips::{ffmpeg, number_of, write_numbered, write_sized};
 use orator_base::stage::progress::Silent;
@@ -27,13 +27,13 @@ fn extract(video: &Path) -> (MediaInfo, Timeline, String) {
 }
 
 #[test]
-fn another_size_inside_a_file_is_brought_to_the_first() {
+fn images_of_another_size_in_a_file_are_scaled_to_the_first_size() {
     let dir = tempfile::tempdir().unwrap();
-    let parts = [("first", [128, 64]), ("scaled", [256, 128]), ("square", [128, 128])];
-    for (k, (name, size)) in parts.into_iter().enumerate() {
+    let segments = [("first", [128, 64]), ("scaled", [256, 128]), ("square", [128, 128])];
+    for (k, (name, size)) in segments.into_iter().enumerate() {
         write_sized(dir.path(), &format!("{name}.mp4"), 30, FrameRate::new(30, 1), size, None);
-        let how = format!("-c:v libx264 -crf 10 -bf 0 -muxdelay 0 -muxpreload 0 -output_ts_offset {k}");
-        if !ffmpeg(dir.path(), &format!("-i {name}.mp4 {how} {name}.ts")) {
+        let options = format!("-c:v libx264 -crf 10 -bf 0 -muxdelay 0 -muxpreload 0 -output_ts_offset {k}");
+        if !ffmpeg(dir.path(), &format!("-i {name}.mp4 {options} {name}.ts")) {
             return;
         }
     }
@@ -60,14 +60,14 @@ fn another_size_inside_a_file_is_brought_to_the_first() {
     assert_eq!((media.n_resizes, media.image_size, media.damage), (2, [128, 64], None));
     assert!(line.contains("the image size changes 2 times"), "{line}");
     assert!(timeline.restart[15] && timeline.restart[30], "{:?}", timeline.restart);
-    // The shape is the same at the first change: what is seen stays in its place.
+    // The first change preserves the aspect ratio, so the image content does not move.
     assert!(timeline.shot_score[15] < 0.2 && timeline.shot_score[30] == 1.0, "{:?}", timeline.shot_score);
-    // A small first part decides, even where that is the smaller one.
+    // The first size is used even if it is the smaller one.
     let (media, ..) = extract(&joined(&["square", "scaled"]));
     assert_eq!(media.image_size, [128, 128]);
 }
 
-/// Six patches of one colour each.
+/// An image of six colour patches, and their colours.
 fn patches() -> (Image, [[u8; 3]; 6]) {
     let colours = [[16, 16, 16], [64, 64, 64], [128, 128, 128], [190, 140, 115], [60, 90, 170], [225, 225, 225]];
     let mut image = Image::filled(192, 128, [0; 3]);
@@ -78,7 +78,7 @@ fn patches() -> (Image, [[u8; 3]; 6]) {
 }
 
 #[test]
-fn hdr_pictures_look_like_the_sdr_ones_they_were_made_of() {
+fn hdr_images_are_tone_mapped_to_their_sdr_source() {
     let dir = tempfile::tempdir().unwrap();
     let (image, colours) = patches();
     png::write(&dir.path().join("patches.png"), &image).unwrap();
@@ -89,18 +89,19 @@ fn hdr_pictures_look_like_the_sdr_ones_they_were_made_of() {
         );
         let tags =
             format!("log-level=none:colorprim=bt2020:transfer={transfer}:colormatrix=bt2020nc:range=limited:crf=8");
-        let how = format!("-loop 1 -t 2 -r 15 -i patches.png -vf {to_hdr} -c:v libx265 -x265-params {tags} {name}.mp4");
-        if !ffmpeg(dir.path(), &how) {
+        let args =
+            format!("-loop 1 -t 2 -r 15 -i patches.png -vf {to_hdr} -c:v libx265 -x265-params {tags} {name}.mp4");
+        if !ffmpeg(dir.path(), &args) {
             continue;
         }
         let path = dir.path().join(format!("{name}.mp4"));
         let mut reader = FrameReader::open(&path, DATASET).unwrap();
         assert_eq!(reader.hdr(), Some(name));
-        let seen = reader.next().unwrap().unwrap().image;
+        let frame = reader.next().unwrap().unwrap().image;
         for (k, colour) in colours.iter().enumerate() {
-            let got = seen.pixel(64 * (k % 3) + 32, 64 * (k / 3) + 32);
-            eprintln!("{name}: {colour:?} comes out as {got:?}");
-            assert!(got.iter().zip(colour).all(|(a, b)| a.abs_diff(*b) <= 4), "{name}: {colour:?} became {got:?}");
+            let found = frame.pixel(64 * (k % 3) + 32, 64 * (k / 3) + 32);
+            eprintln!("{name}: {colour:?} is read as {found:?}");
+            assert!(found.iter().zip(colour).all(|(a, b)| a.abs_diff(*b) <= 4), "{name}: {colour:?} became {found:?}");
         }
         let (media, _, line) = extract(&path);
         assert_eq!(media.hdr.as_deref(), Some(name));
@@ -108,8 +109,8 @@ fn hdr_pictures_look_like_the_sdr_ones_they_were_made_of() {
     }
 }
 
-/// Mean share of combed pixels over a clip at 25 frames a second.
-fn combs(path: &Path, pictures: PictureOptions) -> f64 {
+/// Mean share of pixels with combing artefacts over a clip at 25 fps.
+fn mean_comb_share(path: &Path, pictures: PictureOptions) -> f64 {
     let reader = FrameReader::open(path, FrameRate::new(25, 1)).unwrap().with_options(pictures);
     let frames: Vec<Image> = reader.map(|frame| frame.unwrap().image).collect();
     let shares: Vec<f64> = frames.windows(2).map(|pair| comb_share(&pair[0], &pair[1])).collect();
@@ -117,16 +118,16 @@ fn combs(path: &Path, pictures: PictureOptions) -> f64 {
 }
 
 #[test]
-fn interlaced_fields_are_found_and_combs_removed() {
+fn interlacing_is_detected_and_combing_is_removed() {
     let dir = tempfile::tempdir().unwrap();
-    // A disc on a textured wall, 6 px to the side each 50th of a second.
+    // A disc in front of a textured wall that moves 6 px sideways per 1/50 s.
     let disc = "geq=lum='if(lt(hypot(mod(6*N,W)-X,Y-H/2),60),220,60+20*sin(X/9)*cos(Y/7))':cb=128:cr=128";
     let drawn = format!("-f lavfi -i color=gray:s=480x320:r=50:d=2.4 -vf {disc} -c:v ffv1 drawn.mkv");
     if !ffmpeg(dir.path(), &drawn) {
         return;
     }
-    let kept = PictureOptions::default();
-    let wanted = PictureOptions { deinterlace: true, ..kept };
+    let interlaced = PictureOptions::default();
+    let deinterlaced = PictureOptions { deinterlace: true, ..interlaced };
     for (name, fields, codec) in [
         ("flagged.mp4", "tinterlace=interleave_top", "libx264 -flags +ildct+ilme -crf 12"),
         ("bottom.mpg", "tinterlace=interleave_bottom", "mpeg2video -flags +ildct+ilme -q:v 2 -top 0"),
@@ -137,20 +138,20 @@ fn interlaced_fields_are_found_and_combs_removed() {
             continue;
         }
         let path = dir.path().join(name);
-        let [before, after] = [kept, wanted].map(|pictures| combs(&path, pictures));
+        let [before, after] = [interlaced, deinterlaced].map(|pictures| mean_comb_share(&path, pictures));
         eprintln!("{name}: combs {before:.5} before, {after:.6} after");
         assert!(before > 0.001 && after < 0.05 * before, "{name}: {before} to {after}");
         let (media, _, line) = extract(&path);
         assert!(media.pictures.deinterlace && line.contains("interlaced: deinterlaced"), "{name}: {line}");
-        // Every frame shows the disc as it was when the earlier field was taken.
-        let reader = FrameReader::open(&path, FrameRate::new(25, 1)).unwrap().with_options(wanted);
+        // Every frame shows the disc at the time of the earlier field.
+        let reader = FrameReader::open(&path, FrameRate::new(25, 1)).unwrap().with_options(deinterlaced);
         for frame in reader.map(Result::unwrap).skip(10).take(40) {
             let row = |x: usize| frame.image.pixel(x, 160)[1] > 140;
             let lit: Vec<usize> = (0..480).filter(|x| row(*x)).collect();
             let centre = lit.iter().sum::<usize>() as f64 / lit.len() as f64;
             let truth = f64::from((12 * frame.frame_idx as u32) % 480);
             if (70.0..410.0).contains(&truth) {
-                assert!((centre - truth).abs() < 1.5, "{name} {}: {centre} is not {truth}", frame.frame_idx);
+                assert!((centre - truth).abs() < 1.5, "{name} {}: {centre}, expected {truth}", frame.frame_idx);
             }
         }
     }
@@ -161,7 +162,7 @@ fn interlaced_fields_are_found_and_combs_removed() {
 }
 
 #[test]
-fn plain_clips_are_left_alone() {
+fn plain_clips_need_no_image_processing() {
     let dir = tempfile::tempdir().unwrap();
     let plain = write_numbered(dir.path(), "in.mp4", 60, FrameRate::new(30, 1), None);
     extract(&plain);
@@ -179,7 +180,7 @@ fn plain_clips_are_left_alone() {
 }
 
 #[test]
-fn real_clips_are_neither_interlaced_nor_in_bars() {
+fn real_clips_are_neither_interlaced_nor_letterboxed() {
     let Some(videos) = real_data("data/videos") else { return };
     for (name, video) in
         files_under(&videos).iter().filter(|(name, _)| name.ends_with(".mp4") || name.ends_with(".mkv"))
