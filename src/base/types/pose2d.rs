@@ -70,12 +70,12 @@ pub struct Pose2d {
     /// as missing.
     pub other_hand: [bool; 2],
     /// The speaker's face, if it is large enough in the picture.
-    pub face: Option<MouthOpening>,
+    pub face: Option<FaceMeasurement>,
 }
 
 /// Mouth of a detected face.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct MouthOpening {
+pub struct FaceMeasurement {
     /// Confidence that the region contains a face, 0..1.
     pub score: f32,
     /// Distance between the lips in distances between the outer corners of the eyes.

@@ -191,7 +191,7 @@ mod tests {
         assert_eq!((found.tars, found.unknown[0].0.clone()), (vec![tar], broken));
         assert_eq!(find(&[dir.path().to_owned()], Some(MotionKind::Authors)).unwrap().takes.len(), 1);
         let text = format!("{:#}", find(&[dir.path().join("flat/a.wav")], None).unwrap_err());
-        assert!(text.contains("147 numbers"), "{text}");
+        assert!(text.contains("147 values"), "{text}");
         assert!(find(&[dir.path().join("gone")], None).is_err());
     }
 }

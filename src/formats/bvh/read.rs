@@ -274,13 +274,13 @@ mod tests {
             (good.replace("ROOT", "LEAF"), "`LEAF`"),
             (good.replace("Yrotation", "Wrotation"), "Wrotation"),
             (good.replace("Frames: 1", "Frames: 2"), "9 values"),
-            (good.replace("Frames: 1", "Frames: -1"), "Frames: -1"),
-            (good.replace("0.04", "0"), "Frame Time"),
-            (good.replace("0.04", "1e-300"), "Frame Time: 1"),
+            (good.replace("Frames: 1", "Frames: -1"), "number of frames -1"),
+            (good.replace("0.04", "0"), "invalid frame time 0"),
+            (good.replace("0.04", "1e-300"), "invalid frame time 1"),
             (good.replace("0.04", "1.1"), "expected 0.001 to 1"),
             (good.replace("MOTION", "}"), "MOTION"),
             (good.replace("OFFSET 10 0 0", "OFFSET ten 0 0"), "`ten`"),
-            (good[..20].to_owned(), "ends before"),
+            (good[..20].to_owned(), "unexpected end"),
         ] {
             let text = format!("{:#}", Bvh::parse(&broken).unwrap_err());
             assert!(text.contains(expected), "{text}");

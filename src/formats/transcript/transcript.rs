@@ -249,7 +249,7 @@ mod tests {
     fn errors_name_the_position_and_until_cuts_words() {
         assert!(error_of("0 1 so\n", "tsv").contains("line 1"));
         assert!(error_of("0\t1\tso\n2\tx\twell", "tsv").contains("line 2"));
-        assert!(error_of("2\t1\tso\n", "tsv").contains("from 2 to 1"));
+        assert!(error_of("2\t1\tso\n", "tsv").contains("invalid times 2.00 to 1.00"));
         assert!(error_of("-1\t1\tso\n", "tsv").contains("line 1: invalid times -1.00"));
         assert!(error_of("a 1 0.5 0.2\n", "ctm").contains("line 1"));
         assert!(error_of("b 1 0 1 so\nc 1 0 1 so\n", "ctm").contains("no recording is named a"));

@@ -89,8 +89,8 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("w");
         assert_eq!(convert(&b"2 3\nthe 1 2 3 \n. . . 4 5 6\n"[..], &path).unwrap(), 2);
-        assert!(error_of(b"the 1 2 3\nso 1 2\n").contains("line 2: a word and 3 numbers"));
-        assert!(error_of(b"the 1 2 3\nso 1 2 3 4\n").contains("line 2: `so` has 4 numbers, 3"));
+        assert!(error_of(b"the 1 2 3\nso 1 2\n").contains("line 2: expected a word and 3 numbers"));
+        assert!(error_of(b"the 1 2 3\nso 1 2 3 4\n").contains("line 2: `so` has 4 numbers, expected 3"));
         assert!(error_of(b"the 1 2 3\nso 1 2 x\n").contains("line 2: `x` is not a number"));
         assert!(error_of(b"the 1 2 3\nso 1 2 nan\n").contains("not finite"));
         assert!(error_of(b"the 1 2 3\nso 1 2 3").contains("line 2 has no line end"));

@@ -130,7 +130,7 @@ impl Stage for ExtractStage {
         let note = |damage: &String| format!("; the file is damaged, its readable part is used: {damage}");
         let damage = media.damage.as_ref().map(note).unwrap_or_default();
         let notes = media.notes().iter().fold(String::new(), |text, note| text + "; " + note);
-        Ok(Report { line: format!("{n_frames} frames at {rate}, {cuts}, {sound}{notes}{damage}"), facts })
+        Ok(Report { line: format!("{} at {rate}, {cuts}, {sound}{notes}{damage}", counted(n_frames, "frame")), facts })
     }
 }
 

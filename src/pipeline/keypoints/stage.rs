@@ -9,6 +9,7 @@ use ndarray::{Array3, s};
 use orator_base::stage::artifacts::{Artifact, StageName, dir};
 use orator_base::stage::progress::Progress;
 use orator_base::stage::{Input, Report, Stage, StageWrapper, Unit};
+use orator_base::text::counted;
 use orator_base::text::length;
 use orator_base::types::sound::SAMPLE_RATE;
 use orator_dataset::config::videos::Videos;
@@ -113,7 +114,7 @@ impl Stage for KeypointExtractStage {
         let remarks = remarks.collect::<Vec<_>>().join("; ");
         let mut facts = serde_json::to_value(&media)?.as_object().cloned().unwrap_or_default();
         facts.insert("notes".into(), notes.into());
-        Ok(Report { line: format!("{n_frames} frames at {fps}, {sound}; {remarks}"), facts })
+        Ok(Report { line: format!("{} at {fps}, {sound}; {remarks}", counted(n_frames, "frame")), facts })
     }
 }
 

@@ -84,7 +84,7 @@ impl Stage for Pose2dStage {
             .into_iter()
             .map(|(key, entry)| (key.to_owned(), read(entry)))
             .collect();
-        let mut pose2d = to_stored("pose2d", &self.chosen.settings).unwrap_or_default();
+        let mut pose2d = to_stored(StageName::Pose2d.as_str(), &self.chosen.settings).unwrap_or_default();
         // `follow = "largest"` is left out, so that the output of versions without this setting stays fresh.
         if let Some(keys) = pose2d.as_object_mut().filter(|_| !self.follows_talker()) {
             keys.remove("follow");

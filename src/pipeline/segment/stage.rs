@@ -55,7 +55,7 @@ impl Stage for SegmentStage {
 
     fn settings(&self, _unit: &Unit) -> serde_json::Value {
         let model = self.speech.as_ref().map(SpeechDetector::used);
-        let rules = config::to_stored("segment", &self.rules).unwrap_or_default();
+        let rules = config::to_stored(StageName::Segment.as_str(), &self.rules).unwrap_or_default();
         serde_json::json!({ "segment": rules, "speech_model": model })
     }
 

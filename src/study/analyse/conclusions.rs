@@ -1,7 +1,7 @@
 //! Conclusions: sentences on what the votes of a task show and what they do not show.
 
 use super::number_format::{counted, p_value, percent, percents, points};
-use super::result::{Conclusion, PairAnalysis, ShareAnalysis, ShareMeasure, StatisticSettings, TaskAnalysis};
+use super::result::{PairAnalysis, ShareAnalysis, ShareMeasure, StatisticSettings, TaskAnalysis, TestOutcome};
 use super::statistic::StatisticMethod;
 use crate::plan::TaskDesign;
 
@@ -77,18 +77,18 @@ fn conclusion_sentence(share: &ShareAnalysis) -> String {
         ),
     };
     match share.conclusion {
-        Conclusion::Above => format!("That is {above} ({p})."),
-        Conclusion::Below => format!("That is {below} ({p})."),
-        Conclusion::AboveWithinBound => format!("That is {above} ({p}). {within}: it is significant, but small."),
-        Conclusion::BelowWithinBound => format!("That is {below} ({p}). {within}: it is significant, but small."),
-        Conclusion::Equivalent => {
+        TestOutcome::Above => format!("That is {above} ({p})."),
+        TestOutcome::Below => format!("That is {below} ({p})."),
+        TestOutcome::AboveWithinBound => format!("That is {above} ({p}). {within}: it is significant, but small."),
+        TestOutcome::BelowWithinBound => format!("That is {below} ({p}). {within}: it is significant, but small."),
+        TestOutcome::Equivalent => {
             format!("No difference from chance was found ({p}). {within}: equivalent up to this bound.")
         }
-        Conclusion::Inconclusive => format!(
+        TestOutcome::Inconclusive => format!(
             "Inconclusive: the tests rule out neither chance ({p}) nor differences of {bound} percentage points or more \
              (equivalence test, {equivalence}). A test that is not significant does not show equality."
         ),
-        Conclusion::Untested => {
+        TestOutcome::Untested => {
             let reason = share.statistics.missing.first().map(|reason| format!(": {reason}")).unwrap_or_default();
             format!("No test that generalises to other participants and clips could be computed{reason}.")
         }
@@ -132,8 +132,8 @@ fn pair_sentence(pair: &PairAnalysis, design: TaskDesign) -> String {
     let size =
         format!("{:.2} {unit}{}{}", scale * pair.difference.abs(), ends.unwrap_or_default(), p.unwrap_or_default());
     match pair.conclusion {
-        Conclusion::Untested => format!("{high} and {low}: not tested ({size})."),
-        Conclusion::Inconclusive | Conclusion::Equivalent => {
+        TestOutcome::Untested => format!("{high} and {low}: not tested ({size})."),
+        TestOutcome::Inconclusive | TestOutcome::Equivalent => {
             format!(
                 "No difference was found between {high} and {low} ({size}). This does not show that they are equal."
             )
@@ -144,7 +144,7 @@ fn pair_sentence(pair: &PairAnalysis, design: TaskDesign) -> String {
 
 fn many_pairs_sentence(task: &TaskAnalysis) -> String {
     let is_found = |pair: &&PairAnalysis| {
-        !matches!(pair.conclusion, Conclusion::Inconclusive | Conclusion::Equivalent | Conclusion::Untested)
+        !matches!(pair.conclusion, TestOutcome::Inconclusive | TestOutcome::Equivalent | TestOutcome::Untested)
     };
     let n_found = task.pairs.iter().filter(is_found).count();
     format!(

@@ -2,7 +2,7 @@
 //! judged real. Also medians and means of the scores of single conditions.
 
 use super::outcome::{BinaryVote, Numbering, differences, distinct, mean_score, name_pairs, scores};
-use super::result::{Conclusion, PairAnalysis, ScoreAnalysis, StatisticSettings};
+use super::result::{PairAnalysis, ScoreAnalysis, StatisticSettings, TestOutcome};
 use super::statistic::{StatisticMethod, StatisticSet, TestResult, adjust};
 use crate::plan::TaskDesign;
 use crate::stats::cluster::crossed::{crossed_difference, crossed_estimate};
@@ -54,7 +54,7 @@ pub fn single_pairs(votes: &[BinaryVote], conditions: &[&str], settings: &Statis
 fn family(mut pairs: Vec<PairAnalysis>, level: f64) -> Vec<PairAnalysis> {
     adjust(&mut pairs.iter_mut().map(|pair| &mut pair.statistics).collect::<Vec<_>>());
     for pair in &mut pairs {
-        pair.conclusion = Conclusion::new(pair.statistics.crossed_p(), level, pair.difference, false);
+        pair.conclusion = TestOutcome::new(pair.statistics.crossed_p(), level, pair.difference, false);
     }
     pairs
 }
@@ -77,7 +77,7 @@ fn pair_of<'v>(
         steps: None,
         difference,
         statistics,
-        conclusion: Conclusion::Untested,
+        conclusion: TestOutcome::Untested,
     }
 }
 

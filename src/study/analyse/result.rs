@@ -165,7 +165,7 @@ pub struct ShareAnalysis {
     pub statistics: StatisticSet,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub model: Option<ModelEstimate>,
-    pub conclusion: Conclusion,
+    pub conclusion: TestOutcome,
 }
 
 impl ShareAnalysis {
@@ -212,7 +212,7 @@ pub struct PairAnalysis {
     pub difference: f64,
     #[serde(flatten)]
     pub statistics: StatisticSet,
-    pub conclusion: Conclusion,
+    pub conclusion: TestOutcome,
 }
 
 /// Bradley-Terry strength of a condition.
@@ -240,10 +240,10 @@ pub struct ModelEstimate {
     pub sd_clips: f64,
 }
 
-/// Conclusion from a headline test and its equivalence test.
+/// Outcome of a headline test and its equivalence test.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Conclusion {
+pub enum TestOutcome {
     /// Above chance, or the first condition above the second.
     Above,
     Below,
@@ -258,8 +258,8 @@ pub enum Conclusion {
     Untested,
 }
 
-impl Conclusion {
-    /// Conclusion from a two-sided p value at `level`, the sign of the difference and the equivalence test.
+impl TestOutcome {
+    /// Outcome of a two-sided p value at `level`, the sign of the difference and the equivalence test.
     pub fn new(p: Option<f64>, level: f64, difference: f64, is_equivalent: bool) -> Self {
         match (p, is_equivalent) {
             (None, _) => Self::Untested,

@@ -1,7 +1,7 @@
 //! Proportion of successes compared with chance, by every method from the naive to the crossed one.
 
 use super::outcome::{BinaryVote, distinct};
-use super::result::{Conclusion, ModelEstimate, ShareAnalysis, ShareMeasure, StatisticSettings};
+use super::result::{ModelEstimate, ShareAnalysis, ShareMeasure, StatisticSettings, TestOutcome};
 use super::statistic::{StatisticMethod, StatisticSet, TestResult};
 use crate::stats::cluster::crossed::crossed_estimate;
 use crate::stats::cluster::sign_flips::{SideBlock, side_p, sign_flip_p};
@@ -47,7 +47,7 @@ pub fn share(cell: &ShareCell, settings: &StatisticSettings) -> ShareAnalysis {
         share: n_successes as f64 / votes.len().max(1) as f64,
         statistics: found,
         model: None,
-        conclusion: Conclusion::Untested,
+        conclusion: TestOutcome::Untested,
     };
     if settings.with_models && has_expectation {
         analysis.model = mixed_model(&votes, &mut analysis.statistics, settings.confidence);
@@ -90,7 +90,7 @@ fn add_naive(found: &mut StatisticSet, n_successes: u64, n_votes: u64, settings:
 pub fn conclude(analysis: &mut ShareAnalysis, level: f64) {
     let is_equivalent = analysis.statistics.equivalence(StatisticMethod::Crossed).is_some_and(|test| test.passes);
     analysis.conclusion =
-        Conclusion::new(analysis.statistics.crossed_p(), level, analysis.share - CHANCE, is_equivalent);
+        TestOutcome::new(analysis.statistics.crossed_p(), level, analysis.share - CHANCE, is_equivalent);
 }
 
 /// Trials of each participant by side; `None` if sides are unknown, as in tables that report correctness only.

@@ -80,7 +80,7 @@ fn one_frame_without_audio_is_enough() {
     let out = dir.path().join("out");
     assert_eq!(
         run(&video, &out, &config::ExtractConfig::default()).unwrap().line,
-        "1 frames at 15 fps, no cut, no sound"
+        "1 frame at 15 fps, 0 cuts, no audio"
     );
     assert!(!out.join("audio.wav").exists());
     assert_eq!(media(&out)["has_audio"], false);

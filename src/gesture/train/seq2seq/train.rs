@@ -112,7 +112,7 @@ pub fn train_with_callback(
     );
     progress.say(&format!(
         "{} of {}; writing checkpoints to {}",
-        counted(train.len(), "segment"),
+        counted(train.len(), "training segment"),
         source.path(),
         folder.display()
     ));

@@ -97,7 +97,7 @@ fn hands(rows: &[ConditionRow]) -> Grid {
         heads: heads(&[
             "visible",
             "missed",
-            "other hand",
+            "hand of the other side",
             "swapped",
             "misplaced",
             "hidden",

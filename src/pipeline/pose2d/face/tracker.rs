@@ -5,7 +5,7 @@ use super::model::{DetectedFace, FaceModel};
 use crate::pose2d::decode::ScoredPoint;
 use anyhow::Result;
 use orator_base::types::image::Image;
-use orator_base::types::pose2d::{MouthOpening, coco};
+use orator_base::types::pose2d::{FaceMeasurement, coco};
 use orator_media::opencv::warp::Region;
 
 /// Least presence score of a face.
@@ -34,7 +34,7 @@ impl FaceTrack {
         image: &Image,
         body: &[ScoredPoint; 17],
         least: f64,
-    ) -> Result<Option<MouthOpening>> {
+    ) -> Result<Option<FaceMeasurement>> {
         let mut detect = |region: &Region| detect(model, image, region, body, least);
         self.points = None;
         let mut found = match self.region.take() {
@@ -50,7 +50,7 @@ impl FaceTrack {
         }
         let Some(face) = found else { return Ok(None) };
         self.region = Some(landmarks::region(&face.points));
-        let measured = |opening: f64| MouthOpening { score: face.score as f32, opening: opening as f32 };
+        let measured = |opening: f64| FaceMeasurement { score: face.score as f32, opening: opening as f32 };
         let face_seen = landmarks::opening(&face.points).map(measured);
         self.points = Some(face.points);
         Ok(face_seen)

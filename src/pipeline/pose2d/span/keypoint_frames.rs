@@ -2,7 +2,7 @@
 
 use anyhow::Result;
 use ndarray::{Array1, Array2, Array3};
-use orator_base::types::pose2d::{Keypoint, Keypoints, MouthOpening, N_BODY, N_HAND, PersonBox, Pose2d};
+use orator_base::types::pose2d::{FaceMeasurement, Keypoint, Keypoints, N_BODY, N_HAND, PersonBox, Pose2d};
 use orator_base::types::time::FrameRate;
 use orator_formats::keypoints_npz::{Extras, FaceFrames};
 use serde::{Deserialize, Serialize};
@@ -51,7 +51,7 @@ impl KeypointFrames {
             left_hand: points(|pose| &pose.left_hand, N_HAND)?,
             right_hand: points(|pose| &pose.right_hand, N_HAND)?,
         };
-        let of_face = |part: fn(&MouthOpening) -> f32, missing: f32| {
+        let of_face = |part: fn(&FaceMeasurement) -> f32, missing: f32| {
             poses().map(|pose| pose.face.as_ref().map_or(missing, part)).collect::<Array1<f32>>()
         };
         let face = poses().any(|pose| pose.face.is_some()).then(|| FaceFrames {
@@ -82,7 +82,7 @@ mod tests {
         gathered.push(pose.clone(), 0.0);
         pose.right_hand[20] = Keypoint { x: 5.0, y: 6.0, score: 0.5 };
         pose.person.height = 9.0;
-        pose.face = Some(MouthOpening { score: 0.9, opening: 0.2 });
+        pose.face = Some(FaceMeasurement { score: 0.9, opening: 0.2 });
         gathered.push(pose, 0.07);
         assert_eq!(gathered.share(|pose| pose.face.is_some()), 0.5);
         let (keypoints, extras) = gathered.finish(FrameRate::new(15, 1), [64, 48]).unwrap();

@@ -97,7 +97,8 @@ impl PoseSpan {
         let left_hand = self.frames.share(|pose| any(&pose.left_hand));
         let right_hand = self.frames.share(|pose| any(&pose.right_hand));
         let [body, left, right] = [person, left_hand, right_hand].map(|share| format!("{:.0} %", 100.0 * share));
-        let mut line = format!("{n_frames} frames: person in {body}, left hand {left}, right hand {right}");
+        let mut line =
+            format!("{}: person in {body}, left hand {left}, right hand {right}", counted(n_frames, "frame"));
         let mut facts = json!({
             "n_frames": n_frames, "person": person, "left_hand": left_hand, "right_hand": right_hand,
             "several_persons": self.frames.share(|pose| pose.n_people > 1),

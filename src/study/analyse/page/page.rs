@@ -2,7 +2,7 @@
 
 use super::{charts, tables};
 use crate::analyse::number_format::{counted, list};
-use crate::analyse::result::{Conclusion, StudyAnalysis, TaskAnalysis};
+use crate::analyse::result::{StudyAnalysis, TaskAnalysis, TestOutcome};
 use orator_report::html::{Node, Page, Section, node};
 use serde_json::Value;
 
@@ -55,10 +55,10 @@ fn per_task(tasks: &[TaskAnalysis], body: impl Fn(&TaskAnalysis) -> Vec<Node>) -
 fn meaning(analysis: &StudyAnalysis) -> Vec<Node> {
     let card = |task: &TaskAnalysis| {
         let conclusion = task.pooled().map(|share| share.conclusion);
-        let conclusion = conclusion.or(task.pairs.first().map(|pair| pair.conclusion)).unwrap_or(Conclusion::Untested);
+        let conclusion = conclusion.or(task.pairs.first().map(|pair| pair.conclusion)).unwrap_or(TestOutcome::Untested);
         let class = match conclusion {
-            Conclusion::Equivalent => "card conclusion equivalent",
-            Conclusion::Inconclusive | Conclusion::Untested => "card conclusion",
+            TestOutcome::Equivalent => "card conclusion equivalent",
+            TestOutcome::Inconclusive | TestOutcome::Untested => "card conclusion",
             _ => "card conclusion found",
         };
         let sentences = task.conclusions.iter().map(|sentence| node("p").text(sentence));
