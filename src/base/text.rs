@@ -64,7 +64,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn numbers_read_well() {
+    fn numbers_are_formatted_with_units_and_separators() {
         assert_eq!([0, 1, 2].map(|n| counted(n, "video")), ["0 videos", "1 video", "2 videos"]);
         assert_eq!([59.4, 61.0, 3599.4, 7384.0].map(duration), ["59 s", "1 min 01 s", "59 min 59 s", "2 h 03 min"]);
         assert_eq!([41.24, 744.0, 11_772.0, -0.0].map(length), ["41.2 s", "12.4 min", "3.27 h", "0.0 s"]);
