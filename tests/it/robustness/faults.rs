@@ -31,14 +31,14 @@ fn reference(shim: &Shim, root: &Path, at: usize) -> Reference {
     let start = root.join(format!("start-{at}"));
     set_up(&root.join("base"), &start, scene);
     let run = |name: &str| {
-        let place = root.join(format!("{name}-{at}"));
-        copy(&start, &place);
-        let (output, calls) = shim.calls(&place, scene.args);
+        let scratch = root.join(format!("{name}-{at}"));
+        copy(&start, &scratch);
+        let (output, calls) = shim.calls(&scratch, scene.args);
         assert!(output.status.success(), "{:?}: {}", scene.args, text_of(&output));
         // The verb runs twice, because what a second run adds (a cache) is not a difference.
-        orator(&place, scene.args).output().unwrap();
-        let content = content(&place);
-        std::fs::remove_dir_all(&place).unwrap();
+        orator(&scratch, scene.args).output().unwrap();
+        let content = content(&scratch);
+        std::fs::remove_dir_all(&scratch).unwrap();
         (content, calls)
     };
     let (mut end, calls) = run("one");
@@ -63,14 +63,14 @@ fn chosen(calls: &[Call]) -> Vec<Call> {
 }
 
 /// Problem in the response of a scene to a fault; none if it was handled correctly.
-fn trial(shim: &Shim, reference: &Reference, call: &Call, fault: Fault, place: &Path) -> Option<String> {
-    copy(&reference.start, place);
-    let (output, was_reached) = shim.run(place, reference.scene.args, call, fault);
+fn trial(shim: &Shim, reference: &Reference, call: &Call, fault: Fault, scratch: &Path) -> Option<String> {
+    copy(&reference.start, scratch);
+    let (output, was_reached) = shim.run(scratch, reference.scene.args, call, fault);
     if !was_reached {
         return None;
     }
-    let differences = |place: &Path| {
-        let mut now = content(place);
+    let differences = |scratch: &Path| {
+        let mut now = content(scratch);
         now.retain(|name, _| !reference.varying.contains(name));
         let names: BTreeSet<&String> = now.keys().chain(reference.end.keys()).collect();
         let differ = names.into_iter().filter(|name| now.get(*name) != reference.end.get(*name));
@@ -82,7 +82,7 @@ fn trial(shim: &Shim, reference: &Reference, call: &Call, fault: Fault, place: &
         None | Some(101) => return Some(format!("ended with {:?}: {text}", output.status)),
         Some(0) if is_cleanup(call) => {}
         Some(0) => {
-            let differ = differences(place);
+            let differ = differences(scratch);
             if !differ.is_empty() {
                 return Some(format!("exit code 0, but {differ:?} differ: {text}"));
             }
@@ -92,11 +92,11 @@ fn trial(shim: &Shim, reference: &Reference, call: &Call, fault: Fault, place: &
     }
     // A retry after a completed attempt may be rejected, since its output exists; what only a second retry adds (a
     // cache) is not a difference.
-    let retry = orator(place, reference.scene.args).output().unwrap();
-    let mut differ = differences(place);
+    let retry = orator(scratch, reference.scene.args).output().unwrap();
+    let mut differ = differences(scratch);
     if !differ.is_empty() && retry.status.success() {
-        orator(place, reference.scene.args).output().unwrap();
-        differ = differences(place);
+        orator(scratch, reference.scene.args).output().unwrap();
+        differ = differences(scratch);
     }
     (!differ.is_empty()).then(|| format!("after a retry {differ:?} differ: {}", text_of(&retry)))
 }
@@ -153,9 +153,9 @@ fn sweep(faults: &[Fault], sample: usize) {
     trials.truncate(if is_complete { n_all } else { sample });
     let problems = in_parallel(trials.len(), |n, worker| {
         let (at, call, fault) = &trials[n];
-        let place = root.join(format!("trial-{worker}"));
+        let scratch = root.join(format!("trial-{worker}"));
         let reference: &Reference = &references[*at];
-        let problem = trial(&shim, reference, call, *fault, &place)?;
+        let problem = trial(&shim, reference, call, *fault, &scratch)?;
         let Call { operation, path, site, nth } = call;
         let text = format!("{:?}: {fault:?} at {operation} {path} ({site}, {nth}): {problem}", reference.scene.args);
         eprintln!("{text}");

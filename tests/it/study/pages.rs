@@ -14,8 +14,8 @@ use std::process::Command;
 
 /// Study of all designs, ten trials with films of 1.6 s; the films of even index are preferred.
 fn every_design(n_sessions: usize) -> MadeStudy {
-    let made = MadeStudy::new(n_sessions, n_sessions, 4, 40);
-    let mut plan: StudyPlan = serde_json::from_slice(&fs::read(made.folder.plan()).unwrap()).unwrap();
+    let study = MadeStudy::new(n_sessions, n_sessions, 4, 40);
+    let mut plan: StudyPlan = serde_json::from_slice(&fs::read(study.folder.plan()).unwrap()).unwrap();
     let designs = [
         (TaskDesign::Turing, false, ""),
         (TaskDesign::TuringSingle, true, ""),
@@ -31,7 +31,7 @@ fn every_design(n_sessions: usize) -> MadeStudy {
         scale: scale.to_owned(),
     };
     plan.tasks = designs.into_iter().enumerate().map(task).collect();
-    let films = |indices: &[usize]| indices.iter().map(|k| made.films[*k].clone()).collect::<Vec<_>>();
+    let films = |indices: &[usize]| indices.iter().map(|k| study.films[*k].clone()).collect::<Vec<_>>();
     let trial = |task, phase, indices: &[usize], expected| Trial { task, phase, films: films(indices), expected };
     let side = |side| Some(Response::Side(side));
     let trials = vec![
@@ -47,20 +47,20 @@ fn every_design(n_sessions: usize) -> MadeStudy {
         trial(5, TrialPhase::Main, &[4, 5, 6, 7], None),
     ];
     plan.sessions.iter_mut().for_each(|session| session.trials.clone_from(&trials));
-    plan.sound_check.clone_from(&made.films[0]);
-    fs::write(made.folder.plan(), serde_json::to_vec(&plan).unwrap()).unwrap();
-    let file = fs::read_to_string(made.folder.study_file()).unwrap();
-    fs::write(made.folder.study_file(), file.replace("[\"en\"]", "[\"en\", \"de\", \"ar\"]")).unwrap();
-    StudySeal::of(&made.folder).unwrap().write(&made.folder).unwrap();
-    made
+    plan.sound_check.clone_from(&study.films[0]);
+    fs::write(study.folder.plan(), serde_json::to_vec(&plan).unwrap()).unwrap();
+    let file = fs::read_to_string(study.folder.study_file()).unwrap();
+    fs::write(study.folder.study_file(), file.replace("[\"en\"]", "[\"en\", \"de\", \"ar\"]")).unwrap();
+    StudySeal::of(&study.folder).unwrap().write(&study.folder).unwrap();
+    study
 }
 
-/// Takes part at `address` by the rule of `made`, and returns the report of the participant.
-fn take_part(made: &MadeStudy, address: &str, driver: &Path, options: &str) -> Value {
+/// Takes part at `address` by the rule of `study`, and returns the report of the participant.
+fn take_part(study: &MadeStudy, address: &str, driver: &Path, options: &str) -> Value {
     let score = |k: usize| if k.is_multiple_of(2) { 0.9 } else { 0.1 };
-    let scores: BTreeMap<_, _> = made.films.iter().enumerate().map(|(k, film)| (film, score(k))).collect();
-    let rule = json!({ "scores": scores, "numbers": { &made.films[6]: 42 } });
-    let answers = made.path().join("answers.json");
+    let scores: BTreeMap<_, _> = study.films.iter().enumerate().map(|(k, film)| (film, score(k))).collect();
+    let rule = json!({ "scores": scores, "numbers": { &study.films[6]: 42 } });
+    let answers = study.path().join("answers.json");
     fs::write(&answers, rule.to_string()).unwrap();
     let mut command = Command::new("node");
     command.arg("tests/it/study/browser/participant.mjs").env("ORATOR_DRIVER", driver);
@@ -82,12 +82,13 @@ fn sessions_by_keyboard_and_by_touch_are_stored_as_answered() {
     if Command::new("chromium").arg("--version").output().is_err() {
         return skip("no browser is installed (package chromium)");
     }
-    let made = every_design(3);
-    let served = made.serve(&[]);
-    let by_keys = take_part(&made, &served.address, &driver, "--width 1280 --language en --away-at 1 --interrupt-at 5");
+    let study = every_design(3);
+    let served = study.serve(&[]);
+    let by_keyboard =
+        take_part(&study, &served.address, &driver, "--width 1280 --language en --away-at 1 --interrupt-at 5");
     let dark = "--width 360 --height 640 --touch --scheme dark --language ar --reload-at 1 --offline-at 2";
-    let by_touch = take_part(&made, &served.address, &driver, dark);
-    for report in [&by_keys, &by_touch] {
+    let by_touch = take_part(&study, &served.address, &driver, dark);
+    for report in [&by_keyboard, &by_touch] {
         eprintln!("offset of the films at the start and later, ms: {}", report["offsets_ms"]);
         assert!(is_code(report) && report["trials"] == 10, "{report}");
         // Two frames in most of the trials: a machine under load corrects late.
@@ -95,11 +96,11 @@ fn sessions_by_keyboard_and_by_touch_are_stored_as_answered() {
         let n_near = offsets.iter().filter(|offset| offset[1].as_u64().unwrap() <= 80).count();
         assert!(2 * n_near > offsets.len(), "{report}");
     }
-    assert_eq!(by_keys["problems"], json!([]));
-    let withdrawn = take_part(&made, &served.address, &driver, "--touch --width 360 --language de --withdraw-at 2");
+    assert_eq!(by_keyboard["problems"], json!([]));
+    let withdrawn = take_part(&study, &served.address, &driver, "--touch --width 360 --language de --withdraw-at 2");
     assert_eq!(withdrawn["code"], Value::Null);
 
-    let votes = made.exported("votes");
+    let votes = study.exported("votes");
     assert_eq!(votes.len(), 20, "a withdrawal leaves no votes");
     let expected = [
         json!({ "side": "left" }),
@@ -144,8 +145,8 @@ fn sessions_resume_by_token_and_by_the_operators_link() {
     if Command::new("chromium").arg("--version").output().is_err() {
         return skip("no browser is installed (package chromium)");
     }
-    let made = MadeStudy::new(3, 3, 4, 5).requiring_id();
-    let served = made.serve(&[]);
+    let study = MadeStudy::new(3, 3, 4, 5).requiring_id();
+    let served = study.serve(&[]);
     let page = |path: &str| format!("http://{}/{path}", served.address);
     let visit = |url: &str| script(&driver, "visit", &["--url", url]);
     let expected = |headings: [&str; 2], begins: u32| json!({ "headings": headings, "begins": begins, "fragment": "" });
