@@ -69,7 +69,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn numbers_read_well() {
+    fn numbers_are_formatted_with_units_and_separators() {
         assert_eq!([0, 1, 2].map(|n| counted(n, "video")), ["0 videos", "1 video", "2 videos"]);
         assert_eq!(["entry", "key", "process"].map(|noun| counted(2, noun)), ["2 entries", "2 keys", "2 processes"]);
         assert_eq!([59.4, 61.0, 3599.4, 7384.0].map(duration), ["59 s", "1 min 01 s", "59 min 59 s", "2 h 03 min"]);

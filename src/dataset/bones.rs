@@ -71,7 +71,7 @@ mod tests {
     }
 
     #[test]
-    fn long_videos_weigh_more_and_unmeasured_bones_nothing() {
+    fn long_videos_weigh_more_and_unmeasured_bones_have_no_weight() {
         let video = |length: f64, n_frames| {
             let mut lengths_metres = vec![length; N_BONES];
             lengths_metres[6] = 0.0;

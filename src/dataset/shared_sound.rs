@@ -173,7 +173,7 @@ mod tests {
     use rand_chacha::ChaCha8Rng;
 
     /// `n` random codes; as in real sound, one bit in eight changes from each code to the next.
-    fn sound(n: usize, seed: u64) -> Vec<u32> {
+    fn random_codes(n: usize, seed: u64) -> Vec<u32> {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let mut code: u32 = rng.random();
         (0..n)
@@ -185,9 +185,9 @@ mod tests {
     }
 
     #[test]
-    fn shared_sound_is_found_at_its_position() {
+    fn shared_audio_is_found_at_its_position() {
         let mut rng = ChaCha8Rng::seed_from_u64(9);
-        let mut videos: Vec<Vec<u32>> = (0..6).map(|seed| sound(3_000, seed)).collect();
+        let mut videos: Vec<Vec<u32>> = (0..6).map(|seed| random_codes(3_000, seed)).collect();
         let intro: Vec<u32> = videos[1][500..800].to_vec();
         // One bit in fifteen is flipped.
         let noisy =

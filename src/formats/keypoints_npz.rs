@@ -208,7 +208,7 @@ mod tests {
     }
 
     #[test]
-    fn missing_arrays_are_noted_and_wrong_shapes_are_errors() {
+    fn missing_arrays_are_noted_and_invalid_shapes_are_errors() {
         let dir = tempfile::tempdir().unwrap();
         let mut body = Array3::from_elem((2, N_BODY, 3), 7.0);
         body[[1, 3, 0]] = f64::NAN;

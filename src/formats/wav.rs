@@ -119,7 +119,7 @@ mod tests {
 
     proptest::proptest! {
         #[test]
-        fn sound_round_trips_within_one_step(
+        fn audio_round_trips_within_one_step(
             rate in 1u32..200_000,
             sound in proptest::collection::vec(-1.0f32..1.0, 0..300),
         ) {

@@ -202,7 +202,7 @@ mod tests {
     }
 
     #[test]
-    fn loading_names_what_does_not_fit() -> anyhow::Result<()> {
+    fn loading_names_mismatched_tensors() -> anyhow::Result<()> {
         let mut params = Params::new(0);
         params.trainable("w", &[2, 2], Init::He)?;
         params.buffer("mean", &[2], 0.0)?;

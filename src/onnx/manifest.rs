@@ -112,7 +112,7 @@ mod tests {
     }
 
     #[test]
-    fn errors_name_the_mistake() {
+    fn errors_name_the_invalid_entry() {
         let message =
             |from: &str, to: &str| format!("{:#}", Manifest::parse(&BUILTIN.replacen(from, to, 1)).unwrap_err());
         assert!(message("role = \"person\"", "rolle = \"person\"").contains("rolle"));

@@ -90,7 +90,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn levels_of_a_tone_then_quiet_then_silence() {
+    fn levels_of_a_tone_quiet_and_silence_are_measured() {
         let path = tempfile::tempdir().unwrap().keep().join("tone.wav");
         let spec = hound::WavSpec {
             channels: 1,

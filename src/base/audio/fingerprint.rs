@@ -100,7 +100,7 @@ mod tests {
         fingerprinter.finish()
     }
 
-    fn wrong_bits(a: &[u32], b: &[u32]) -> f64 {
+    fn bit_error_rate(a: &[u32], b: &[u32]) -> f64 {
         let wrong: u32 = a.iter().zip(b).map(|(a, b)| (a ^ b).count_ones()).sum();
         f64::from(wrong) / (32 * a.len().min(b.len())) as f64
     }
@@ -114,15 +114,15 @@ mod tests {
     }
 
     #[test]
-    fn copies_are_similar_and_other_sounds_are_not() {
+    fn copies_are_similar_and_other_audio_is_not() {
         let sound = babble(10, 1);
         let original = codes(&sound, 4096);
         // Shifted by half a hop (the worst case), quieter, and with noise 20 dB below the signal.
         let mut rng = ChaCha8Rng::seed_from_u64(5);
         let level = (sound.iter().map(|v| v * v).sum::<f32>() / sound.len() as f32).sqrt();
         let copy: Vec<f32> = sound[256..].iter().map(|v| 0.3 * (v + level * rng.random_range(-0.17..0.17))).collect();
-        let near = wrong_bits(&original, &codes(&copy, 4096));
-        let far = wrong_bits(&original, &codes(&babble(10, 2), 4096));
+        let near = bit_error_rate(&original, &codes(&copy, 4096));
+        let far = bit_error_rate(&original, &codes(&babble(10, 2), 4096));
         assert!(near < 0.25 && (far - 0.5).abs() < 0.03, "{near} {far}");
     }
 }

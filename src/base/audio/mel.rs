@@ -121,7 +121,7 @@ mod tests {
     }
 
     #[test]
-    fn silence_and_short_sound() {
+    fn short_audio_has_no_frames_and_silence_is_the_floor() {
         assert_eq!(log_mel(&[0.0; 399]).nrows(), 0);
         assert!(log_mel(&[0.0; 800]).iter().all(|v| (*v - FLOOR.ln()).abs() < 1e-6));
         assert_eq!(n_frames(n_samples(427)), 427);

@@ -225,7 +225,7 @@ mod tests {
     }
 
     #[test]
-    fn silence_and_empty_sounds_have_no_onsets() {
+    fn silence_and_empty_audio_have_no_onsets() {
         assert!(onsets(&[]).is_empty());
         assert!(onsets(&[0.0; 20_000]).is_empty());
         assert!(onsets(&[f32::NAN; 3000]).is_empty());

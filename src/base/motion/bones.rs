@@ -102,7 +102,7 @@ mod tests {
     }
 
     #[test]
-    fn lengths_become_exact_and_directions_and_nan_stay() {
+    fn lengths_become_exact_and_directions_and_nan_are_preserved() {
         let mut m = motion();
         m.joints.slice_mut(s![2, R_ELBOW, ..]).fill(f32::NAN);
         let before = m.clone();

@@ -29,7 +29,7 @@ mod tests {
     use crate::math::rotation::Rotation;
 
     #[test]
-    fn a_turn_past_half_a_turn_and_back_has_no_jump() {
+    fn a_rotation_past_180_degrees_and_back_has_no_jump() {
         let axis = [0.6, 0.0, 0.8];
         let angle = |t: usize| 2.5 + 1.2 * (t as f64 * 0.1).sin();
         let mut track: Vec<Vec3> = (0..100).map(|t| Rotation::about(axis, angle(t)).rotation_vector()).collect();

@@ -172,7 +172,7 @@ mod tests {
     }
 
     #[test]
-    fn linear_motion_is_exact_up_to_its_ends_and_keeps_its_duration() {
+    fn linear_motion_is_exact_up_to_its_ends_and_of_equal_duration() {
         for (from, n, to, expected) in
             [(60, 241, 15, 61), (30, 60, 15, 30), (20, 40, 15, 30), (15, 33, 15, 33), (30, 1, 15, 1)]
         {
@@ -189,7 +189,7 @@ mod tests {
     }
 
     #[test]
-    fn a_gap_stays_a_gap_and_affects_nothing_else() {
+    fn a_gap_remains_a_gap_and_does_not_affect_other_frames() {
         let mut motion = swing(FrameRate::new(60, 1), 4.0, 1.0);
         motion.joints.slice_mut(ndarray::s![100..140, 2, ..]).fill(f32::NAN);
         motion.mask.slice_mut(ndarray::s![100..140, 2]).fill(false);

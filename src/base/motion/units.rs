@@ -90,7 +90,7 @@ mod tests {
     }
 
     #[test]
-    fn a_wrong_unit_is_named_with_its_factor() {
+    fn an_implausible_unit_is_named_with_its_factor() {
         let motion = standing(20);
         let times = |by: f32| Motion { joints: &motion.joints * by, ..motion.clone() };
         for by in [0.5, 1.0, 1.6] {

@@ -77,7 +77,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn crop_is_clipped_to_the_picture() {
+    fn crop_is_clipped_to_the_image() {
         let image = Image { width: 3, height: 2, data: (0..18).collect() };
         let area = |x, y, width, height| PixelArea { x, y, width, height };
         assert_eq!(image.cropped(area(0, 0, 3, 2)), image);

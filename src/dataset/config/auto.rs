@@ -47,7 +47,7 @@ mod tests {
     use serde_json::json;
 
     #[test]
-    fn auto_or_a_number() {
+    fn auto_and_numbers_are_parsed() {
         let read = |value| serde_json::from_value::<Auto<usize>>(value).map_err(|error| error.to_string());
         assert_eq!(read(json!("auto")), Ok(Auto::Chosen));
         assert_eq!(read(json!(7)), Ok(Auto::Given(7)));

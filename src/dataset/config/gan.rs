@@ -169,7 +169,7 @@ mod tests {
     }
 
     #[test]
-    fn given_values_are_kept_and_a_recipe_fills_in_the_rest() {
+    fn a_recipe_fills_in_only_missing_values() {
         let asked = GanConfig { steps: 400.into(), dropout: 0.0.into(), ..GanConfig::default() };
         let filled = asked.filled(|key| Some(if key == "augment_noise_db" { -0.5 } else { 7.0 })).unwrap();
         let expected = GanSettings { steps: 400, dropout: 0.0, augment_noise_db: -0.5, ..GanSettings::with(7.0, 7) };

@@ -140,7 +140,7 @@ mod tests {
     }
 
     #[test]
-    fn folders_of_frames_and_files_are_matched_to_sounds_by_name() {
+    fn folders_of_frames_and_files_are_matched_to_audio_by_name() {
         let dir = tempfile::tempdir().unwrap();
         let write = |name: &str, text: &str| {
             let path = dir.path().join(name);

@@ -196,7 +196,7 @@ mod tests {
     }
 
     #[test]
-    fn the_smallest_file_works() {
+    fn a_minimal_file_is_valid() {
         let text = "[[speaker]]\nname = \"host\"\nvideos = [\"videos/host/*.mp4\"]\n";
         let settings = resolved(text, &["extract.fps=10"]).unwrap().settings;
         assert_eq!((settings.speaker[0].name.as_str(), settings.extract.fps), ("host", 10));

@@ -154,7 +154,7 @@ mod tests {
     }
 
     #[test]
-    fn equal_names_in_two_folders_differ_and_no_dot_is_left() {
+    fn equal_names_in_two_folders_get_distinct_names_without_dots() {
         let folder = Path::new("/data");
         let a = work_name(Path::new("/data/a/My Talk.v2.mp4"), folder);
         let b = work_name(Path::new("/data/b/My Talk.v2.mp4"), folder);
@@ -164,7 +164,7 @@ mod tests {
     }
 
     #[test]
-    fn a_pattern_a_folder_and_a_missing_file() {
+    fn patterns_folders_and_missing_files_are_resolved() {
         let dir = tempfile::tempdir().unwrap();
         for name in ["b.mp4", "a.MKV", "notes.txt"] {
             std::fs::write(dir.path().join(name), "").unwrap();

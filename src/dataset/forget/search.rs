@@ -266,7 +266,7 @@ mod tests {
     }
 
     #[test]
-    fn a_match_across_two_pieces_is_found_once() {
+    fn a_match_across_two_blocks_is_found_once() {
         let terms = terms();
         let terms: Vec<&SearchTerm> = terms.iter().collect();
         let text: Vec<u8> = [&[b' '; 300][..], b"a.mp4", &[b' '; 300]].concat();

@@ -306,7 +306,7 @@ mod tests {
     }
 
     #[test]
-    fn videos_go_to_the_split_furthest_below_its_share_and_none_stays_empty() {
+    fn videos_fill_the_split_furthest_below_its_share_and_no_split_is_empty() {
         assert_eq!(filled(&[10.0; 10]), [70.0, 20.0, 10.0]);
         let few = |n: usize| {
             let mut fill = SplitFill::new(0.15, 0.15, n as f64);

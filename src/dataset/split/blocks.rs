@@ -207,7 +207,7 @@ mod tests {
     }
 
     #[test]
-    fn shared_sound_is_excluded_where_the_splits_differ() {
+    fn shared_audio_is_excluded_where_the_splits_differ() {
         let block = |split, start_secs, end_secs| TimeBlock { split: Some(split), start_secs, end_secs };
         let own = [block(Split::Train, 0.0, 60.0), block(Split::Test, 60.0, 100.0)];
         let other = [block(Split::Train, 0.0, 40.0), block(Split::Validation, 40.0, 90.0)];

@@ -381,7 +381,7 @@ mod tests {
     }
 
     #[test]
-    fn smoothing_removes_jitter_and_keeps_slow_motion() {
+    fn smoothing_removes_jitter_and_preserves_slow_motion() {
         let mut features =
             Array2::from_shape_fn((60, 3), |(t, _)| (t as f32 * 0.1).sin() + if t % 2 == 0 { 0.05 } else { -0.05 });
         smooth(&mut features);

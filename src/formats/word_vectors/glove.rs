@@ -85,7 +85,7 @@ mod tests {
     }
 
     #[test]
-    fn wrong_dimensions_and_truncation_are_errors_with_the_line() {
+    fn invalid_dimensions_and_truncation_are_errors_with_the_line() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("w");
         assert_eq!(convert(&b"2 3\nthe 1 2 3 \n. . . 4 5 6\n"[..], &path).unwrap(), 2);

@@ -167,7 +167,7 @@ mod tests {
     use super::*;
 
     /// Noise between `left` and `right` of a 320 x 180 picture, `fill` elsewhere.
-    fn picture(seed: usize, [left, right]: [usize; 2], fill: impl Fn(usize, usize) -> u8) -> Image {
+    fn test_image(seed: usize, [left, right]: [usize; 2], fill: impl Fn(usize, usize) -> u8) -> Image {
         let mut image = Image::filled(320, 180, [0; 3]);
         for (at, pixel) in image.data.as_chunks_mut::<3>().0.iter_mut().enumerate() {
             let (x, y) = (at % 320, at / 320);
@@ -179,7 +179,7 @@ mod tests {
 
     fn found(bars: [usize; 2], fill: impl Fn(usize, usize) -> u8) -> Option<PixelArea> {
         let mut finder = BarFinder::default();
-        (0..5).for_each(|seed| finder.push(&picture(seed, bars, &fill)));
+        (0..5).for_each(|seed| finder.push(&test_image(seed, bars, &fill)));
         finder.finish()
     }
 
@@ -197,7 +197,7 @@ mod tests {
     }
 
     #[test]
-    fn pictures_without_bars_have_none() {
+    fn images_without_bars_have_none() {
         assert_eq!(found([0, 0], |_, _| 0), None);
         // Bars that are too narrow, on one side only, or of unequal width.
         assert_eq!(found([10, 10], |_, _| 0), None);
@@ -209,7 +209,7 @@ mod tests {
         // A lit figure in front of a dark wall does not end at a straight seam.
         let mut figure = BarFinder::default();
         for seed in 0..5 {
-            let mut image = picture(seed, [100, 100], |_, _| 2);
+            let mut image = test_image(seed, [100, 100], |_, _| 2);
             for (at, pixel) in image.data.as_chunks_mut::<3>().0.iter_mut().enumerate() {
                 let (x, y) = ((at % 320) as f64 - 160.0, (at / 320) as f64 - 90.0);
                 if (x / 60.0).hypot(y / 85.0) > 1.0 {
@@ -223,7 +223,7 @@ mod tests {
     }
 
     #[test]
-    fn tiny_pictures_have_none_either() {
+    fn tiny_images_have_no_bars() {
         let mut finder = BarFinder::default();
         (0..3).for_each(|_| finder.push(&Image::filled(3, 2, [9; 3])));
         assert_eq!(finder.finish(), None);

@@ -126,7 +126,7 @@ mod tests {
     }
 
     #[test]
-    fn moving_combs_are_measured_and_nothing_else() {
+    fn only_moving_combs_are_measured() {
         assert!(comb_share(&disc([50.0, 62.0]), &disc([74.0, 86.0])) > 0.01);
         let static_disc = disc([50.0; 2]);
         assert_eq!(comb_share(&static_disc, &disc([62.0; 2])), 0.0);

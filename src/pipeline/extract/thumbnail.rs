@@ -70,7 +70,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_difference_is_the_mean_over_the_picture() {
+    fn a_difference_is_the_mean_over_the_image() {
         let a = Image::filled(4, 2, [10, 20, 30]);
         let mut b = a.clone();
         assert_eq!(mean_change(&a, &b), 0.0);

@@ -58,7 +58,7 @@ mod tests {
     use ndarray::Array3;
 
     #[test]
-    fn only_long_gaps_stay_open() {
+    fn only_long_gaps_remain_open() {
         let visible = [false, true, false, false, true, false, false, false];
         assert_eq!(long_gaps(&visible, 2), [false, false, false, false, false, true, true, true]);
         assert_eq!(long_gaps(&visible, 0), visible.map(|s| !s));

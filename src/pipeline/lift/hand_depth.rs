@@ -74,7 +74,7 @@ mod tests {
     }
 
     #[test]
-    fn wrongly_mirrored_hands_are_corrected() {
+    fn incorrectly_mirrored_hands_are_corrected() {
         let truth = turning(60);
         assert_eq!(resolved(truth.clone()), truth);
         let mut wrong = truth.clone();

@@ -96,7 +96,7 @@ mod tests {
     }
 
     #[test]
-    fn a_wrong_file_is_reported_with_the_reason() {
+    fn an_invalid_file_is_reported_with_the_reason() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("w.safetensors");
         std::fs::write(&path, HANDS).unwrap();

@@ -106,7 +106,7 @@ mod tests {
     }
 
     #[test]
-    fn clothes_distinguish_people_whatever_their_position_and_light() {
+    fn clothes_distinguish_persons_at_any_position_and_light() {
         let of = |(image, body): (Image, [ScoredPoint; 17])| BodyColours::measure(&image, &body, 0.3).unwrap();
         let red = of(person([180, 40, 40], 1.0, 100.0));
         let same = red.distance(&of(person([180, 40, 40], 0.9, 200.0)));

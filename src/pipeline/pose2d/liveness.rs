@@ -118,7 +118,7 @@ mod tests {
     use super::*;
 
     /// Two boxes of noise; the right one differs in each picture.
-    fn picture(frame: usize, light: u8, shift: usize) -> Image {
+    fn test_image(frame: usize, light: u8, shift: usize) -> Image {
         let mut image = Image::filled(200, 100, [0; 3]);
         for (at, pixel) in image.data.as_chunks_mut::<3>().0.iter_mut().enumerate() {
             let (x, y) = ((at % 200 + shift) / 10, at / 200 / 10);
@@ -131,18 +131,18 @@ mod tests {
     }
 
     #[test]
-    fn changing_boxes_are_alive() {
+    fn changing_boxes_show_a_living_person() {
         let person_at = |x: f32| PersonBox { x, y: 10.0, width: 80.0, height: 80.0, score: 0.9 };
         let mut tracks = LivenessTracks::default();
         let mut last = Vec::new();
         for frame in 0..4 {
             // Changes of light and small camera movement are not liveness.
-            last =
-                tracks.update(&picture(frame, 10 * frame as u8, 3 * (frame % 2)), &[person_at(10.0), person_at(115.0)]);
+            last = tracks
+                .update(&test_image(frame, 10 * frame as u8, 3 * (frame % 2)), &[person_at(10.0), person_at(115.0)]);
         }
         assert_eq!((last[0].n, last[1].n), (3, 3));
         assert!(last[0].max_change < 6.0 && last[1].max_change > 20.0, "{last:?}");
-        assert_eq!(tracks.update(&picture(9, 0, 0), &[])[..], []);
-        assert_eq!(tracks.update(&picture(9, 0, 0), &[person_at(60.0)])[0].n, 0);
+        assert_eq!(tracks.update(&test_image(9, 0, 0), &[])[..], []);
+        assert_eq!(tracks.update(&test_image(9, 0, 0), &[person_at(60.0)])[0].n, 0);
     }
 }

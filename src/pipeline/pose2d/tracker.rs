@@ -198,7 +198,7 @@ mod tests {
     }
 
     #[test]
-    fn the_followed_person_stays_while_another_grows_larger() {
+    fn the_followed_person_is_not_replaced_by_a_larger_one() {
         let mut followed = PersonTrack::default();
         for step in 0..30 {
             let grown = step as f32;
@@ -232,7 +232,7 @@ mod tests {
     }
 
     #[test]
-    fn a_picture_is_replaced_by_a_living_person() {
+    fn a_printed_person_is_replaced_by_a_living_one() {
         let (large, small) = (at(80.0, 200.0, 0.9), at(0.0, 60.0, 0.8));
         let mut followed = PersonTrack::default();
         followed.update(&[large, small], tracker_step(300, false));
@@ -245,7 +245,7 @@ mod tests {
     }
 
     #[test]
-    fn the_active_speaker_is_followed_whoever_is_larger_or_more_similar() {
+    fn the_active_speaker_is_preferred_to_larger_or_more_similar_persons() {
         let speaking = |candidate: Candidate| Candidate { speaks: true, appearance_distance: Some(90.0), ..candidate };
         let (large, small) = (Candidate { appearance_distance: Some(1.0), ..at(80.0, 200.0, 0.9) }, at(0.0, 30.0, 0.5));
         let mut followed = PersonTrack::default();

@@ -85,7 +85,7 @@ mod tests {
     }
 
     #[test]
-    fn errors_keep_their_texts_and_types() {
+    fn errors_round_trip_with_their_texts_and_types() {
         let media = || UnreadableMedia("a.mp4 is empty".to_owned());
         assert!(sent(&media().into()).is::<UnreadableMedia>());
         assert!(sent(&Error::from(media()).context("the stage")).downcast_ref() == Some(&media()));

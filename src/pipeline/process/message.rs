@@ -135,7 +135,7 @@ mod tests {
     use serde_json::json;
 
     #[test]
-    fn numbers_keep_their_last_bit_and_names_their_bytes() {
+    fn numbers_round_trip_exactly_and_names_byte_for_byte() {
         let facts = json!({ "a": 0.1 + 0.2, "b": 1.0, "c": 3, "d": null, "e": [-1, 1e300, 0.017_453_292_519_943_295] });
         let facts = facts.as_object().unwrap().clone();
         let settings = Settings::default();

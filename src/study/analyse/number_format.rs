@@ -65,7 +65,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn numbers_read_well() {
+    fn numbers_are_rounded_and_grouped() {
         assert_eq!([0, 999, 1083, 2_000_000].map(count), ["0", "999", "1,083", "2,000,000"]);
         assert_eq!([1, 2000].map(|n| counted(n, "vote")), ["1 vote", "2,000 votes"]);
         assert_eq!([1.0, 0.0268, 6.51e-12, 0.0].map(bare_p), ["1", "0.027", "6.5e-12", "< 1e-99"]);

@@ -162,7 +162,7 @@ mod tests {
     }
 
     #[test]
-    fn the_challenge_preset_mismatches_natural_motion_in_tasks_with_sound() {
+    fn the_challenge_preset_mismatches_natural_motion_in_audio_tasks() {
         let file = read(&SMALLEST.replace("rebol", "genea2020"));
         assert_eq!(file.task[0].conditions, ["natural", "model"]);
         assert_eq!(file.task[1].conditions, ["natural", "mismatched", "model"]);

@@ -88,7 +88,7 @@ mod tests {
     }
 
     #[test]
-    fn with_a_proxy_local_peers_have_no_limit_and_others_have_theirs() {
+    fn with_a_proxy_only_local_peers_are_unlimited() {
         let n_admitted = |trusts_local: bool, address: &str| {
             let limit = PeerLimit::new(2, trusts_local);
             let admitted: Vec<_> = (0..5).map_while(|_| limit.admit(address.parse().unwrap())).collect();

@@ -204,7 +204,7 @@ mod tests {
     }
 
     #[test]
-    fn agreement_on_everything_or_nothing() {
+    fn full_agreement_is_1_and_undefined_agreement_is_an_error() {
         let same = vec![vec![2.0, 2.0], vec![5.0, 5.0]];
         assert_eq!(alpha(&same, MeasurementScale::Interval), Ok(1.0));
         let constant = vec![vec![2.0, 2.0]; 3];

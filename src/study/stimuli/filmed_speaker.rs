@@ -222,7 +222,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn sounds_are_normalised_without_clipping() {
+    fn audio_is_normalised_without_clipping() {
         let noise = |gain: f32, peak: f32| {
             let mut samples: Vec<f32> =
                 (0..48_000u64).map(|i| gain * ((i * i * 7_919 % 2_003) as f32 / 1_001.5 - 1.0)).collect();

@@ -325,7 +325,7 @@ mod tests {
     }
 
     #[test]
-    fn an_id_neither_resumes_a_session_nor_ends_one_before_its_time() {
+    fn an_id_neither_resumes_a_session_nor_ends_one_early() {
         let dir = tempfile::tempdir().unwrap();
         let db = database::open(&dir.path().join("responses.sqlite"), "plan").unwrap();
         assert_eq!(session(&begin_as(&db, "first", "p", 1000)), Some(0));

@@ -135,7 +135,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn work_is_acknowledged_after_its_commit_and_a_failure_stores_nothing() {
+    fn work_is_acknowledged_after_its_commit_and_failures_are_not_stored() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("responses.sqlite");
         let (store, thread) = ResponseStore::open(&path, "plan").unwrap();

@@ -1,5 +1,5 @@
-//! Bad input in one folder with good: each is reported with its file and what to do, refused content is no failure,
-//! the others go on, the exit code tells, and nothing made is lost.
+//! Invalid beside valid input: each problem is reported with its file and a remedy, rejected content is no failure,
+//! other units continue, the exit code shows failures, and no existing output is lost.
 
 use crate::fixtures::clips::ffmpeg;
 use orator_base::types::pose2d::Keypoints;
@@ -11,46 +11,47 @@ use serde_json::Value;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// The line of `stage` for the video whose work name begins with `name`.
+/// Line that `stage` reports for the video whose work name starts with `name`.
 fn line(answer: &ProgramAnswer, stage: &str, name: &str) -> String {
-    let of = |list: &str, text: &str| {
+    let find = |list: &str, text: &str| {
         let entries = answer.json[list].as_array().cloned().unwrap_or_default();
-        let is_it = |entry: &&Value| {
+        let is_unit = |entry: &&Value| {
             let unit = entry["unit"].as_str().unwrap_or_default().replace("host/", "");
             entry["stage"] == stage && unit.starts_with(&format!("{name}-"))
         };
-        entries.iter().find(is_it).map(|entry| entry[text].as_str().unwrap_or_default().to_owned())
+        entries.iter().find(is_unit).map(|entry| entry[text].as_str().unwrap_or_default().to_owned())
     };
-    of("failures", "error").map(|error| format!("failed: {error}")).or(of("units", "line")).unwrap_or_default()
+    find("failures", "error").map(|error| format!("failed: {error}")).or(find("units", "line")).unwrap_or_default()
 }
 
-/// A copy of `from` that may not be read; false, with a loud line, for a user who may read everything.
-fn lock(from: &Path, to: &Path) -> bool {
+/// Copies `from` without read permission; returns false, with a skip line, if this user may read every file.
+fn copy_unreadable(from: &Path, to: &Path) -> bool {
     use std::os::unix::fs::PermissionsExt as _;
     fs::copy(from, to).unwrap();
     fs::set_permissions(to, fs::Permissions::from_mode(0o000)).unwrap();
     if fs::File::open(to).is_err() {
         return true;
     }
-    skip("in part: this user (root?) may read a file without permission to read it");
+    skip("in part: this user (root?) may read files without read permission");
     fs::remove_file(to).unwrap();
     false
 }
 
-/// `nobody.mp4`: a gray picture with a tone.
-fn gray(project: &Project, size: &str, secs: u32) {
+/// Writes `nobody.mp4`: a gray image with a tone.
+fn write_gray_video(project: &Project, size: &str, secs: u32) {
     let inputs = format!("-f lavfi -i color=gray:size={size}:duration={secs}:rate=15 -f lavfi -i sine=duration={secs}");
     assert!(ffmpeg(&project.video(""), &format!("{inputs} nobody.mp4")));
 }
 
-/// The keypoints made of the video whose work name begins with `name`.
+/// Keypoints of the video whose work name starts with `name`.
 fn keypoints(project: &Project, name: &str) -> Keypoints {
-    let is_it = |(file, _): &(String, PathBuf)| file.contains(&format!("{name}-")) && file.ends_with("/keypoints.npz");
-    let file = files_under(&project.work().join("pose2d")).into_iter().find(is_it);
+    let is_wanted =
+        |(file, _): &(String, PathBuf)| file.contains(&format!("{name}-")) && file.ends_with("/keypoints.npz");
+    let file = files_under(&project.work().join("pose2d")).into_iter().find(is_wanted);
     keypoints_npz::read(&file.expect(name).1).unwrap()
 }
 
-/// One picture coded twice: equal points are found, within a few px.
+/// Asserts that two encodings of one clip have the same points, within a few px.
 fn assert_alike(one: &Keypoints, other: &Keypoints) {
     assert_eq!((one.image_size, one.n_frames()), (other.image_size, other.n_frames()));
     let parts = [
@@ -73,7 +74,7 @@ fn assert_alike(one: &Keypoints, other: &Keypoints) {
 }
 
 #[test]
-fn bad_videos_are_reported_and_the_others_go_on() {
+fn invalid_videos_are_reported_and_the_others_are_processed() {
     let project = Project::with_clips("bad", 1, 6.0);
     let good = project.clips().remove(0);
     let from = good.to_string_lossy().into_owned();
@@ -82,7 +83,7 @@ fn bad_videos_are_reported_and_the_others_go_on() {
     };
     fs::write(project.video("text.mp4"), "this is no video\n").unwrap();
     fs::write(project.video("zero.mp4"), "").unwrap();
-    // The program's own files have their index in front, so that half a file is half a clip; ffmpeg's end with it.
+    // The project's clips have their index first, so that half a file is half a clip; those of ffmpeg have it last.
     let half = |from: &Path, name: &str| {
         let bytes = fs::read(from).unwrap();
         fs::write(project.video(name), &bytes[..bytes.len() / 2]).unwrap();
@@ -93,21 +94,21 @@ fn bad_videos_are_reported_and_the_others_go_on() {
     fs::create_dir(project.video("folder.mp4")).unwrap();
     #[cfg(unix)]
     std::os::unix::fs::symlink("nowhere.mp4", project.video("dangling.mp4")).unwrap();
-    let locked = lock(&good, &project.video("locked.mp4"));
+    let locked = copy_unreadable(&good, &project.video("locked.mp4"));
     make("silent.mp4", "-an -c copy");
     make("oneframe.mp4", "-frames:v 1 -t 0.1");
     make("slow10fps.mp4", "-r 10");
-    // Coded turned one way, marked to be shown turned back.
+    // Encoded rotated, with metadata that rotates it back.
     make("../coded.mp4", "-vf transpose=cclock");
-    let mark = "-i ../coded.mp4 -c copy -metadata:s:v rotate=270 rotated.mp4";
-    assert!(ffmpeg(&project.video(""), mark));
-    gray(&project, "640x480", 6);
+    let rotate = "-i ../coded.mp4 -c copy -metadata:s:v rotate=270 rotated.mp4";
+    assert!(ffmpeg(&project.video(""), rotate));
+    write_gray_video(&project, "640x480", 6);
     project.name_videos(&["videos/host", "videos/missing.mp4", "videos/none-*.mp4", "videos/empty"]);
     fs::create_dir_all(project.video("../empty")).unwrap();
 
     let answer = project.run(&[]);
     assert_eq!(answer.code, 2, "{}", answer.errors);
-    for (name, says) in [
+    for (name, expected) in [
         ("text", "text.mp4"),
         ("zero", "zero.mp4"),
         ("truncated", "truncated.mp4"),
@@ -120,63 +121,66 @@ fn bad_videos_are_reported_and_the_others_go_on() {
             continue;
         }
         let error = line(&answer, "extract", name);
-        assert!(error.starts_with("failed: ") && error.contains(says), "{name}: {error:?}");
+        assert!(error.starts_with("failed: ") && error.contains(expected), "{name}: {error:?}");
     }
     assert!(line(&answer, "extract", "damaged").contains("the file is damaged, its readable part is used"));
-    for (name, says) in [("silent", "sound"), ("nobody", "still"), ("oneframe", "no interval accepted")] {
-        let refusal = line(&answer, "segment", name);
-        assert!(!refusal.starts_with("failed") && refusal.contains(says), "{name}: {refusal:?}");
+    for (name, expected) in [("silent", "sound"), ("nobody", "still"), ("oneframe", "no interval accepted")] {
+        let reason = line(&answer, "segment", name);
+        assert!(!reason.starts_with("failed") && reason.contains(expected), "{name}: {reason:?}");
     }
     for name in ["slow10fps", "rotated"] {
-        let kept = line(&answer, "segment", name);
-        assert!(kept.contains("accepted") && !kept.starts_with("accepted 0.0"), "{name}: {kept:?}");
+        let summary = line(&answer, "segment", name);
+        assert!(summary.contains("accepted") && !summary.starts_with("accepted 0.0"), "{name}: {summary:?}");
     }
     assert_alike(&keypoints(&project, "rotated"), &keypoints(&project, "clip-1"));
     for message in ["none-*.mp4", "empty"] {
         assert!(answer.errors.contains(message), "{message}: {}", answer.errors);
     }
-    let shard = project.work().join("dataset/host/index.jsonl");
-    let made = fs::read(&shard).unwrap();
+    let index = project.work().join("dataset/host/index.jsonl");
+    let before = fs::read(&index).unwrap();
     let again = project.run(&[]);
-    assert_eq!((again.code, fs::read(&shard).unwrap()), (2, made));
-    assert_eq!(again.json["stages"]["pose2d"]["done"], 0, "fresh work was done again");
+    assert_eq!((again.code, fs::read(&index).unwrap()), (2, before));
+    assert_eq!(again.json["stages"]["pose2d"]["done"], 0, "an up-to-date unit was processed again");
 }
 
 #[test]
-fn a_speaker_without_an_interval_is_exit_code_2_with_the_reasons() {
+fn a_speaker_without_an_interval_exits_with_2_and_the_reasons() {
     let project = Project::with_clips("nothing", 0, 0.0);
-    gray(&project, "320x240", 5);
+    write_gray_video(&project, "320x240", 5);
     let answer = project.run(&[]);
     assert_eq!(answer.code, 2);
     assert!(answer.errors.contains("no interval") && answer.errors.contains("still"), "{}", answer.errors);
 }
 
 #[test]
-fn wrong_set_up_is_exit_code_1_and_says_what_to_do() {
+fn invalid_settings_exit_with_1_and_a_remedy() {
     let project = Project::with_clips("set-up", 1, 2.0);
-    let says = |args: &[&str], expected: &[&str]| {
+    let fails = |args: &[&str], expected: &[&str]| {
         let answer = project.run(args);
         assert_eq!(answer.code, 1, "{args:?}: {}", answer.errors);
         for text in expected {
             assert!(answer.errors.contains(text), "{args:?}: {text:?} is not in {:?}", answer.errors);
         }
     };
-    says(&["--set", "models.dir=nowhere"], &["marker", "nowhere", "models fetch"]);
+    fails(&["--set", "models.dir=nowhere"], &["marker", "nowhere", "models fetch"]);
     fs::write(project.dir().join("file"), "").unwrap();
-    says(&["--set", &format!("work.dir={}", project.dir().join("file/work").display())], &["cannot write", "work.dir"]);
-    says(&["--set", "extract.fps=0"], &["extract.fps", "1 to 120"]);
-    says(&["--set", "pose2d.body=no-such-model"], &["no-such-model", "models add"]);
-    says(&["--speaker", "nobody"], &["nobody", "host"]);
-    says(&["--from", "lift", "--to", "extract"], &["--from"]);
-    says(&["--what"], &["--what"]);
-    says(&["-c", "gone.toml"], &["gone.toml", "orator init"]);
+    fails(
+        &["--set", &format!("work.dir={}", project.dir().join("file/work").display())],
+        &["cannot write", "work.dir"],
+    );
+    fails(&["--set", "extract.fps=0"], &["extract.fps", "1 to 120"]);
+    fails(&["--set", "pose2d.body=no-such-model"], &["no-such-model", "models add"]);
+    fails(&["--speaker", "nobody"], &["nobody", "host"]);
+    fails(&["--from", "lift", "--to", "extract"], &["--from"]);
+    fails(&["--what"], &["--what"]);
+    fails(&["-c", "gone.toml"], &["gone.toml", "orator init"]);
     let file = project.dir().join("pipeline.toml");
     fs::write(&file, "[extract]\nfsp = 15\nfps = \"a\"\n").unwrap();
-    says(&[], &["2 problems", "line 2: extract.fsp", "did you mean fps", "line 3: extract.fps"]);
+    fails(&[], &["2 problems", "line 2: extract.fsp", "did you mean fps", "line 3: extract.fps"]);
 }
 
 #[test]
-fn wrong_models_are_exit_code_1_and_say_which_and_why() {
+fn invalid_models_exit_with_1_and_name_the_model_and_the_cause() {
     let project = Project::with_clips("models", 1, 1.0);
     let models = |folder: &str| {
         let to = project.dir().join(folder);
@@ -186,7 +190,7 @@ fn wrong_models_are_exit_code_1_and_say_which_and_why() {
         }
         to
     };
-    let described = |folder: &str, id: &str, change: &dyn Fn(&mut ModelEntry)| {
+    let write_manifest = |folder: &str, id: &str, change: &dyn Fn(&mut ModelEntry)| {
         let mut entry = Manifest::builtin().unwrap().get(id).unwrap().clone();
         change(&mut entry);
         let manifest = Manifest { models: vec![entry], ..Manifest::default() };
@@ -197,9 +201,9 @@ fn wrong_models_are_exit_code_1_and_say_which_and_why() {
     let mut bytes = fs::read(&flipped).unwrap();
     bytes[1000] ^= 1;
     fs::write(&flipped, bytes).unwrap();
-    described("input", "person-marker", &|entry| entry.inputs[0].shape = vec![1, 3, 416, 416]);
-    described("output", "body-marker", &|entry| entry.outputs[0].shape = vec![1, 17, 128, 96]);
-    for (folder, says) in [
+    write_manifest("input", "person-marker", &|entry| entry.inputs[0].shape = vec![1, 3, 416, 416]);
+    write_manifest("output", "body-marker", &|entry| entry.outputs[0].shape = vec![1, 17, 128, 96]);
+    for (folder, expected) in [
         ("missing", ["body-marker is missing", "marker_body.onnx", "models fetch"]),
         ("flipped", ["person-marker differs from its description", "marker_person.onnx has sha256", "models add"]),
         ("input", ["tensors of the model person-marker differ", "416", "320"]),
@@ -207,6 +211,6 @@ fn wrong_models_are_exit_code_1_and_say_which_and_why() {
     ] {
         let answer = project.run(&["--set", &format!("models.dir={folder}")]);
         assert_eq!(answer.code, 1, "{folder}: {}", answer.errors);
-        assert!(says.iter().all(|text| answer.errors.contains(text)), "{folder}: {}", answer.errors);
+        assert!(expected.iter().all(|text| answer.errors.contains(text)), "{folder}: {}", answer.errors);
     }
 }

@@ -1,5 +1,5 @@
-//! Files of an earlier version of the program (`fixtures/before`) open: a dataset, a work folder, and a GAN checkpoint,
-//! whose header alone is kept; a formula fills it with numbers.
+//! Files of an earlier version (`fixtures/before`) remain readable: a dataset, a work folder and a GAN checkpoint, of
+//! which only the header is stored; a formula generates its weights.
 
 use crate::fixtures::untrained::generate;
 use orator_dataset::verify::verify::verify;
@@ -15,13 +15,13 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-fn before(name: &str) -> PathBuf {
+fn earlier(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/before").join(name)
 }
 
 #[test]
 fn a_dataset_verifies_and_reads() {
-    let folder = before("work/dataset/host");
+    let folder = earlier("work/dataset/host");
     let found = verify(&folder, true, &Silent).unwrap();
     assert!(found.problems.is_empty(), "{:?}", found.problems);
     let dataset = Dataset::open(&folder).unwrap();
@@ -41,65 +41,65 @@ fn a_dataset_verifies_and_reads() {
 const TRAIN_SUM: f64 = 0.869_040_330_871_939_7;
 const TEST_SUM: f64 = 23.001_238_243_654_37;
 
-/// A project with the earlier work folder and configuration, beside clips drawn anew.
+/// A project with the earlier work folder and configuration, and newly rendered clips.
 fn project() -> Project {
     let project = Project::with_clips("before", 2, 1.0);
-    for (name, path) in files_under(&before("work")) {
+    for (name, path) in files_under(&earlier("work")) {
         let to = project.work().join(name);
         fs::create_dir_all(to.parent().unwrap()).unwrap();
         fs::copy(path, to).unwrap();
     }
-    fs::copy(before("pipeline.toml"), project.dir().join("pipeline.toml")).unwrap();
+    fs::copy(earlier("pipeline.toml"), project.dir().join("pipeline.toml")).unwrap();
     project
 }
 
 #[test]
-fn a_work_folder_has_a_status() {
+fn status_reads_a_work_folder() {
     let project = project();
     let status = project.answer(&["status", "--why"]);
     assert_eq!(status.code, 0, "{}", status.errors);
     let units = status.json["units"].as_array().unwrap();
     let state = |unit: &str, stage: &str| {
-        let is_it = |fact: &&Value| fact["unit"].as_str().unwrap().starts_with(unit) && fact["stage"] == stage;
-        let fact = units.iter().find(is_it).unwrap_or_else(|| panic!("{unit} {stage}: {}", status.json));
+        let is_fact = |fact: &&Value| fact["unit"].as_str().unwrap().starts_with(unit) && fact["stage"] == stage;
+        let fact = units.iter().find(is_fact).unwrap_or_else(|| panic!("{unit} {stage}: {}", status.json));
         (fact["state"].as_str().unwrap().to_owned(), fact["reason"].as_str().unwrap_or_default().to_owned())
     };
-    // The clips are drawn anew: their bytes may differ from those of then, and whatever follows waits for them.
+    // The clips are newly rendered: their bytes may differ from the earlier ones, so that later stages wait for them.
     for (unit, stage) in
         [("host/clip-1", "extract"), ("host/clip-1", "lift"), ("host/clip-2", "extract"), ("host", "dataset")]
     {
-        let (word, why) = state(unit, stage);
-        assert!(["fresh", "stale", "waits", "-"].contains(&word.as_str()), "{unit} {stage}: {word}: {why}");
-        eprintln!("{unit} {stage}: {word}: {why}");
+        let (value, reason) = state(unit, stage);
+        assert!(["fresh", "stale", "waits", "-"].contains(&value.as_str()), "{unit} {stage}: {value}: {reason}");
+        eprintln!("{unit} {stage}: {value}: {reason}");
     }
-    assert!(status.errors.contains("max_bone_change"), "the key under its former name is told: {}", status.errors);
+    assert!(status.errors.contains("max_bone_change"), "the former name of the key is reported: {}", status.errors);
 }
 
 #[test]
-fn a_video_is_forgotten_with_its_files_of_former_names() {
+fn forget_removes_files_with_former_names() {
     let project = project();
     let measures = |files: &[(String, PathBuf)]| {
         files.iter().any(|(name, _)| name.ends_with("lift/host/clip-1-f39adeef/measures.npz"))
     };
     assert!(measures(&files_under(&project.work())));
-    let others = |project: &Project| -> BTreeMap<String, Vec<u8>> {
+    let read_shards = |project: &Project| -> BTreeMap<String, Vec<u8>> {
         let files = files_under(&project.work()).into_iter();
         files.filter(|(name, _)| name.ends_with(".tar")).map(|(name, path)| (name, fs::read(path).unwrap())).collect()
     };
-    let shards = others(&project);
+    let shards = read_shards(&project);
     let answer = project.answer(&["forget", "--video", "clip-1.mp4"]);
     assert_eq!(answer.code, 0, "{} {}", answer.json, answer.errors);
     assert!(answer.json["found"].as_array().unwrap().is_empty(), "{}", answer.json);
-    let left: Vec<String> = files_under(&project.work()).into_iter().map(|(name, _)| name).collect();
-    assert!(!left.iter().any(|name| name.contains("clip-1")), "{left:?}");
-    let kept = others(&project);
-    assert_eq!(kept.len(), 1, "{left:?}");
-    assert!(kept.iter().all(|(name, bytes)| shards[name] == *bytes));
+    let names: Vec<String> = files_under(&project.work()).into_iter().map(|(name, _)| name).collect();
+    assert!(!names.iter().any(|name| name.contains("clip-1")), "{names:?}");
+    let remaining = read_shards(&project);
+    assert_eq!(remaining.len(), 1, "{names:?}");
+    assert!(remaining.iter().all(|(name, bytes)| shards[name] == *bytes));
     let found = verify(&project.work().join("dataset/host"), true, &Silent).unwrap();
     assert!(found.problems.is_empty(), "{:?}", found.problems);
 }
 
-/// Number `index` of the tensor `name`: 24 bits of a hash (FNV-1a of the name, then SplitMix64) as 0..1.
+/// Element `index` of the tensor `name`: 24 bits of a hash (FNV-1a of the name, then SplitMix64) scaled to 0..1.
 fn hashed(name: &str, index: u64) -> f32 {
     let seed = name
         .bytes()
@@ -110,7 +110,7 @@ fn hashed(name: &str, index: u64) -> f32 {
     ((z ^ (z >> 31)) >> 40) as f32 / 16_777_216.0
 }
 
-/// The values of a tensor: weights of a spread that suits their number of inputs, norms about one.
+/// Values of a tensor: weights scaled by the number of inputs, norm parameters near one.
 fn filled(name: &str, shape: &[u64]) -> Vec<f32> {
     let fan_in: u64 = shape.iter().skip(1).product();
     let value = |index: u64| {
@@ -126,12 +126,12 @@ fn filled(name: &str, shape: &[u64]) -> Vec<f32> {
     (0..shape.iter().product()).map(value).collect()
 }
 
-/// Writes the kept header and the numbers of the formula as a safetensors file.
+/// Writes the stored header and the generated weights as a safetensors file.
 fn write_checkpoint(path: &Path) {
-    let kept: Value = serde_json::from_slice(&fs::read(before("checkpoint.json")).unwrap()).unwrap();
-    let mut header = json!({ "__metadata__": kept["metadata"] });
+    let stored: Value = serde_json::from_slice(&fs::read(earlier("checkpoint.json")).unwrap()).unwrap();
+    let mut header = json!({ "__metadata__": stored["metadata"] });
     let mut data: Vec<u8> = Vec::new();
-    for (name, shape) in kept["tensors"].as_object().unwrap() {
+    for (name, shape) in stored["tensors"].as_object().unwrap() {
         let shape: Vec<u64> = serde_json::from_value(shape.clone()).unwrap();
         let first = data.len();
         data.extend(filled(name, &shape).into_iter().flat_map(f32::to_le_bytes));
@@ -143,7 +143,7 @@ fn write_checkpoint(path: &Path) {
 }
 
 #[test]
-fn a_checkpoint_generates_the_motion_of_then() {
+fn a_checkpoint_generates_its_original_motion() {
     let folder = tempfile::tempdir().unwrap();
     write_checkpoint(&folder.path().join("host.safetensors"));
     let samples = (0..16_000_i32).map(|i| (((i64::from(i).pow(2) * 7) >> 6) % 20_001 - 10_000) as f32 / 32_768.0);
@@ -152,10 +152,10 @@ fn a_checkpoint_generates_the_motion_of_then() {
     let output = generate(folder.path(), "--checkpoint host.safetensors --audio speech.wav --out motion.npy");
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     let fps = FrameRate::new(15, 1);
-    let [then, now] =
-        [before("motion.npy"), folder.path().join("motion.npy")].map(|file| npy::read(&file, fps).unwrap());
-    assert_eq!(then.joints.dim(), now.joints.dim());
-    let apart = then.joints.iter().zip(&now.joints).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
-    eprintln!("{apart:e} m at most");
-    assert!(apart <= 1e-6, "{apart:e} m");
+    let [expected, generated] =
+        [earlier("motion.npy"), folder.path().join("motion.npy")].map(|file| npy::read(&file, fps).unwrap());
+    assert_eq!(expected.joints.dim(), generated.joints.dim());
+    let difference = expected.joints.iter().zip(&generated.joints).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
+    eprintln!("difference: {difference:e} m at most");
+    assert!(difference <= 1e-6, "{difference:e} m");
 }

@@ -1,6 +1,6 @@
-//! Every call that writes fails once, or is where the program is killed: it says so, and the same command ends in the
-//! same bytes afterwards. `ORATOR_FAULTS=all` tries every call (`make prove`), another word those of the verbs with it among
-//! their arguments; without, a few are drawn by lot.
+//! Every call that writes fails once, or is the point at which the program is killed: the error is reported, and a
+//! retry writes identical bytes. `ORATOR_FAULTS=all` (`make prove`) tries every call, another word those of the verbs
+//! with it among their arguments; by default a random sample is tried.
 
 use crate::fixtures::faults::scenes::{SCENES, Scene, content, copy, prepare, set_up};
 use crate::fixtures::faults::shim::{Call, Fault, Shim, orator};
@@ -11,34 +11,34 @@ use std::process::Output;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-/// Workers; each trial has a folder of its own.
+/// Number of workers; each has a separate folder.
 const N_WORKERS: usize = 2;
 
 /// A scene that ran without a fault.
-struct Calm {
+struct Reference {
     scene: &'static Scene,
     /// The folder before the verb.
     start: PathBuf,
-    /// What the folder holds afterwards; files that are not the same in every run are left out.
+    /// Content of the folder afterwards, without the files in `varying`.
     end: BTreeMap<String, String>,
-    /// Those left out: times and paths are in them.
+    /// Files that differ between runs, because they contain times or paths.
     varying: BTreeSet<String>,
     calls: Vec<Call>,
 }
 
-fn calm(shim: &Shim, root: &Path, at: usize) -> Calm {
+fn reference(shim: &Shim, root: &Path, at: usize) -> Reference {
     let scene = &SCENES[at];
     let start = root.join(format!("start-{at}"));
     set_up(&root.join("base"), &start, scene);
     let run = |name: &str| {
-        let place = root.join(format!("{name}-{at}"));
-        copy(&start, &place);
-        let (output, calls) = shim.calls(&place, scene.args);
-        assert!(output.status.success(), "{:?}: {}", scene.args, said(&output));
-        // A verb that is given twice: what the second one adds (a cache) is no difference.
-        orator(&place, scene.args).output().unwrap();
-        let content = content(&place);
-        std::fs::remove_dir_all(&place).unwrap();
+        let scratch = root.join(format!("{name}-{at}"));
+        copy(&start, &scratch);
+        let (output, calls) = shim.calls(&scratch, scene.args);
+        assert!(output.status.success(), "{:?}: {}", scene.args, text_of(&output));
+        // The verb runs twice, because what a second run adds (a cache) is not a difference.
+        orator(&scratch, scene.args).output().unwrap();
+        let content = content(&scratch);
+        std::fs::remove_dir_all(&scratch).unwrap();
         (content, calls)
     };
     let (mut end, calls) = run("one");
@@ -46,10 +46,10 @@ fn calm(shim: &Shim, root: &Path, at: usize) -> Calm {
     let differs = |(name, hash): (&String, &String)| (other.get(name) != Some(hash)).then(|| name.clone());
     let varying: BTreeSet<String> = end.iter().filter_map(differs).collect();
     end.retain(|name, _| !varying.contains(name));
-    Calm { scene, start, end, varying, calls }
+    Reference { scene, start, end, varying, calls }
 }
 
-fn said(output: &Output) -> String {
+fn text_of(output: &Output) -> String {
     format!("{}{}", String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr))
 }
 
@@ -62,113 +62,116 @@ fn chosen(calls: &[Call]) -> Vec<Call> {
     calls.iter().filter(|call| call.nth <= 2 || last[&call.site] == call.nth).cloned().collect()
 }
 
-/// What is wrong with how a scene took a fault; none: nothing.
-fn trial(shim: &Shim, calm: &Calm, call: &Call, fault: Fault, place: &Path) -> Option<String> {
-    copy(&calm.start, place);
-    let (output, was_reached) = shim.run(place, calm.scene.args, call, fault);
+/// Problem in the response of a scene to a fault; none if it was handled correctly.
+fn trial(shim: &Shim, reference: &Reference, call: &Call, fault: Fault, scratch: &Path) -> Option<String> {
+    copy(&reference.start, scratch);
+    let (output, was_reached) = shim.run(scratch, reference.scene.args, call, fault);
     if !was_reached {
         return None;
     }
-    let whole = |place: &Path| {
-        let mut now = content(place);
-        now.retain(|name, _| !calm.varying.contains(name));
-        let names: BTreeSet<&String> = now.keys().chain(calm.end.keys()).collect();
-        let differ = names.into_iter().filter(|name| now.get(*name) != calm.end.get(*name));
+    let differences = |scratch: &Path| {
+        let mut now = content(scratch);
+        now.retain(|name, _| !reference.varying.contains(name));
+        let names: BTreeSet<&String> = now.keys().chain(reference.end.keys()).collect();
+        let differ = names.into_iter().filter(|name| now.get(*name) != reference.end.get(*name));
         differ.map(|name| name.as_str().to_owned()).collect::<Vec<_>>()
     };
-    let said = said(&output);
+    let text = text_of(&output);
     match output.status.code() {
         _ if fault == Fault::Kill => {}
-        None | Some(101) => return Some(format!("ended with {:?}: {said}", output.status)),
-        Some(0) if is_cleaning(call) => {}
+        None | Some(101) => return Some(format!("ended with {:?}: {text}", output.status)),
+        Some(0) if is_cleanup(call) => {}
         Some(0) => {
-            let lost = whole(place);
-            if !lost.is_empty() {
-                return Some(format!("exit code 0, but {lost:?} differ: {said}"));
+            let differ = differences(scratch);
+            if !differ.is_empty() {
+                return Some(format!("exit code 0, but {differ:?} differ: {text}"));
             }
         }
-        Some(_) if !names(&said, &call.path) => return Some(format!("the message names no file: {said}")),
+        Some(_) if !names_file(&text, &call.path) => return Some(format!("the message names no file: {text}")),
         Some(_) => {}
     }
-    // A try after one that had come to its end may be refused, since all is there; what a second look alone finds (a
-    // cache) is no difference.
-    let again = orator(place, calm.scene.args).output().unwrap();
-    let mut differ = whole(place);
-    if !differ.is_empty() && again.status.success() {
-        orator(place, calm.scene.args).output().unwrap();
-        differ = whole(place);
+    // A retry after a completed attempt may be rejected, since its output exists; what only a second retry adds (a
+    // cache) is not a difference.
+    let retry = orator(scratch, reference.scene.args).output().unwrap();
+    let mut differ = differences(scratch);
+    if !differ.is_empty() && retry.status.success() {
+        orator(scratch, reference.scene.args).output().unwrap();
+        differ = differences(scratch);
     }
-    (!differ.is_empty()).then(|| format!("after the next try {differ:?} differ: {}", self::said(&again)))
+    (!differ.is_empty()).then(|| format!("after a retry {differ:?} differ: {}", text_of(&retry)))
 }
 
-/// Removing what is no longer needed may be left to the next run.
-fn is_cleaning(call: &Call) -> bool {
+/// Removals of obsolete files may be left to the next run.
+fn is_cleanup(call: &Call) -> bool {
     call.operation == "unlink"
 }
 
-/// Whether a message names the file, the file it is an attempt at, or a folder around it.
-fn names(said: &str, path: &str) -> bool {
+/// Whether a message names the file, the target of an attempt file, or a parent folder.
+fn names_file(text: &str, path: &str) -> bool {
     if matches!(path, "" | ".") {
-        return true; // the folder itself, of which any file says enough
+        return true; // the folder itself, which any file name identifies
     }
     let mut parts = path.rsplit('/').map(|part| part.trim_start_matches('.').split('.').next().unwrap_or_default());
-    parts.by_ref().take(3).any(|part| !part.is_empty() && said.contains(part))
+    parts.by_ref().take(3).any(|part| !part.is_empty() && text.contains(part))
 }
 
-/// A number from 0 to 2^32 that a trial's place in the sample is drawn by.
-fn lot(text: &str) -> u32 {
+/// Sort key that shuffles the trials reproducibly.
+fn shuffle_key(text: &str) -> u32 {
     u32::from_le_bytes(blake3::hash(text.as_bytes()).as_bytes()[..4].try_into().unwrap())
 }
 
-/// Tries `faults` at every call of every scene, or at `sample` of them, drawn by lot.
+/// Tries `faults` at every call of every scene, or at a random sample of `sample` calls.
 fn sweep(faults: &[Fault], sample: usize) {
     let Some(shim) = Shim::build() else { return skip("no C compiler") };
     let folder = tempfile::Builder::new().prefix("orator-faults-").tempdir().unwrap();
     let root = folder.path().canonicalize().unwrap();
     prepare(&root.join("base"));
     let wanted = std::env::var("ORATOR_FAULTS").ok();
-    let is_whole = wanted.is_some();
+    let is_complete = wanted.is_some();
     let is_wanted = |scene: &Scene| wanted.as_deref().is_none_or(|word| word == "all" || scene.args.contains(&word));
     let scenes: Vec<usize> = (0..SCENES.len()).filter(|at| is_wanted(&SCENES[*at])).collect();
-    let calms = in_parallel(scenes.len(), |n, _| calm(&shim, &root, scenes[n]));
+    let references = in_parallel(scenes.len(), |n, _| reference(&shim, &root, scenes[n]));
     let mut trials = Vec::new();
-    for (calm, at) in calms.iter().zip(0..) {
-        for call in chosen(&calm.calls) {
+    for (reference, at) in references.iter().zip(0..) {
+        for call in chosen(&reference.calls) {
             trials.extend(faults.iter().map(|fault| (at, call.clone(), *fault)));
         }
     }
-    let n_sites = calms.iter().flat_map(|calm| &calm.calls).map(|call| &call.site).collect::<BTreeSet<_>>().len();
+    let n_sites =
+        references.iter().flat_map(|reference| &reference.calls).map(|call| &call.site).collect::<BTreeSet<_>>().len();
     let n_all = trials.len();
-    // In turns, so that every scene is among the first.
-    trials.sort_by_cached_key(|(at, call, fault)| lot(&format!("{at} {} {} {fault:?}", call.operation, call.path)));
+    // Round-robin, so that the sample includes every scene.
+    trials.sort_by_cached_key(|(at, call, fault)| {
+        shuffle_key(&format!("{at} {} {} {fault:?}", call.operation, call.path))
+    });
     let mut turns = BTreeMap::new();
     trials.sort_by_cached_key(|(at, ..)| {
         let turn = turns.entry(*at).or_insert(0);
         *turn += 1;
         (*turn, *at)
     });
-    trials.truncate(if is_whole { n_all } else { sample });
-    let wrong = in_parallel(trials.len(), |n, worker| {
+    trials.truncate(if is_complete { n_all } else { sample });
+    let problems = in_parallel(trials.len(), |n, worker| {
         let (at, call, fault) = &trials[n];
-        let place = root.join(format!("trial-{worker}"));
-        let calm: &Calm = &calms[*at];
-        let wrong = trial(&shim, calm, call, *fault, &place)?;
+        let scratch = root.join(format!("trial-{worker}"));
+        let reference: &Reference = &references[*at];
+        let problem = trial(&shim, reference, call, *fault, &scratch)?;
         let Call { operation, path, site, nth } = call;
-        let text = format!("{:?}: {fault:?} at {operation} {path} ({site}, {nth}): {wrong}", calm.scene.args);
+        let text = format!("{:?}: {fault:?} at {operation} {path} ({site}, {nth}): {problem}", reference.scene.args);
         eprintln!("{text}");
         Some(text)
     });
-    let wrong: Vec<String> = wrong.into_iter().flatten().collect();
+    let problems: Vec<String> = problems.into_iter().flatten().collect();
     eprintln!(
-        "{} verbs, {n_sites} call sites, {} of {n_all} trials of {faults:?}: {} wrong",
+        "{} verbs, {n_sites} call sites, {} of {n_all} trials of {faults:?}: {} failed",
         scenes.len(),
         trials.len(),
-        wrong.len()
+        problems.len()
     );
-    assert!(wrong.is_empty(), "{} wrong:\n{}", wrong.len(), wrong.join("\n"));
+    assert!(problems.is_empty(), "{} failed:\n{}", problems.len(), problems.join("\n"));
 }
 
-/// `work` for every number below `n`, with the worker's number.
+/// Runs `work` for every number below `n`, with the worker's number, and returns the results in order.
 fn in_parallel<T: Send>(n: usize, work: impl Fn(usize, usize) -> T + Sync) -> Vec<T> {
     let next = AtomicUsize::new(0);
     let done = Mutex::new(Vec::new());
@@ -193,6 +196,6 @@ fn in_parallel<T: Send>(n: usize, work: impl Fn(usize, usize) -> T + Sync) -> Ve
 }
 
 #[test]
-fn a_write_that_fails_or_is_the_last_is_told_and_the_next_try_ends_in_the_same_bytes() {
+fn failed_or_last_writes_are_reported_and_a_retry_writes_the_same_bytes() {
     sweep(&[Fault::InputOutput, Fault::NoSpace, Fault::Kill], 54);
 }

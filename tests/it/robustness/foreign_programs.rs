@@ -1,4 +1,4 @@
-//! Programs of others (Python, npm, pip, those of clusters) run, load and read nothing that lies in the working directory.
+//! Foreign programs (Python, npm, pip, cluster clients) run, load and read no files of the working directory.
 
 use crate::fixtures::clips::tone;
 use crate::fixtures::faults::shim::path_with;
@@ -18,7 +18,7 @@ use std::sync::{Arc, Mutex};
 const MODULES: [&str; 6] = ["pocketsphinx", "os", "pip", "sitecustomize", "importlib/__init__", "encodings/__init__"];
 const PROGRAMS: [&str; 8] = ["python3", "npm", "node", "pip3", "scontrol", "sbatch", "kubectl", "ssh"];
 
-/// A working directory with planted modules and programs, each of which makes the file `ran`.
+/// A working directory with planted modules and programs, each of which writes to the file `ran` when executed.
 struct Planted {
     dir: tempfile::TempDir,
 }
@@ -36,7 +36,7 @@ impl Planted {
 
     fn command(&self, args: &[&str]) -> Command {
         let mut command = Command::new(env!("CARGO_BIN_EXE_orator"));
-        command.args(args).current_dir(self.dir.path()).env("PATH", path_after_here(None));
+        command.args(args).current_dir(self.dir.path()).env("PATH", path_after_working_directory(None));
         command
     }
 }
@@ -51,28 +51,28 @@ fn plant(dir: &Path) {
     PROGRAMS.iter().for_each(|name| script(&dir.join(name), &format!("echo \"$0\" >> '{}'", ran.display())));
 }
 
-/// A search path that begins with the working directory, by a dot and by an empty entry.
-fn path_after_here(bin: Option<&Path>) -> OsString {
+/// A search path that starts with the working directory, as a dot and as an empty entry.
+fn path_after_working_directory(bin: Option<&Path>) -> OsString {
     let mut path = OsString::from(".::");
     path.push(bin.map_or_else(|| std::env::var_os("PATH").unwrap(), path_with));
     path
 }
 
-fn said(output: &Output) -> String {
+fn text_of(output: &Output) -> String {
     format!("{}{}", String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr))
 }
 
 #[track_caller]
-fn expect_nothing_ran(dir: &Path, output: &Output) {
+fn expect_none_ran(dir: &Path, output: &Output) {
     let ran = fs::read_to_string(dir.join("ran"));
-    assert!(ran.is_err(), "{ran:?} ran: {}", said(output));
+    assert!(ran.is_err(), "{ran:?} ran: {}", text_of(output));
 }
 
-/// The Python behind `python3`, which may be a script of a version manager.
+/// Interpreter behind `python3`, which may itself be a script of a version manager.
 #[track_caller]
 fn real_python() -> Option<String> {
-    let asked = Command::new("python3").args(["-c", "import sys; print(sys.executable)"]).output();
-    let found = asked.ok().filter(|output| output.status.success());
+    let output = Command::new("python3").args(["-c", "import sys; print(sys.executable)"]).output();
+    let found = output.ok().filter(|output| output.status.success());
     if found.is_none() {
         skip("no python3");
     }
@@ -80,15 +80,15 @@ fn real_python() -> Option<String> {
 }
 
 #[test]
-fn python_imports_no_module_of_the_working_directory() {
+fn python_imports_no_module_from_the_working_directory() {
     let Some(python) = real_python() else { return };
     let planted = Planted::new();
     for args in [&["doctor"][..], &["align", "a.wav", "a.txt", "--out", "a.words.json"]] {
         let output = planted.command(args).env("ORATOR_PYTHON", "python3").output().unwrap();
-        expect_nothing_ran(planted.dir.path(), &output);
+        expect_none_ran(planted.dir.path(), &output);
     }
 
-    // Where there is no pip3, Python runs its module pip.
+    // Without pip3, Python runs its pip module.
     let (models, bin) = (planted.path("models"), planted.path("bin"));
     [&models, &bin].into_iter().for_each(|folder| fs::create_dir(folder).unwrap());
     fs::write(models.join("manifest.toml"), package_models(&bin, &["pip"])).unwrap();
@@ -97,12 +97,12 @@ fn python_imports_no_module_of_the_working_directory() {
     let mut command = planted.command(&["models", "fetch", "person-packed"]);
     command.env("PATH", format!(".::{}", bin.display())).env("PIP_INDEX_URL", "http://127.0.0.1:9/");
     let output = command.env_remove("PIP_FIND_LINKS").output().unwrap();
-    expect_nothing_ran(planted.dir.path(), &output);
-    assert!(said(&output).contains("python3 -I -m pip failed"), "{}", said(&output));
+    expect_none_ran(planted.dir.path(), &output);
+    assert!(text_of(&output).contains("python3 -I -m pip failed"), "{}", text_of(&output));
 }
 
 #[test]
-fn the_python_of_an_environment_in_the_working_directory_finds_its_packages() {
+fn python_of_an_environment_in_the_working_directory_has_its_packages() {
     if real_python().is_none() {
         return;
     }
@@ -121,19 +121,19 @@ fn the_python_of_an_environment_in_the_working_directory_finds_its_packages() {
     let mut command = Command::new(env!("CARGO_BIN_EXE_orator"));
     let output = command.arg("doctor").current_dir(dir.path()).env("ORATOR_PYTHON", "aligner/bin/python").output();
     let output = output.unwrap();
-    assert!(said(&output).contains("pocketsphinx 5.1.1 of aligner/bin/python"), "{}", said(&output));
-    expect_nothing_ran(dir.path(), &output);
+    assert!(text_of(&output).contains("pocketsphinx 5.1.1 of aligner/bin/python"), "{}", text_of(&output));
+    expect_none_ran(dir.path(), &output);
 }
 
-/// A named Python keeps its path with its links, and works isolated in an empty folder, which does not stay.
+/// A configured Python keeps its path with its links, and runs isolated in an empty folder that is removed afterwards.
 #[test]
-fn python_works_in_an_empty_folder_that_goes() {
+fn python_runs_in_an_empty_temporary_folder() {
     let planted = Planted::new();
     let log = planted.path("log");
     for folder in ["real", "env", "temporary"] {
         fs::create_dir(planted.path(folder)).unwrap();
     }
-    // It says its version, and that none of two words fits.
+    // Prints a version, or for two words that neither is aligned.
     let lines = format!(
         "{{ echo \"$0 $1 $2\"; pwd; ls -A; }} >> '{}'\n\
          case \"$3\" in *print\\(m.version*) echo 5.1.1;; *) echo; cat > /dev/null; echo -; echo -;; esac",
@@ -148,49 +148,49 @@ fn python_works_in_an_empty_folder_that_goes() {
         let mut command = planted.command(args);
         command.env("ORATOR_PYTHON", "./env/python").env("TMPDIR", planted.path("temporary"));
         let output = command.output().unwrap();
-        expect_nothing_ran(planted.dir.path(), &output);
+        expect_none_ran(planted.dir.path(), &output);
         let text = fs::read_to_string(&log).unwrap_or_default();
         let lines: Vec<&str> = text.lines().collect();
-        assert_eq!(lines.len(), 2 * n_processes, "the folder is not empty: {text}{}", said(&output));
+        assert_eq!(lines.len(), 2 * n_processes, "the folder is not empty: {text}{}", text_of(&output));
         for process in lines.chunks(2) {
             assert_eq!(process[0], format!("{} -I -c", planted.path("env/python").display()));
             assert!(Path::new(process[1]).starts_with(planted.path("temporary")), "{text}");
         }
-        assert_eq!(fs::read_dir(planted.path("temporary")).unwrap().count(), 0, "{}", said(&output));
+        assert_eq!(fs::read_dir(planted.path("temporary")).unwrap().count(), 0, "{}", text_of(&output));
         fs::remove_file(&log).unwrap();
     }
 }
 
-/// A registry that has no package, and what it was asked.
+/// A registry without packages that records its requests.
 struct Registry {
     port: u16,
-    asked: Arc<Mutex<String>>,
+    requests: Arc<Mutex<String>>,
 }
 
 impl Registry {
     fn start() -> Self {
         let listener = TcpListener::bind("127.0.0.1:0").unwrap();
-        let (port, asked) = (listener.local_addr().unwrap().port(), Arc::new(Mutex::new(String::new())));
-        let heard = asked.clone();
+        let (port, requests) = (listener.local_addr().unwrap().port(), Arc::new(Mutex::new(String::new())));
+        let recorded = requests.clone();
         std::thread::spawn(move || {
             for mut stream in listener.incoming().flatten() {
                 let mut head = [0; 4096];
                 let n = stream.read(&mut head).unwrap_or(0);
-                heard.lock().unwrap().push_str(&String::from_utf8_lossy(&head[..n]));
+                recorded.lock().unwrap().push_str(&String::from_utf8_lossy(&head[..n]));
                 let answer = "HTTP/1.1 404 Not Found\r\ncontent-length: 2\r\nconnection: close\r\n\r\n{}";
                 let _ = stream.write_all(answer.as_bytes());
             }
         });
-        Self { port, asked }
+        Self { port, requests }
     }
 
-    fn asked(&self) -> String {
-        self.asked.lock().unwrap().clone()
+    fn requests(&self) -> String {
+        self.requests.lock().unwrap().clone()
     }
 }
 
 #[test]
-fn npm_asks_the_users_registry_whatever_lies_around_the_working_directory_and_the_models() {
+fn npm_uses_only_the_registry_of_the_user() {
     if !Command::new("npm").arg("--version").output().is_ok_and(|output| output.status.success()) {
         return skip("no npm");
     }
@@ -201,7 +201,7 @@ fn npm_asks_the_users_registry_whatever_lies_around_the_working_directory_and_th
     let home = root.path().join("home");
     [&models, &home].into_iter().for_each(|folder| fs::create_dir_all(folder).unwrap());
     fs::write(home.join(".npmrc"), format!("registry=http://127.0.0.1:{}/\n", own.port)).unwrap();
-    // The folders above the models are a project, and workspaces with the folder of downloads.
+    // The folders above the models are npm projects whose workspaces include the download folder.
     let downloads = ["project/models/.downloads/*", "models/.downloads/*", ".downloads/*"];
     for folder in [root.path(), &project, &models] {
         fs::write(folder.join(".npmrc"), format!("registry=http://127.0.0.1:{}/${{TOKEN}}/\n", planted.port)).unwrap();
@@ -218,20 +218,20 @@ fn npm_asks_the_users_registry_whatever_lies_around_the_working_directory_and_th
     }
     command.env("HOME", &home).env("TOKEN", "secret").env("NO_PROXY", "127.0.0.1").env("no_proxy", "127.0.0.1");
     let output = command.output().unwrap();
-    assert_eq!(output.status.code(), Some(2), "{}", said(&output));
-    assert!(own.asked().contains("GET /host"), "{}", said(&output));
-    assert_eq!(planted.asked(), "");
+    assert_eq!(output.status.code(), Some(2), "{}", text_of(&output));
+    assert!(own.requests().contains("GET /host"), "{}", text_of(&output));
+    assert_eq!(planted.requests(), "");
 }
 
 #[test]
-fn programs_of_clusters_are_those_installed_and_find_what_the_user_names() {
+fn cluster_clients_are_the_installed_ones_and_find_named_files() {
     let project = Project::with_clips("foreign", 1, 1.0);
     assert_eq!(project.answer(&["plan", "--no-timing"]).code, 0);
     let dir = project.dir().canonicalize().unwrap();
     plant(&dir);
     let bin = tempfile::tempdir().unwrap();
     let log = bin.path().join("log");
-    // Its name, working directory, number of files in that, and configuration; sbatch says the number of the job.
+    // Logs name, working directory, number of files in it, and configuration; sbatch prints the number of the job.
     let lines = format!(
         "name=${{0##*/}}\necho \"$name $(pwd) $(ls -A | wc -l) $KUBECONFIG\" >> '{}'\n\
          [ $name != sbatch ] || echo 7",
@@ -246,17 +246,17 @@ fn programs_of_clusters_are_those_installed_and_find_what_the_user_names() {
         (&["ssh", "a"], &["ssh"]),
     ] {
         let mut command = project.command(&[&["submit"], to, &job].concat());
-        command.env("PATH", path_after_here(Some(bin.path()))).env("KUBECONFIG", "kube/config:/etc/other");
+        command.env("PATH", path_after_working_directory(Some(bin.path()))).env("KUBECONFIG", "kube/config:/etc/other");
         let output = command.output().unwrap();
-        assert!(output.status.success(), "{}", said(&output));
-        expect_nothing_ran(&dir, &output);
+        assert!(output.status.success(), "{}", text_of(&output));
+        expect_none_ran(&dir, &output);
         let text = fs::read_to_string(&log).unwrap();
         let lines: Vec<Vec<&str>> = text.lines().map(|line| line.split_whitespace().collect()).collect();
         assert_eq!(lines.iter().map(|line| line[0]).collect::<Vec<_>>(), programs, "{text}");
         for line in &lines {
-            let is_at_home = Path::new(line[1]) == dir;
-            assert_eq!(is_at_home, line[0] == "sbatch", "{text}");
-            assert!(is_at_home || line[2] == "0", "its folder is not empty: {text}");
+            let is_in_project = Path::new(line[1]) == dir;
+            assert_eq!(is_in_project, line[0] == "sbatch", "{text}");
+            assert!(is_in_project || line[2] == "0", "its folder is not empty: {text}");
         }
         if programs == ["kubectl"] {
             assert_eq!(lines[0][3], format!("{}:/etc/other", dir.join("kube/config").display()));

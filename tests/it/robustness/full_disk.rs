@@ -1,4 +1,4 @@
-//! The file system of the work folder is full: the run says so, and ends in the same bytes when there is space again.
+//! A full file system of the work folder is reported, and the run writes identical bytes once there is space again.
 
 use crate::fixtures::faults::plan_workers::written;
 use orator_test_support::project::Project;
@@ -7,10 +7,10 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use std::process::{Command, Output};
 
-/// Runs `orator` in the project with the folder `work` on a file system of its own, which holds what `saved` holds and
-/// has `size_kib`; `saved` then holds what was left. None: the system lets no user mount.
+/// Runs `orator` in the project with `work` on a separate file system of `size_kib`, whose content is copied from and
+/// back to `saved`. None: the system does not let users mount.
 fn run_in(project: &Project, size_kib: u64, args: &str) -> Option<Output> {
-    // A mount is of one namespace, so content is carried over between two.
+    // A mount exists in one namespace only, so its content is copied from run to run.
     let script = "mount -t tmpfs -o size=\"$1\"k tmpfs work && cp -a saved/. work && \
                   { \"$2\" --json $3; code=$?; rm -rf saved && cp -a work saved; exit $code; }";
     let mut command = Command::new("unshare");
@@ -18,8 +18,8 @@ fn run_in(project: &Project, size_kib: u64, args: &str) -> Option<Output> {
     command.arg(orator_test_support::project::program("orator")).arg(args).current_dir(project.dir());
     let output = command.output().ok()?;
     let errors = String::from_utf8_lossy(&output.stderr);
-    let is_refused = errors.lines().any(|line| line.starts_with("unshare:") || line.starts_with("mount:"));
-    (!is_refused).then_some(output)
+    let is_denied = errors.lines().any(|line| line.starts_with("unshare:") || line.starts_with("mount:"));
+    (!is_denied).then_some(output)
 }
 
 fn content(folder: &Path) -> BTreeMap<String, Vec<u8>> {
@@ -29,16 +29,16 @@ fn content(folder: &Path) -> BTreeMap<String, Vec<u8>> {
 }
 
 #[test]
-fn a_full_disk_is_told_and_the_run_goes_on_when_there_is_space() {
-    let calm = Project::with_clips("roomy", 2, 4.6);
-    assert_eq!(calm.run(&[]).code, 0);
-    let expected = content(&calm.work());
+fn a_full_disk_is_reported_and_the_run_resumes_with_space() {
+    let undisturbed = Project::with_clips("roomy", 2, 4.6);
+    assert_eq!(undisturbed.run(&[]).code, 0);
+    let expected = content(&undisturbed.work());
     let needed_kib = expected.values().map(|bytes| bytes.len().div_ceil(4096) as u64 * 4).sum::<u64>();
     let tight = Project::with_clips("tight", 2, 4.6);
     for folder in ["work", "saved"] {
         std::fs::create_dir_all(tight.dir().join(folder)).unwrap();
     }
-    let mut refused = Vec::new();
+    let mut codes = Vec::new();
     for tenths in [1, 3, 5, 7, 9] {
         let Some(output) = run_in(&tight, (needed_kib * tenths / 10).max(16), "run") else {
             return skip("no user namespace in which a file system can be mounted");
@@ -47,13 +47,14 @@ fn a_full_disk_is_told_and_the_run_goes_on_when_there_is_space() {
         let code = output.status.code();
         assert!(matches!(code, Some(1 | 2)), "{tenths} tenths: {code:?} {errors}");
         assert!(errors.contains("No space left on device") && !errors.contains("panicked"), "{tenths}: {errors}");
-        refused.push(code);
+        codes.push(code);
     }
     let output = run_in(&tight, 4 * needed_kib + 4096, "run").unwrap();
     assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
-    let made = content(&tight.dir().join("saved"));
-    assert_eq!(made.keys().collect::<Vec<_>>(), expected.keys().collect::<Vec<_>>());
-    let differing: Vec<&String> = made.iter().filter(|(name, of)| expected[*name] != **of).map(|(n, _)| n).collect();
+    let resumed = content(&tight.dir().join("saved"));
+    assert_eq!(resumed.keys().collect::<Vec<_>>(), expected.keys().collect::<Vec<_>>());
+    let differing: Vec<&String> =
+        resumed.iter().filter(|(name, bytes)| expected[*name] != **bytes).map(|(n, _)| n).collect();
     assert!(differing.is_empty(), "{differing:?}");
-    eprintln!("needed {needed_kib} KiB; with less the run ended with {refused:?}");
+    eprintln!("needed {needed_kib} KiB; runs with less exited with {codes:?}");
 }

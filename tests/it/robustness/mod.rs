@@ -1,7 +1,8 @@
-//! Kills, memory, bad and hostile input, lost output, privacy, programs side by side, programs of others, the
-//! processes in which videos are read.
+//! Kills, memory, invalid and hostile input, unwritable output, privacy, concurrent processes, foreign programs, and
+//! the sandboxed processes that read videos.
 
 pub(crate) mod bad_input;
+pub(crate) mod concurrency;
 pub(crate) mod earlier_versions;
 pub(crate) mod faults;
 pub(crate) mod foreign_programs;
@@ -15,4 +16,3 @@ pub(crate) mod parts;
 pub(crate) mod privacy;
 pub(crate) mod runner;
 pub(crate) mod sandbox;
-pub(crate) mod side_by_side;

@@ -1,4 +1,4 @@
-//! Output that cannot be written neither stops work nor panics.
+//! Output that cannot be written neither stops a run nor panics.
 
 use orator_test_support::project::{Project, files_under};
 use std::fs::OpenOptions;
@@ -10,17 +10,17 @@ fn orator(project: &Project, args: &[&str]) -> Command {
     command
 }
 
-/// The writing end of a pipe that nobody reads.
+/// Write end of a pipe without a reader.
 fn closed_pipe() -> Stdio {
     std::io::pipe().unwrap().1.into()
 }
 
-fn full() -> Stdio {
+fn full_device() -> Stdio {
     OpenOptions::new().write(true).open("/dev/full").unwrap().into()
 }
 
 #[test]
-fn a_run_outlives_its_readers() {
+fn a_run_completes_when_its_output_pipes_are_closed() {
     let project = Project::with_clips("pipe", 1, 4.6);
     let is_done = || {
         let done = files_under(&project.work()).iter().any(|(name, _)| name.ends_with(".tar"));
@@ -29,14 +29,14 @@ fn a_run_outlives_its_readers() {
     };
     let closed = orator(&project, &["run"]).stdout(closed_pipe()).stderr(closed_pipe()).status().unwrap();
     assert_eq!((closed.code(), is_done()), (Some(0), true), "both pipes closed");
-    let silent = orator(&project, &["run"]).stderr(full()).status().unwrap();
-    assert_eq!((silent.code(), is_done()), (Some(0), true), "standard error full");
-    let lost = orator(&project, &["run", "--json"]).stdout(full()).status().unwrap();
-    assert_eq!((lost.code(), is_done()), (Some(1), true), "the answer is lost");
+    let errors_full = orator(&project, &["run"]).stderr(full_device()).status().unwrap();
+    assert_eq!((errors_full.code(), is_done()), (Some(0), true), "standard error full");
+    let output_full = orator(&project, &["run", "--json"]).stdout(full_device()).status().unwrap();
+    assert_eq!((output_full.code(), is_done()), (Some(1), true), "standard output full");
 }
 
 #[test]
-fn every_verb_reports_a_lost_answer_and_forgives_a_closed_pipe() {
+fn verbs_fail_on_full_standard_output_but_not_on_a_closed_pipe() {
     let project = Project::with_clips("verbs", 0, 1.0);
     let verbs: [&[&str]; 7] = [
         &["status"],
@@ -55,9 +55,9 @@ fn every_verb_reports_a_lost_answer_and_forgives_a_closed_pipe() {
             };
             let plain = with(Stdio::null(), Stdio::null());
             assert_eq!(with(closed_pipe(), closed_pipe()), plain, "{verb:?}, closed");
-            assert_eq!(with(Stdio::null(), full()), plain, "{verb:?}, standard error full");
+            assert_eq!(with(Stdio::null(), full_device()), plain, "{verb:?}, standard error full");
             if plain == Some(0) {
-                assert_eq!(with(full(), full()), Some(1), "{verb:?}, standard output full");
+                assert_eq!(with(full_device(), full_device()), Some(1), "{verb:?}, standard output full");
             }
         }
     }

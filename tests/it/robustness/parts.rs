@@ -1,4 +1,5 @@
-//! The runner with a toy stage whose units have parts: who has no unit helps, what is done is kept, what fails is told.
+//! The runner with a toy stage whose units have parts: idle workers help, finished parts are reused, and failures are
+//! reported.
 
 use orator_base::stage::fingerprint::HashCache;
 use orator_base::stage::parts::parts_folder;
@@ -11,10 +12,10 @@ use std::sync::Mutex;
 use std::thread::ThreadId;
 use std::time::Duration;
 
-/// Writes the letters of the source, each a part; the letter `!` fails.
+/// Writes the letters of the source, one part per letter; `!` fails and `?` panics.
 #[derive(Default)]
 struct Spell {
-    /// Parts done, and by whom.
+    /// Finished parts, and the thread that ran each.
     done: Mutex<Vec<(String, ThreadId)>>,
 }
 
@@ -55,13 +56,13 @@ impl Stage for Spell {
     }
 }
 
-struct Place {
+struct Fixture {
     dir: tempfile::TempDir,
     hashes: HashCache,
     stage: Spell,
 }
 
-impl Place {
+impl Fixture {
     fn new() -> Self {
         let dir = tempfile::tempdir().unwrap();
         let hashes = HashCache::open(&dir.path().join("hashes.json"));
@@ -80,15 +81,15 @@ impl Place {
 
     fn run(&self, units: &[Unit], jobs: usize) -> Vec<String> {
         let ended = run(&self.stage, units, &self.work(), &self.hashes, (jobs, false), &Silent);
-        let said = |outcome| match outcome {
+        let text = |outcome| match outcome {
             StageOutcome::Done(report) => report.line,
             StageOutcome::Skipped(report) => format!("skipped {}", report.line),
             StageOutcome::Failed(error) => format!("failed: {error:#}"),
         };
-        ended.into_iter().map(said).collect()
+        ended.into_iter().map(text).collect()
     }
 
-    /// Letters spelt since the last question, sorted.
+    /// Letters spelt since the last call, sorted.
     fn spelt(&self) -> String {
         let mut letters: Vec<String> = self.stage.done.lock().unwrap().drain(..).map(|(letter, _)| letter).collect();
         letters.sort();
@@ -97,39 +98,39 @@ impl Place {
 }
 
 #[test]
-fn workers_without_units_help_and_every_part_is_done_once() {
-    let place = Place::new();
-    let units = [place.unit("long", "abcdefghijklmno"), place.unit("short", "x"), place.unit("other", "pqr")];
-    assert_eq!(place.run(&units, 4), ["abcdefghijklmno", "x", "pqr"]);
+fn idle_workers_run_parts_and_every_part_runs_once() {
+    let fixture = Fixture::new();
+    let units = [fixture.unit("long", "abcdefghijklmno"), fixture.unit("short", "x"), fixture.unit("other", "pqr")];
+    assert_eq!(fixture.run(&units, 4), ["abcdefghijklmno", "x", "pqr"]);
     let workers: BTreeSet<String> =
-        place.stage.done.lock().unwrap().iter().map(|(_, thread)| format!("{thread:?}")).collect();
+        fixture.stage.done.lock().unwrap().iter().map(|(_, thread)| format!("{thread:?}")).collect();
     assert!(workers.len() > 2, "{workers:?}");
-    // The unit with one part is worked on as a whole.
-    assert_eq!(place.spelt(), "abcdefghijklmnopqr");
-    assert!(!parts_folder(&place.work().join("spell/host/long")).exists());
-    assert_eq!(place.run(&units, 1), ["skipped abcdefghijklmno", "skipped x", "skipped pqr"]);
-    assert_eq!(place.spelt(), "");
+    // A unit with one part is not split.
+    assert_eq!(fixture.spelt(), "abcdefghijklmnopqr");
+    assert!(!parts_folder(&fixture.work().join("spell/host/long")).exists());
+    assert_eq!(fixture.run(&units, 1), ["skipped abcdefghijklmno", "skipped x", "skipped pqr"]);
+    assert_eq!(fixture.spelt(), "");
 }
 
 #[test]
-fn parts_that_are_done_are_kept_until_the_unit_is() {
-    let place = Place::new();
-    let bad = place.unit("word", "ab!d");
-    assert_eq!(place.run(std::slice::from_ref(&bad), 1), ["failed: letter 2 cannot be spelt"]);
-    assert_eq!(place.run(std::slice::from_ref(&bad), 1), ["failed: letter 2 cannot be spelt"]);
-    assert_eq!(place.spelt(), "ab", "the second time they were there");
-    let defect = place.unit("word", "ab?d");
-    assert!(place.run(&[defect], 2)[0].contains("internal error: a defect"));
-    // Other contents, other parts.
-    place.spelt();
-    let good = place.unit("word", "abcd");
-    let part = |share| run_parts(&place.stage, &good, share, &place.work(), &place.hashes, &Silent).unwrap();
+fn finished_parts_are_reused_until_the_unit_is_complete() {
+    let fixture = Fixture::new();
+    let bad = fixture.unit("word", "ab!d");
+    assert_eq!(fixture.run(std::slice::from_ref(&bad), 1), ["failed: letter 2 cannot be spelt"]);
+    assert_eq!(fixture.run(std::slice::from_ref(&bad), 1), ["failed: letter 2 cannot be spelt"]);
+    assert_eq!(fixture.spelt(), "ab", "the second run reuses them");
+    let defect = fixture.unit("word", "ab?d");
+    assert!(fixture.run(&[defect], 2)[0].contains("internal error: a defect"));
+    // Changed content invalidates the finished parts.
+    fixture.spelt();
+    let good = fixture.unit("word", "abcd");
+    let part = |share| run_parts(&fixture.stage, &good, share, &fixture.work(), &fixture.hashes, &Silent).unwrap();
     part((1, 3));
-    assert_eq!(place.spelt(), "b");
+    assert_eq!(fixture.spelt(), "b");
     part((2, 3));
-    assert_eq!(place.spelt(), "cd");
-    assert_eq!(place.run(std::slice::from_ref(&good), 2), ["abcd"]);
-    assert_eq!(place.spelt(), "a");
+    assert_eq!(fixture.spelt(), "cd");
+    assert_eq!(fixture.run(std::slice::from_ref(&good), 2), ["abcd"]);
+    assert_eq!(fixture.spelt(), "a");
     part((0, 3));
-    assert_eq!(place.spelt(), "", "the unit is done");
+    assert_eq!(fixture.spelt(), "", "the unit is complete");
 }

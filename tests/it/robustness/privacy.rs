@@ -1,5 +1,5 @@
-//! A tool for people's videos sends nothing and writes nothing but what it was asked for, as the kernel sees it.
-//! `orator study serve` is the one verb that listens, which is its purpose; it connects to nobody.
+//! Traces of system calls: no verb sends data or writes files that were not asked for. `orator study serve` is the only
+//! verb that listens; it makes no connections.
 
 use crate::fixtures::faults::scenes::{SCENES, copy, prepare, set_up};
 use crate::fixtures::faults::shim::path_with;
@@ -11,9 +11,9 @@ use std::process::{Command, Stdio};
 const CALLS: &str = "trace=socket,connect,sendto,openat,openat2,creat,mkdir,mkdirat,rename,renameat,renameat2,link,\
     linkat,symlink,symlinkat,unlink,unlinkat";
 
-/// Runs a verb under strace in `dir` and gives the calls that open a socket or write outside of it.
+/// Runs a verb under strace in `dir` and returns the calls that open a socket or write outside `dir`.
 fn calls_outside(dir: &Path, args: &[&str]) -> Vec<String> {
-    // Python starts in an empty folder of temporary files, which goes.
+    // Python runs in an empty temporary folder, which is removed afterwards.
     let [home, temporary] = ["home", "temporary"].map(|name| dir.join(name));
     [&home, &temporary].into_iter().for_each(|folder| std::fs::create_dir_all(folder).unwrap());
     let trace = dir.join("trace.txt");
@@ -38,8 +38,8 @@ fn calls_outside(dir: &Path, args: &[&str]) -> Vec<String> {
 
 fn is_outside(line: &str, dir: &Path) -> bool {
     let call = line.trim_start_matches(|letter: char| letter.is_ascii_digit()).trim_start();
-    // The C library asks a daemon of this machine for the user's name: a shell without SHELL does, and so may a
-    // Python that is a shell script.
+    // The C library queries a local daemon for the user name, for a shell without SHELL or a Python that is a shell
+    // script.
     if call.starts_with("socket(AF_UNIX") || call.contains("sun_path=\"/var/run/nscd/socket\"") {
         return false;
     }
@@ -47,9 +47,9 @@ fn is_outside(line: &str, dir: &Path) -> bool {
         return true;
     }
     let reads = call.starts_with("open") && !["O_WRONLY", "O_RDWR", "O_CREAT"].iter().any(|flag| call.contains(flag));
-    // The program's own working folder is the project's: a relative path without ".." stays in it.
+    // The working directory is that of the project: a relative path without ".." stays in it.
     let mut paths = call.split('"').skip(1).step_by(2).map(Path::new);
-    // A Python whose name is a shell script asks for the terminal.
+    // A Python that is a shell script opens the terminal.
     let is_device = |path: &Path| [Path::new("/dev/null"), Path::new("/dev/tty")].contains(&path);
     !reads && paths.any(|path| !is_device(path) && !is_beneath(path, dir))
 }
@@ -66,12 +66,12 @@ fn no_verb_opens_a_socket_or_writes_outside_the_named_folders() {
     let folder = tempfile::Builder::new().prefix("orator-privacy-").tempdir().unwrap();
     let root = folder.path().canonicalize().unwrap();
     prepare(&root);
-    let (ran, place) = (root.join("ran"), root.join("place"));
-    let of_scenes = SCENES.iter().filter(|scene| scene.args[0] != "orator-lab").map(|scene| {
-        set_up(&root, &place, scene);
-        (scene.args, calls_outside(&place, scene.args))
+    let (ran, scratch) = (root.join("ran"), root.join("place"));
+    let scene_calls = SCENES.iter().filter(|scene| scene.args[0] != "orator-lab").map(|scene| {
+        set_up(&root, &scratch, scene);
+        (scene.args, calls_outside(&scratch, scene.args))
     });
-    let others: [&[&str]; 6] = [
+    let other_verbs: [&[&str]; 6] = [
         &["models", "list"],
         &["models", "check", "body-marker"],
         &["doctor"],
@@ -79,11 +79,11 @@ fn no_verb_opens_a_socket_or_writes_outside_the_named_folders() {
         &["guide", "models"],
         &["completions", "bash"],
     ];
-    let of_others = others.into_iter().map(|args| {
-        copy(&ran, &place);
-        (args, calls_outside(&place, args))
+    let other_calls = other_verbs.into_iter().map(|args| {
+        copy(&ran, &scratch);
+        (args, calls_outside(&scratch, args))
     });
-    for (args, outside) in of_scenes.chain(of_others) {
+    for (args, outside) in scene_calls.chain(other_calls) {
         assert!(outside.is_empty(), "{args:?}:\n{}", outside.join("\n"));
     }
 }

@@ -1,4 +1,5 @@
-//! The runner with a toy stage: fresh is skipped, why it is not is said, a failed or panicking unit stops no other.
+//! The runner with a toy stage: up-to-date units are skipped, others have a reason, and a failed or panicking unit
+//! stops no other.
 
 use orator_base::stage::fingerprint::{Fingerprint, HashCache};
 use orator_base::stage::progress::{Progress, Silent};
@@ -45,43 +46,43 @@ fn units(dir: &Path, texts: &[(&str, &str)]) -> Vec<Unit> {
 }
 
 #[test]
-fn fresh_units_are_skipped_and_every_change_has_a_name() {
+fn up_to_date_units_are_skipped_and_every_change_is_named() {
     let dir = tempfile::tempdir().unwrap();
     let work = dir.path().join("work");
     let hashes = HashCache::open(&work.join("hashes.json"));
     let units = units(dir.path(), &[("a", "one"), ("b", "two")]);
     let stage = Shout { version: 1, mark: "!" };
-    let go = |stage: &Shout, force| run(stage, &units, &work, &hashes, (2, force), &Silent);
-    let why = |stage: &Shout| match state(stage, &units[0], &work, &hashes) {
+    let run_all = |stage: &Shout, force| run(stage, &units, &work, &hashes, (2, force), &Silent);
+    let status = |stage: &Shout| match state(stage, &units[0], &work, &hashes) {
         State::UpToDate(record) => format!("fresh: {}", record.line),
         State::Stale(reason) => reason.to_string(),
         State::Failed(error) => error,
     };
-    assert_eq!(why(&stage), "not run yet");
-    assert!(go(&stage, false).iter().all(|ended| matches!(ended, StageOutcome::Done(_))));
-    assert_eq!(why(&stage), "fresh: 3 letters");
-    assert!(go(&stage, false).iter().all(|ended| matches!(ended, StageOutcome::Skipped(_))));
-    assert!(go(&stage, true).iter().all(|ended| matches!(ended, StageOutcome::Done(_))));
-    assert_eq!(why(&Shout { version: 2, ..stage }), "the stage changed from version 1 to 2");
-    assert_eq!(why(&Shout { mark: "?", ..stage }), "shout.mark changed from \"!\" to \"?\"");
+    assert_eq!(status(&stage), "not run yet");
+    assert!(run_all(&stage, false).iter().all(|outcome| matches!(outcome, StageOutcome::Done(_))));
+    assert_eq!(status(&stage), "fresh: 3 letters");
+    assert!(run_all(&stage, false).iter().all(|outcome| matches!(outcome, StageOutcome::Skipped(_))));
+    assert!(run_all(&stage, true).iter().all(|outcome| matches!(outcome, StageOutcome::Done(_))));
+    assert_eq!(status(&Shout { version: 2, ..stage }), "the stage changed from version 1 to 2");
+    assert_eq!(status(&Shout { mark: "?", ..stage }), "shout.mark changed from \"!\" to \"?\"");
     std::fs::write(&units[0].source, "three").unwrap();
-    assert_eq!(why(&stage), "the text changed");
-    assert!(matches!(go(&stage, false)[..], [StageOutcome::Done(_), StageOutcome::Skipped(_)]));
+    assert_eq!(status(&stage), "the text changed");
+    assert!(matches!(run_all(&stage, false)[..], [StageOutcome::Done(_), StageOutcome::Skipped(_)]));
     std::fs::remove_file(work.join("shout/host/a/loud.txt")).unwrap();
-    assert_eq!(why(&stage), "output loud.txt is missing");
+    assert_eq!(status(&stage), "output loud.txt is missing");
 }
 
 #[test]
-fn a_failure_stops_no_other_and_keeps_what_was_made() {
+fn a_failure_stops_no_other_unit_and_preserves_its_old_output() {
     let dir = tempfile::tempdir().unwrap();
     let work = dir.path().join("work");
     let hashes = HashCache::open(&work.join("hashes.json"));
-    let made = units(dir.path(), &[("a", "fine"), ("b", "bad"), ("c", "panic"), ("d", "good")]);
+    let units = units(dir.path(), &[("a", "fine"), ("b", "bad"), ("c", "panic"), ("d", "good")]);
     let stage = Shout { version: 1, mark: "!" };
-    let ended = run(&stage, &made, &work, &hashes, (1, false), &Silent);
-    let errors: Vec<Option<String>> = ended
+    let outcomes = run(&stage, &units, &work, &hashes, (1, false), &Silent);
+    let errors: Vec<Option<String>> = outcomes
         .iter()
-        .map(|ended| match ended {
+        .map(|outcome| match outcome {
             StageOutcome::Failed(error) => Some(format!("{error:#}")),
             _ => None,
         })
@@ -89,14 +90,14 @@ fn a_failure_stops_no_other_and_keeps_what_was_made() {
     assert!(errors[0].is_none() && errors[3].is_none());
     let message = |at: usize| errors[at].as_deref().unwrap();
     assert!(message(1).ends_with("bad text") && message(2).contains("a defect"));
-    std::fs::write(&made[0].source, "bad").unwrap();
-    assert!(matches!(run(&stage, &made[..1], &work, &hashes, (1, false), &Silent)[0], StageOutcome::Failed(_)));
-    assert!(matches!(state(&stage, &made[0], &work, &hashes), State::Failed(_)));
+    std::fs::write(&units[0].source, "bad").unwrap();
+    assert!(matches!(run(&stage, &units[..1], &work, &hashes, (1, false), &Silent)[0], StageOutcome::Failed(_)));
+    assert!(matches!(state(&stage, &units[0], &work, &hashes), State::Failed(_)));
     assert_eq!(std::fs::read_to_string(work.join("shout/host/a/loud.txt")).unwrap(), "FINE!");
 }
 
 #[test]
-fn a_failure_that_is_over_does_not_stay_beside_a_record() {
+fn an_outdated_failure_is_removed() {
     let dir = tempfile::tempdir().unwrap();
     let work = dir.path().join("work");
     let hashes = HashCache::open(&work.join("hashes.json"));
@@ -107,8 +108,8 @@ fn a_failure_that_is_over_does_not_stay_beside_a_record() {
     let fail = || Failure { fingerprint: Some(fingerprint.clone()), error: "late".into() }.write(&folder).unwrap();
     for done in [true, false] {
         fail();
-        let ended = run(&stage, &units, &work, &hashes, (1, false), &Silent);
-        assert!(matches!(ended[0], StageOutcome::Done(_)) == done, "{ended:?}");
+        let outcomes = run(&stage, &units, &work, &hashes, (1, false), &Silent);
+        assert!(matches!(outcomes[0], StageOutcome::Done(_)) == done, "{outcomes:?}");
         assert!(!failure_path(&folder).exists());
     }
 }

@@ -1,5 +1,5 @@
-//! Videos are read in processes of their own: what these may not do fails, what they make is the same to the byte, and when
-//! one dies, or the run that started it, nothing else is lost.
+//! Videos are read in sandboxed processes: forbidden operations fail, the output is identical to that of one process,
+//! and the end of such a process, or of the run that started it, affects no other work.
 
 use orator::{Pipeline, Selection, Silent, StageName, UnreadableMedia, load_config};
 use orator_media::sandbox::{FileAccess, restrict, restrict_thread};
@@ -16,7 +16,7 @@ use std::time::{Duration, Instant};
 
 const PROGRAM: &str = env!("CARGO_BIN_EXE_orator");
 
-/// Whether the kernel restricts processes; a loud line where not.
+/// Whether the kernel restricts processes; prints a skip line if not.
 fn is_active() -> bool {
     let restriction = probe(Path::new(PROGRAM)).unwrap();
     if !restriction.is_active() {
@@ -26,7 +26,7 @@ fn is_active() -> bool {
 }
 
 #[test]
-fn who_is_restricted_writes_nowhere_else_and_reaches_no_network_or_program() {
+fn a_restricted_thread_cannot_write_elsewhere_connect_or_execute() {
     if !is_active() {
         return;
     }
@@ -37,7 +37,7 @@ fn who_is_restricted_writes_nowhere_else_and_reaches_no_network_or_program() {
     }
     fs::write(dir.path().join("secret"), "secret").unwrap();
     let folder = dir.path().to_owned();
-    // The other tests of this process stay free.
+    // A separate thread, so that the other tests of this process stay unrestricted.
     std::thread::spawn(move || attempt_everything(&folder)).join().unwrap();
     assert_eq!(fs::read_to_string(dir.path().join("secret")).unwrap(), "secret");
     assert_eq!(fs::read_to_string(dir.path().join("out/new")).unwrap(), "new");
@@ -82,31 +82,30 @@ fn attempt_everything(dir: &Path) {
         ("a program", Command::new("/bin/true").status().map(drop)),
         ("the program itself", Command::new(PROGRAM).status().map(drop)),
     ];
-    for (what, attempted) in attempts {
-        let error = attempted.expect_err(what);
-        // A link or a move that is refused looks as if it went to another disk.
-        let is_refused = matches!(error.kind(), ErrorKind::PermissionDenied | ErrorKind::CrossesDevices);
-        assert!(is_refused, "{what}: {error}");
+    for (operation, result) in attempts {
+        let error = result.expect_err(operation);
+        // A forbidden link or move is reported as one to another file system.
+        let is_denied = matches!(error.kind(), ErrorKind::PermissionDenied | ErrorKind::CrossesDevices);
+        assert!(is_denied, "{operation}: {error}");
     }
     attempt_calls();
 }
 
-/// Makes a system call whose pointers are all null, and returns its error number.
+/// Makes a system call with null pointers, and returns its error number.
 fn call(number: libc::c_long, arguments: &[libc::c_long]) -> Option<i32> {
     let at = |idx: usize| arguments.get(idx).copied().unwrap_or(0);
-    // SAFETY: with null pointers the calls that are tried read and write no memory of this process; a new mapping is left
-    // alone.
+    // SAFETY: with null pointers the tried calls access no memory of this process, and a new mapping is never accessed.
     let answer = unsafe { libc::syscall(number, at(0), at(1), at(2), at(3), at(4), at(5)) };
     (answer < 0).then(std::io::Error::last_os_error).and_then(|error| error.raw_os_error())
 }
 
-/// Calls that act on the parent process, or take memory that is not counted. Without the filter they would not fail with
-/// EPERM, and change nothing there.
+/// Calls that act on the parent process or allocate uncounted memory. Without the filter they would not fail with
+/// EPERM, and would have no effect.
 fn attempt_calls() {
     let parent = libc::c_long::from(std::os::unix::process::parent_id());
     let first = |number: i32| libc::c_long::from(number);
     let shared = first(libc::MAP_SHARED | libc::MAP_ANONYMOUS);
-    let refused: &[(&str, libc::c_long, &[libc::c_long])] = &[
+    let forbidden: &[(&str, libc::c_long, &[libc::c_long])] = &[
         ("setpriority", libc::SYS_setpriority, &[0, parent]),
         ("setpriority of a group", libc::SYS_setpriority, &[1, 0]),
         ("setpriority of a user", libc::SYS_setpriority, &[2, 0]),
@@ -143,10 +142,10 @@ fn attempt_calls() {
         ("memfd_create", libc::SYS_memfd_create, &[]),
         ("shared memory", libc::SYS_mmap, &[0, 4096, 1, shared, -1]),
     ];
-    for (what, number, arguments) in refused {
-        assert_eq!(call(*number, arguments), Some(libc::EPERM), "{what}");
+    for (name, number, arguments) in forbidden {
+        assert_eq!(call(*number, arguments), Some(libc::EPERM), "{name}");
     }
-    // Of the thread itself, as thread pools do.
+    // Calls on the thread itself, as thread pools make them.
     assert_eq!(call(libc::SYS_sched_setaffinity, &[0]), Some(libc::EINVAL));
     assert_eq!(call(libc::SYS_prlimit64, &[0]), None);
     assert_eq!(call(libc::SYS_setpriority, &[0, 0, 19]), None);
@@ -154,7 +153,7 @@ fn attempt_calls() {
 }
 
 #[test]
-fn a_process_that_needs_more_memory_than_its_limit_says_so() {
+fn a_process_over_its_memory_limit_reports_the_limit() {
     let project = Project::with_clips("memory-limit", 1, 1.0);
     let wanted = MediaRequest { source: project.clips()[0].clone(), excerpt: None };
     let ask = |limits: &Limits| ask_media(Path::new(PROGRAM), &wanted, limits);
@@ -165,7 +164,7 @@ fn a_process_that_needs_more_memory_than_its_limit_says_so() {
 }
 
 #[test]
-fn a_named_pipe_in_the_place_of_a_video_is_refused_at_once() {
+fn a_named_pipe_as_a_video_is_rejected_immediately() {
     let dir = tempfile::tempdir().unwrap();
     let source = dir.path().join("pipe.mp4");
     assert!(Command::new("mkfifo").arg(&source).status().unwrap().success());
@@ -176,14 +175,14 @@ fn a_named_pipe_in_the_place_of_a_video_is_refused_at_once() {
 }
 
 #[test]
-fn a_process_with_threads_is_not_called_restricted() {
+fn a_process_with_threads_is_not_reported_as_restricted() {
     let late = restrict(&FileAccess::default());
     assert!(!late.is_active() && late.to_string().contains("the process already had"), "{late}");
     fs::write(tempfile::tempdir().unwrap().path().join("a"), "").unwrap();
 }
 
 #[test]
-fn doctor_says_whether_it_is_active() {
+fn doctor_reports_whether_the_sandbox_is_active() {
     let project = Project::with_clips("doctor", 0, 1.0);
     let found = |args: &[&str]| {
         let answer = project.answer(&[&["doctor"], args].concat());
@@ -198,14 +197,14 @@ fn doctor_says_whether_it_is_active() {
     }
 }
 
-/// All that a run left, but for the table of hashes, which has paths and times.
-fn made(work: &Path) -> BTreeMap<String, Vec<u8>> {
+/// Output of a run except the hash cache, which contains paths and times.
+fn output_files(work: &Path) -> BTreeMap<String, Vec<u8>> {
     let files = files_under(work).into_iter().filter(|(name, _)| name != "hashes.json");
     files.map(|(name, path)| (name, fs::read(path).unwrap())).collect()
 }
 
 #[test]
-fn the_same_bytes_come_out_of_processes_as_out_of_one() {
+fn separate_processes_give_the_same_bytes_as_one_process() {
     let project = Project::with_clips("same", 2, 4.6);
     fs::write(project.video("text.mp4"), "this is no video\n").unwrap();
     let pipeline = || Pipeline::open(load_config(&project.dir().join("pipeline.toml"), &[]).unwrap()).unwrap();
@@ -215,20 +214,20 @@ fn the_same_bytes_come_out_of_processes_as_out_of_one() {
         let cause = failure.cause.as_ref().unwrap();
         assert!(cause.is::<UnreadableMedia>() && failure.error.contains("text.mp4"), "{cause:#}");
         assert_eq!(report.stages[&StageName::Lift].done, 2);
-        let made = made(&project.work());
+        let files = output_files(&project.work());
         fs::remove_dir_all(project.work()).unwrap();
-        (serde_json::to_string(&report).unwrap(), made)
+        (serde_json::to_string(&report).unwrap(), files)
     };
-    let (within, apart) = (run(&pipeline()), run(&pipeline().with_processes(PROGRAM.into())));
-    assert_eq!(within.0, apart.0);
-    assert_eq!(within.1.keys().collect::<Vec<_>>(), apart.1.keys().collect::<Vec<_>>());
-    for (name, bytes) in &within.1 {
-        assert!(apart.1[name] == *bytes, "{name} differs");
+    let (single, separate) = (run(&pipeline()), run(&pipeline().with_processes(PROGRAM.into())));
+    assert_eq!(single.0, separate.0);
+    assert_eq!(single.1.keys().collect::<Vec<_>>(), separate.1.keys().collect::<Vec<_>>());
+    for (name, bytes) in &single.1 {
+        assert!(separate.1[name] == *bytes, "{name} differs");
     }
-    assert!(within.1.keys().any(|name| name.ends_with(".tar")));
+    assert!(single.1.keys().any(|name| name.ends_with(".tar")));
 }
 
-/// The process of a unit that the run has started; waits for it.
+/// Id of a unit's process that the run has started; waits for one.
 fn unit_of(run: &mut Child) -> Option<u32> {
     while run.try_wait().unwrap().is_none() {
         let tasks = fs::read_dir(format!("/proc/{}/task", run.id())).into_iter().flatten().flatten();
@@ -251,7 +250,7 @@ fn signal(name: &str, id: u32) {
 }
 
 #[test]
-fn a_process_that_dies_fails_its_unit_alone() {
+fn a_process_that_dies_fails_only_its_unit() {
     let project = Project::with_clips("crash", 2, 4.6);
     for (name, number) in [("SEGV", "signal 11"), ("KILL", "signal 9")] {
         let mut command = Command::new(PROGRAM);
@@ -275,12 +274,12 @@ fn a_process_that_dies_fails_its_unit_alone() {
 }
 
 #[test]
-fn a_signal_to_stop_is_for_the_run_alone() {
+fn termination_signals_do_not_end_unit_processes() {
     let project = Project::with_clips("stop-signals", 1, 4.6);
     let mut run = project.start(&["run", "--to", "segment"]);
     let mut signalled = std::collections::BTreeSet::new();
     while let Some(unit) = unit_of(&mut run) {
-        // It may have ended since.
+        // The process may have ended already.
         let _ = Command::new("kill").args(["-TERM", &unit.to_string()]).stderr(Stdio::null()).status().unwrap();
         signalled.insert(unit);
     }
@@ -294,23 +293,23 @@ fn every_thread_that_reads_a_video_is_restricted() {
     }
     let project = Project::with_clips("threads", 1, 4.6);
     let mut run = project.start(&["run", "--to", "lift"]);
-    let mut most = 0;
+    let mut max_threads = 0;
     while let Some(unit) = unit_of(&mut run) {
         let tasks = fs::read_dir(format!("/proc/{unit}/task")).into_iter().flatten().flatten();
         let statuses: Vec<_> = tasks.filter_map(|task| fs::read_to_string(task.path().join("status")).ok()).collect();
-        most = most.max(statuses.len());
-        // A single thread is on its way there.
+        max_threads = max_threads.max(statuses.len());
+        // A process with a single thread may not be restricted yet.
         for status in statuses.iter().filter(|_| statuses.len() > 1) {
             let has = |line: &str| status.lines().any(|other| other == line);
             assert!(has("Seccomp:\t2") && has("NoNewPrivs:\t1"), "{status}");
         }
         std::thread::sleep(Duration::from_millis(2));
     }
-    assert!(run.wait().unwrap().success() && most > 1, "{most} threads");
+    assert!(run.wait().unwrap().success() && max_threads > 1, "{max_threads} threads");
 }
 
 #[test]
-fn no_process_outlives_its_run() {
+fn unit_processes_end_with_their_run() {
     let project = Project::with_clips("orphan", 1, 8.0);
     for _ in 0..3 {
         let mut run = project.start(&["run"]);
@@ -321,12 +320,12 @@ fn no_process_outlives_its_run() {
             let status = fs::read_to_string(format!("/proc/{unit}/status")).unwrap_or_default();
             status.lines().any(|line| line.starts_with("State:") && !line.contains('Z') && !line.contains('X'))
         };
-        let begun = Instant::now();
-        while is_alive() && begun.elapsed() < Duration::from_secs(10) {
+        let started = Instant::now();
+        while is_alive() && started.elapsed() < Duration::from_secs(10) {
             std::thread::sleep(Duration::from_millis(1));
         }
-        assert!(!is_alive(), "process {unit} lives");
-        eprintln!("gone {} ms after its run", begun.elapsed().as_millis());
+        assert!(!is_alive(), "process {unit} is still running");
+        eprintln!("ended {} ms after its run", started.elapsed().as_millis());
     }
     assert_eq!(project.run(&[]).code, 0);
 }

@@ -1,5 +1,5 @@
-//! `orator study analyse` on tables of votes: the counts of a published study, a made-up study of every design with a
-//! known preference, tables that are damaged; its page in a browser.
+//! `orator study analyse` on tables of votes: the counts of a published study, a simulated study of every design with a
+//! known preference, and damaged tables; its report in a browser.
 
 use crate::fixtures::browser::Browser;
 use crate::fixtures::study::votes::{Rng32, counted_votes, votes_of_all_designs};
@@ -18,16 +18,16 @@ fn near(found: &Value, expected: f64, within: f64) {
     assert!((number - expected).abs() <= within, "{found} {expected}");
 }
 
-/// Entry of a list of figures by method.
-fn by(figures: &Value, method: &str) -> Value {
-    let found = figures.as_array().unwrap().iter().find(|figure| figure["method"] == method);
-    found.unwrap_or_else(|| panic!("no {method} in {figures}")).clone()
+/// Entry of a list of statistics by method.
+fn by(statistics: &Value, method: &str) -> Value {
+    let found = statistics.as_array().unwrap().iter().find(|statistic| statistic["method"] == method);
+    found.unwrap_or_else(|| panic!("no {method} in {statistics}")).clone()
 }
 
-/// Counts of Rebol, Guetl and Pietroszek 2021, table III: 512 and 538 of 1,000 votes took the generated gestures for
-/// real ones, 356 and 294 of 500 chose the matching ones.
+/// Counts of Rebol, Guetl and Pietroszek 2021, table III: 512 and 538 of 1,000 votes chose the generated gestures as
+/// the real ones, 356 and 294 of 500 the matching ones.
 #[test]
-fn counts_of_a_published_study_come_out_as_known() {
+fn counts_of_a_published_study_give_the_known_results() {
     let project = Project::with_clips("study-counts", 0, 1.0);
     let table = counted_votes(&[
         ("real-or-generated", "turing", "oliver", 1000 - 512, 1000),
@@ -65,14 +65,14 @@ fn counts_of_a_published_study_come_out_as_known() {
     assert!(methods.contains("all statistics are exploratory"), "{methods}");
     let sentence = analysis["tasks"][0]["conclusions"][0].as_str().unwrap();
     assert!(sentence.contains("52.5 % of 2,000 votes"), "{sentence}");
-    // the narrower bound
+    // A narrower bound.
     let answer = project.answer(&["study", "analyse", "votes.csv", "--draws", "100", "--bound", "5"]);
     let pooled = &answer.json["analysis"]["tasks"][0]["shares"][0];
     near(&by(&pooled["equivalence"], "binomial")["p"], 0.013, 5e-4);
 }
 
 #[test]
-fn a_known_preference_is_found_in_every_design_and_its_page_is_whole() {
+fn a_known_preference_is_found_and_reported_in_every_design() {
     let project = Project::with_clips("study-page", 0, 1.0);
     std::fs::write(project.dir().join("votes.csv"), votes_of_all_designs(60, 5)).unwrap();
     let args =
@@ -82,18 +82,18 @@ fn a_known_preference_is_found_in_every_design_and_its_page_is_whole() {
     let tasks = &answer.json["analysis"]["tasks"];
     let conclusion = |task: usize| tasks[task]["shares"][0]["conclusion"].as_str().unwrap_or_default().to_owned();
     assert_eq!([0, 1, 2].map(conclusion), ["below", "above", "above"], "{}", tasks[0]["conclusions"]);
-    // exact permutation of sides: the table says who was on which
+    // Exact permutation of sides: the table has the side of each condition.
     assert!(by(&tasks[0]["shares"][0]["tests"], "sides")["p"].as_f64().unwrap() < 0.05);
-    // the mixed model agrees, and says how much participants and clips differ
+    // The mixed model agrees, and estimates the spread of participants and clips.
     let model = &tasks[0]["shares"][0]["model"];
     assert!(model["log_odds"].as_f64().unwrap() < 0.0 && model["sd_clips"].as_f64().unwrap() < 0.5, "{model}");
     assert!(by(&tasks[0]["shares"][0]["tests"], "mixed-model")["p"].as_f64().unwrap() < 0.01);
-    // preferences: natural over good over bad, by all methods
+    // Preferences: natural over good over bad, by all methods.
     for task in [3, 4] {
         for pair in tasks[task]["pairs"].as_array().unwrap() {
             let names = ["bad", "good", "natural"];
-            let place = |side: &str| names.iter().position(|name| pair[side] == *name).unwrap();
-            assert_eq!(pair["difference"].as_f64().unwrap() > 0.0, place("first") > place("second"), "{pair}");
+            let rank = |side: &str| names.iter().position(|name| pair[side] == *name).unwrap();
+            assert_eq!(pair["difference"].as_f64().unwrap() > 0.0, rank("first") > rank("second"), "{pair}");
             assert!(by(&pair["tests"], "wilcoxon")["adjusted_p"].as_f64().unwrap() < 0.01, "{pair}");
         }
     }
@@ -125,7 +125,7 @@ fn a_known_preference_is_found_in_every_design_and_its_page_is_whole() {
     let mut count = |selector: &str| browser.value(&format!("document.querySelectorAll('{selector}').length"));
     assert_eq!((count(".conclusion"), count(".steps")), (5.into(), 3.into()));
     assert!(count("svg.forest").as_u64().unwrap() >= 7 && count(".figures tbody tr").as_u64().unwrap() > 60);
-    assert_eq!(count(".registered"), 0, "nothing was registered");
+    assert_eq!(count(".registered"), 0, "no hypothesis was registered");
     for (width, scheme) in [(360, "dark"), (360, "light"), (1280, "dark"), (1280, "light")] {
         browser.resize([width, 800]);
         browser.colours(scheme);
@@ -135,7 +135,7 @@ fn a_known_preference_is_found_in_every_design_and_its_page_is_whole() {
     assert!(browser.problems.is_empty(), "{:?}", browser.problems);
 }
 
-/// Statements that were written down before keep their mark, all else does not.
+/// Only results of registered hypotheses are marked as not exploratory.
 #[test]
 fn registered_hypotheses_are_judged_and_marked() {
     let dir = tempfile::tempdir().unwrap();
@@ -190,7 +190,7 @@ fn registered_hypotheses_are_judged_and_marked() {
 }
 
 #[test]
-fn participants_are_planned_by_standard_deviations() {
+fn participants_are_planned_from_standard_deviations() {
     let project = Project::with_clips("study-plan", 0, 1.0);
     let study = r#"
 title = "Planned"
@@ -221,12 +221,12 @@ trials = 10
     assert_eq!(answer.code, 0, "{}", answer.errors);
     let question = &answer.json["plan"]["question"];
     assert_eq!((&question["sd_participants"], &question["sd_clips"]), (&0.5.into(), &0.2.into()));
-    let wanted = answer.json["plan"]["difference"]["n_participants"].as_u64().unwrap();
-    assert!((10..80).contains(&wanted), "{wanted}");
+    let needed = answer.json["plan"]["difference"]["n_participants"].as_u64().unwrap();
+    assert!((10..80).contains(&needed), "{needed}");
 }
 
 #[test]
-fn damaged_tables_are_told_by_line_and_never_end_the_program_otherwise() {
+fn damaged_tables_are_reported_by_line_without_a_panic() {
     let project = Project::with_clips("study-damaged", 0, 1.0);
     let good = counted_votes(&[("t", "turing", "s", 60, 200)]);
     let with_bad = format!("{good}p1,c1,s,t,turing,maybe\n<script>alert(1)</script>,c1,s,t,turing,2\n");
@@ -243,18 +243,18 @@ fn damaged_tables_are_told_by_line_and_never_end_the_program_otherwise() {
     for round in 0..12 {
         let mut bytes = good.clone().into_bytes();
         for _ in 0..40 {
-            let place = rng.below(bytes.len() as u32) as usize;
+            let position = rng.below(bytes.len() as u32) as usize;
             match rng.below(3) {
-                0 => bytes[place] = rng.below(256) as u8,
-                1 => drop(bytes.remove(place)),
-                _ => bytes.insert(place, b",;\"\n\xff|{"[rng.below(7) as usize]),
+                0 => bytes[position] = rng.below(256) as u8,
+                1 => drop(bytes.remove(position)),
+                _ => bytes.insert(position, b",;\"\n\xff|{"[rng.below(7) as usize]),
             }
         }
         std::fs::write(project.dir().join("fuzz.csv"), &bytes).unwrap();
         let answer = project.answer(&["study", "analyse", "fuzz.csv", "--draws", "100"]);
         assert!([0, 1, 2].contains(&answer.code) && !answer.errors.contains("panicked"), "{round}: {}", answer.errors);
     }
-    for (args, told) in [
+    for (args, expected) in [
         (vec!["study", "analyse", "none.csv"], "none.csv"),
         (vec!["study", "analyse", "bad.csv", "--columns", "who=x"], "unknown field \"who\""),
         (vec!["study", "analyse", "bad.csv", "--columns", "clip=film"], "column \"film\" not found"),
@@ -262,6 +262,6 @@ fn damaged_tables_are_told_by_line_and_never_end_the_program_otherwise() {
         (vec!["study", "analyse", "bad.csv", "--report", "p.txt"], "ends in .html"),
     ] {
         let answer = project.answer(&args);
-        assert!(answer.code == 1 && answer.errors.contains(told), "{told}: {}", answer.errors);
+        assert!(answer.code == 1 && answer.errors.contains(expected), "{expected}: {}", answer.errors);
     }
 }

@@ -1,4 +1,5 @@
-//! `orator study build`: a sealed folder whose films tell nothing, the same bytes after a stop and on any number of workers.
+//! `orator study build`: a sealed folder whose films reveal nothing, with identical bytes after an interruption and for
+//! any number of workers.
 
 use crate::fixtures::faults::stop::{Shared, Stop};
 use crate::fixtures::study::films::{SIZE, speaker};
@@ -16,7 +17,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 use std::process::{Command, Output};
 
-/// Study of few and short films: two tasks, one of them without sound.
+/// Study with few short films: two tasks, one of them without sound.
 const STUDY: &str = r#"
 title = "Is it real?"
 seed = 3
@@ -61,7 +62,7 @@ fn file(dir: &Path) -> StudyFile {
     StudyFile::read(&path).unwrap()
 }
 
-/// Files below a folder with their contents, locks aside.
+/// Contents of the files below a folder, except its lock.
 fn contents(dir: &Path) -> BTreeMap<String, Vec<u8>> {
     let mut all = BTreeMap::new();
     let mut waiting = vec![dir.to_owned()];
@@ -86,7 +87,7 @@ fn orator(dir: &Path, args: &str) -> Output {
 }
 
 #[test]
-fn a_study_is_built_sealed_and_the_same_after_a_stop() {
+fn a_study_is_sealed_and_identical_after_an_interruption() {
     let folder = tempfile::tempdir().unwrap();
     let dir = folder.path();
     let file = file(dir);
@@ -95,7 +96,7 @@ fn a_study_is_built_sealed_and_the_same_after_a_stop() {
     let seal = StudySeal::verify(&study).unwrap();
     assert_eq!((built.seal.as_str(), built.up_to_date), (seal.seal.as_str(), false));
 
-    // What participants can reach is the films of the plan, all of one length and date of nothing.
+    // Participants can access only the films of the plan, all of one size and with opaque names.
     let plan: StudyPlan = serde_json::from_slice(&fs::read(study.plan()).unwrap()).unwrap();
     let key: StudyKey = serde_json::from_slice(&fs::read(study.key()).unwrap()).unwrap();
     let films = contents(&study.public());
@@ -113,46 +114,46 @@ fn a_study_is_built_sealed_and_the_same_after_a_stop() {
         assert_eq!(*sealed, blake3::hash(&films[&format!("films/{name}.mp4")]).to_hex().to_string());
     }
     assert!(key.films.values().any(|content| content.number.is_some()));
-    // The page asks how many tones there were.
+    // The sound check asks for the number of tones.
     assert_eq!(key.films[&plan.sound_check].sound, FilmSound::Tones);
-    let heard = orator::read_sound(&study.film(&plan.sound_check)).unwrap();
-    let loudest = heard.samples.iter().fold(0f32, |most, sample| most.max(sample.abs()));
-    let steps = heard.samples.chunks(heard.rate as usize / 50);
+    let sound_check = orator::read_sound(&study.film(&plan.sound_check)).unwrap();
+    let loudest = sound_check.samples.iter().fold(0f32, |most, sample| most.max(sample.abs()));
+    let steps = sound_check.samples.chunks(sound_check.rate as usize / 50);
     let is_loud: Vec<bool> = steps.map(|step| step.iter().any(|sample| sample.abs() > loudest / 2.0)).collect();
     assert_eq!(is_loud.windows(2).filter(|pair| !pair[0] && pair[1]).count(), SOUND_CHECK_TONES);
-    let whole = contents(study.dir());
-    assert!(whole.keys().all(|name| !name.contains(".films")), "what was made on the way is gone");
-    assert!(whole.contains_key("clips/clips.json") && whole.keys().any(|name| name.ends_with(".wav")));
+    let complete = contents(study.dir());
+    assert!(complete.keys().all(|name| !name.contains(".films")), "intermediate files are removed");
+    assert!(complete.contains_key("clips/clips.json") && complete.keys().any(|name| name.ends_with(".wav")));
 
-    // Again: nothing to do. Another study, or one with answers: refused.
+    // The same study is up to date; another study in the same folder is rejected.
     let output = orator(dir, "--json study build study.toml");
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     let facts: Value = serde_json::from_slice(&output.stdout).unwrap();
     assert_eq!((facts["seal"].as_str(), facts["up_to_date"].as_bool()), (Some(seal.seal.as_str()), Some(true)));
     assert_eq!(facts["next"], "orator study serve study");
     let other = StudyFile { participants: 5, ..file.clone() };
-    let refused = build(&other, study.dir(), SIZE, &Silent).unwrap_err().to_string();
-    assert!(refused.contains("is sealed") && refused.contains("--out"), "{refused}");
+    let error = build(&other, study.dir(), SIZE, &Silent).unwrap_err().to_string();
+    assert!(error.contains("is sealed") && error.contains("--out"), "{error}");
 
-    // Stopped while films are made, then finished on one worker.
+    // Interrupted while films are rendered, then completed by one worker.
     let again = dir.join("again");
     let stopped = catch_unwind(AssertUnwindSafe(|| build(&file, &again, SIZE, &Shared(Stop::at(31)) as &dyn Progress)));
     assert!(stopped.is_err() && !again.join("seal.json").exists() && !again.join("public").exists());
-    let made = contents(&again.join(".films"));
-    assert!(!made.is_empty());
-    // Other workers may have made all the others before they ended.
-    fs::remove_file(again.join(".films").join(made.keys().next_back().unwrap())).unwrap();
+    let rendered = contents(&again.join(".films"));
+    assert!(!rendered.is_empty());
+    // Other workers may have rendered all other films before they ended.
+    fs::remove_file(again.join(".films").join(rendered.keys().next_back().unwrap())).unwrap();
     let one = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
     one.install(|| build(&file, &again, SIZE, &Silent)).unwrap();
     let again = contents(&again);
-    assert_eq!(again.keys().collect::<Vec<_>>(), whole.keys().collect::<Vec<_>>());
-    let different: Vec<&String> = whole.keys().filter(|name| whole[*name] != again[*name]).collect();
+    assert_eq!(again.keys().collect::<Vec<_>>(), complete.keys().collect::<Vec<_>>());
+    let different: Vec<&String> = complete.keys().filter(|name| complete[*name] != again[*name]).collect();
     assert!(different.is_empty(), "{different:?}");
     fs::write(study.film("0000000000000000"), "planted").unwrap();
     assert!(build(&file, study.dir(), SIZE, &Silent).unwrap_err().to_string().contains("0000000000000000"));
 }
 
-/// The confined program, which may not do all that the library may.
+/// The program is sandboxed, unlike the library.
 #[test]
 fn the_command_line_builds_a_study() {
     let folder = tempfile::tempdir().unwrap();
@@ -165,43 +166,43 @@ fn the_command_line_builds_a_study() {
     fs::write(dir.join("study.toml"), head.replace("participants = 4", "participants = 1") + task).unwrap();
     let output = orator(dir, "study build study.toml --out made/here");
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-    let said = String::from_utf8_lossy(&output.stdout).into_owned();
+    let text = String::from_utf8_lossy(&output.stdout).into_owned();
     let seal = StudySeal::verify(&StudyFolder::new(dir.join("made/here"))).unwrap();
-    assert!(said.contains("host: 2 clips") && said.contains(&seal.seal), "{said}");
-    assert!(said.contains("next: orator study serve made/here"), "{said}");
+    assert!(text.contains("host: 2 clips") && text.contains(&seal.seal), "{text}");
+    assert!(text.contains("next: orator study serve made/here"), "{text}");
 }
 
 #[test]
-fn what_is_missing_is_said() {
+fn errors_name_the_missing_input() {
     let folder = tempfile::tempdir().unwrap();
     let dir = folder.path();
     let file = file(dir);
-    let say = |change: &dyn Fn(&mut StudyFile)| {
+    let error_of = |change: &dyn Fn(&mut StudyFile)| {
         let mut changed = file.clone();
         change(&mut changed);
         format!("{:#}", build(&changed, &dir.join("out"), SIZE, &Silent).unwrap_err())
     };
     let cases: [(&str, String); 5] = [
-        ("clips per speaker are needed", say(&|file| file.task[0].trials = 400)),
-        ("shorter clips", say(&|file| file.clips.seconds = 30.0)),
-        ("no dataset", say(&|file| file.speaker[0].dataset = Some(dir.join("nowhere")))),
+        ("clips per speaker are needed", error_of(&|file| file.task[0].trials = 400)),
+        ("shorter clips", error_of(&|file| file.clips.seconds = 30.0)),
+        ("no dataset", error_of(&|file| file.speaker[0].dataset = Some(dir.join("nowhere")))),
         (
             "condition model",
-            say(&|file| fs::rename(dir.join("models"), dir.join("moved")).map(|()| file.seed = 9).unwrap()),
+            error_of(&|file| fs::rename(dir.join("models"), dir.join("moved")).map(|()| file.seed = 9).unwrap()),
         ),
         (
             "has no intervals in the validation split",
-            say(&|file| {
+            error_of(&|file| {
                 fs::rename(dir.join("moved"), dir.join("models")).unwrap();
                 file.speaker[0].split = orator_base::types::split::Split::Validation;
             }),
         ),
     ];
-    for (says, text) in cases {
-        assert!(text.contains(says), "{says}: {text}");
+    for (expected, text) in cases {
+        assert!(text.contains(expected), "{expected}: {text}");
     }
     let output = orator(dir, "study build nothing.toml");
     assert_eq!(output.status.code(), Some(1));
-    let said = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert!(said.contains("nothing.toml") && said.contains("orator guide study"), "{said}");
+    let text = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(text.contains("nothing.toml") && text.contains("orator guide study"), "{text}");
 }

@@ -1,5 +1,5 @@
-//! Long run: simulated studies with known truth through the very analysis. Coverage of intervals, errors of tests,
-//! power against the plan, and how far the naive binomial test is off.
+//! Long run: the analysis on simulated studies with a known effect. Coverage of intervals, error rates of tests, power
+//! compared with the plan, and the error of the naive binomial test.
 
 use orator_study::analyse::outcome::BinaryVote;
 use orator_study::analyse::result::{ShareAnalysis, ShareMeasure, StatisticSettings};
@@ -13,8 +13,8 @@ use rand_distr::StandardNormal;
 use rayon::prelude::*;
 
 const STUDIES: u64 = 2000;
-/// Studies that power is foretold by.
-const FORETOLD: usize = 10_000;
+/// Simulations from which power is predicted.
+const N_POWER_SIMULATIONS: usize = 10_000;
 /// Draws of sign flips in each study.
 const DRAWS: usize = 1000;
 const METHODS: [StatisticMethod; 6] = [
@@ -49,7 +49,7 @@ fn rates(studies: &[ShareAnalysis], truth: f64, method: StatisticMethod) -> Rate
     }
 }
 
-/// Prints a scenario's rates, and gives those of each method.
+/// Prints the rates of a scenario and returns those of each method.
 fn scenario(name: &str, truth: f64, study: impl Fn(u64) -> ShareAnalysis + Sync + Send) -> Vec<Rates> {
     let studies: Vec<ShareAnalysis> = (0..STUDIES).into_par_iter().map(study).collect();
     eprintln!("\n{name}, {STUDIES} studies, true share {:.0} %", 100.0 * truth);
@@ -66,7 +66,7 @@ fn settings() -> StatisticSettings {
     StatisticSettings { n_draws: DRAWS, with_models: false, ..StatisticSettings::default() }
 }
 
-/// Nobody can tell, and everybody prefers a side.
+/// Participants who cannot distinguish the conditions but prefer a side.
 fn with_sides(design: &CrossedDesign, stream: u64) -> ShareAnalysis {
     let mut rng = ChaCha8Rng::seed_from_u64(7);
     rng.set_stream(stream);
@@ -85,7 +85,7 @@ fn with_sides(design: &CrossedDesign, stream: u64) -> ShareAnalysis {
 
 #[test]
 #[ignore = "minutes: make prove-study"]
-fn intervals_cover_tests_err_and_power_is_as_the_analysis_says() {
+fn coverage_error_rates_and_power_are_as_predicted() {
     let designs = [
         ("100 participants, 20 votes each, 40 clips", CrossedDesign { n_participants: 100, n_trials: 20, n_clips: 40 }),
         ("40 participants, 10 votes each, 20 clips", CrossedDesign { n_participants: 40, n_trials: 10, n_clips: 20 }),
@@ -112,18 +112,18 @@ fn intervals_cover_tests_err_and_power_is_as_the_analysis_says() {
                     power: 0.9,
                     effect: truth,
                     bound: 0.1,
-                    n_simulations: FORETOLD,
+                    n_simulations: N_POWER_SIMULATIONS,
                     seed: 11,
                 };
                 let is_found = |study: &ShareAnalysis| {
                     study.statistics.test(StatisticMethod::Crossed).is_some_and(|test| test.p < 0.05)
                 };
-                let foretold = 100.0 * power(&question, design.n_participants, truth, &is_found).power;
-                eprintln!("  power foretold {foretold:.1} %, found {:.1} %", rates[crossed].rejected);
-                assert!((foretold - rates[crossed].rejected).abs() <= 3.0);
+                let predicted = 100.0 * power(&question, design.n_participants, truth, &is_found).power;
+                eprintln!("  power predicted {predicted:.1} %, found {:.1} %", rates[crossed].rejected);
+                assert!((predicted - rates[crossed].rejected).abs() <= 3.0);
             }
         }
-        let rates = scenario(&format!("{name}, nobody can tell, sides preferred"), 0.5, |k| with_sides(&design, k));
+        let rates = scenario(&format!("{name}, no effect, sides preferred"), 0.5, |k| with_sides(&design, k));
         assert!(rates[sides].rejected <= 6.0 && rates[binomial].rejected <= 6.0);
     }
 }

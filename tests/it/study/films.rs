@@ -1,4 +1,4 @@
-//! Films of every kind of condition are alike in all but the motion.
+//! Films of all kinds of conditions differ only in motion.
 
 use crate::fixtures::study::films::{SIZE, speaker};
 use crate::fixtures::study::mp4;
@@ -50,7 +50,7 @@ trials = 1
 "#;
 
 #[test]
-fn films_of_all_conditions_differ_in_motion_alone() {
+fn films_of_all_conditions_differ_only_in_motion() {
     let folder = tempfile::tempdir().unwrap();
     let dir = folder.path();
     speaker(dir);
@@ -65,7 +65,7 @@ fn films_of_all_conditions_differ_in_motion_alone() {
     let missing = format!("{:#}", cut().filmed(&file, SIZE, &Silent).map(drop).unwrap_err());
     assert!(missing.contains("theirs") && missing.contains(".npy"), "{missing}");
 
-    // Another system's motion, at its own rate.
+    // Motion of another system, at its own frame rate.
     let clips = host.cut.clips.clone();
     for (number, clip) in clips.iter().enumerate() {
         let motion = SpokenClip { rule: RULE, seed: 6, split: Split::Test, number, n_frames: 30, habits: 0 }.motion();
@@ -103,7 +103,7 @@ fn films_of_all_conditions_differ_in_motion_alone() {
     assert_eq!(host.motion_of(&content("real", None)).unwrap(), name(1));
     assert_ne!(host.motion_of(&content("mismatched", None)).unwrap(), name(1));
 
-    assert!(skeletons.windows(2).all(|pair| pair[0] == pair[1]), "one body");
+    assert!(skeletons.windows(2).all(|pair| pair[0] == pair[1]), "all films show one body");
     let bytes = common_bytes(films.iter().map(|film| std::fs::metadata(film).unwrap().len() as usize));
     films.iter().for_each(|film| std::fs::write(film, padded(std::fs::read(film).unwrap(), bytes).unwrap()).unwrap());
     let mut headers = Vec::new();
@@ -113,11 +113,11 @@ fn films_of_all_conditions_differ_in_motion_alone() {
         let order: Vec<String> = mp4::boxes(&data).into_iter().map(|found| found.kind).collect();
         let at = |kind: &str| order.iter().position(|other| other == kind).unwrap();
         assert!(at("moov") < at("mdat") && order.last().unwrap() == "free", "{order:?}");
-        // Neither a title nor a program's name, and no time of day.
-        let said = mp4::find(&data, "moov/udta").concat();
-        assert!(said.ends_with(b"\0\0\0\x08ilst") && mp4::find(&data, "moov/meta").is_empty());
+        // The headers have no title, no program name and no time.
+        let metadata = mp4::find(&data, "moov/udta").concat();
+        assert!(metadata.ends_with(b"\0\0\0\x08ilst") && mp4::find(&data, "moov/meta").is_empty());
         assert!(mp4::find(&data, "moov/mvhd")[0][4..12].iter().all(|byte| *byte == 0));
-        // The first picture is a key frame.
+        // The first frame is a key frame.
         let keys = &mp4::find(&data, "moov/trak/mdia/minf/stbl/stss")[0];
         assert!(mp4::number(&keys[4..]) >= 1 && mp4::number(&keys[8..]) == 1);
         let [movie, times, edits] =
@@ -129,7 +129,7 @@ fn films_of_all_conditions_differ_in_motion_alone() {
         assert_eq!(media.audio.unwrap().codec, "aac");
         assert_eq!(FrameReader::open(film, FrameRate::new(30, 1)).unwrap().count(), 60);
     }
-    assert!(headers.windows(2).all(|pair| pair[0] == pair[1]), "films differ in what their headers say");
+    assert!(headers.windows(2).all(|pair| pair[0] == pair[1]), "the headers of the films differ");
     let sounds: Vec<_> = films.iter().map(|film| orator::read_sound(film).unwrap()).collect();
-    assert!(sounds.windows(2).all(|pair| pair[0] == pair[1]), "films of one clip sound alike");
+    assert!(sounds.windows(2).all(|pair| pair[0] == pair[1]), "the audio of the films differs");
 }

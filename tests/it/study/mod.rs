@@ -1,14 +1,14 @@
-//! User studies: built, served, analysed.
+//! User studies: building, serving, analysis.
 
 mod analyse;
 mod build;
 mod coverage;
+mod end_to_end;
 mod films;
 mod pages;
 mod serve;
 mod serve_begin;
 mod serve_busy;
-mod serve_crowd;
 mod serve_hostile;
+mod serve_load;
 mod server_killed;
-mod whole;

@@ -1,5 +1,5 @@
-//! Whole sessions of every design in a real browser, against the real server: by keys alone and by touch alone, light and
-//! dark, with a reload, a lost network, a look away and a withdrawal; axe-core looks at every step.
+//! Complete sessions of every design in a real browser against the real server: by keyboard only and by touch only,
+//! light and dark, with a reload, a network failure, a hidden page and a withdrawal; axe-core audits every step.
 
 use crate::fixtures::served_study::{Client, MadeStudy, fitting};
 use orator_study::plan::{PlannedTask, StudyPlan, TaskDesign, Trial, TrialPhase};
@@ -14,8 +14,8 @@ use std::process::Command;
 
 /// Study of all designs, ten trials with films of 1.6 s; the films of even index are preferred.
 fn every_design(n_sessions: usize) -> MadeStudy {
-    let made = MadeStudy::new(n_sessions, n_sessions, 4, 40);
-    let mut plan: StudyPlan = serde_json::from_slice(&fs::read(made.folder.plan()).unwrap()).unwrap();
+    let study = MadeStudy::new(n_sessions, n_sessions, 4, 40);
+    let mut plan: StudyPlan = serde_json::from_slice(&fs::read(study.folder.plan()).unwrap()).unwrap();
     let designs = [
         (TaskDesign::Turing, false, ""),
         (TaskDesign::TuringSingle, true, ""),
@@ -31,7 +31,7 @@ fn every_design(n_sessions: usize) -> MadeStudy {
         scale: scale.to_owned(),
     };
     plan.tasks = designs.into_iter().enumerate().map(task).collect();
-    let films = |indices: &[usize]| indices.iter().map(|k| made.films[*k].clone()).collect::<Vec<_>>();
+    let films = |indices: &[usize]| indices.iter().map(|k| study.films[*k].clone()).collect::<Vec<_>>();
     let trial = |task, phase, indices: &[usize], expected| Trial { task, phase, films: films(indices), expected };
     let side = |side| Some(Response::Side(side));
     let trials = vec![
@@ -47,28 +47,28 @@ fn every_design(n_sessions: usize) -> MadeStudy {
         trial(5, TrialPhase::Main, &[4, 5, 6, 7], None),
     ];
     plan.sessions.iter_mut().for_each(|session| session.trials.clone_from(&trials));
-    plan.sound_check.clone_from(&made.films[0]);
-    fs::write(made.folder.plan(), serde_json::to_vec(&plan).unwrap()).unwrap();
-    let file = fs::read_to_string(made.folder.study_file()).unwrap();
-    fs::write(made.folder.study_file(), file.replace("[\"en\"]", "[\"en\", \"de\", \"ar\"]")).unwrap();
-    StudySeal::of(&made.folder).unwrap().write(&made.folder).unwrap();
-    made
+    plan.sound_check.clone_from(&study.films[0]);
+    fs::write(study.folder.plan(), serde_json::to_vec(&plan).unwrap()).unwrap();
+    let file = fs::read_to_string(study.folder.study_file()).unwrap();
+    fs::write(study.folder.study_file(), file.replace("[\"en\"]", "[\"en\", \"de\", \"ar\"]")).unwrap();
+    StudySeal::of(&study.folder).unwrap().write(&study.folder).unwrap();
+    study
 }
 
-/// Takes part at `address` by the rule of `made`, and gives what the participant reports.
-fn take_part(made: &MadeStudy, address: &str, driver: &Path, more: &str) -> Value {
+/// Takes part at `address` by the rule of `study`, and returns the report of the participant.
+fn take_part(study: &MadeStudy, address: &str, driver: &Path, options: &str) -> Value {
     let score = |k: usize| if k.is_multiple_of(2) { 0.9 } else { 0.1 };
-    let scores: BTreeMap<_, _> = made.films.iter().enumerate().map(|(k, film)| (film, score(k))).collect();
-    let rule = json!({ "scores": scores, "numbers": { &made.films[6]: 42 } });
-    let answers = made.path().join("answers.json");
+    let scores: BTreeMap<_, _> = study.films.iter().enumerate().map(|(k, film)| (film, score(k))).collect();
+    let rule = json!({ "scores": scores, "numbers": { &study.films[6]: 42 } });
+    let answers = study.path().join("answers.json");
     fs::write(&answers, rule.to_string()).unwrap();
     let mut command = Command::new("node");
     command.arg("tests/it/study/browser/participant.mjs").env("ORATOR_DRIVER", driver);
     command.args(["--audit", "--url", &format!("http://{address}/"), "--answers"]).arg(&answers);
-    let done = command.args(more.split_whitespace()).output().unwrap();
-    assert!(done.status.success(), "{more}: {}", String::from_utf8_lossy(&done.stderr));
+    let done = command.args(options.split_whitespace()).output().unwrap();
+    assert!(done.status.success(), "{options}: {}", String::from_utf8_lossy(&done.stderr));
     let report: Value = serde_json::from_slice(&done.stdout).unwrap();
-    assert_eq!(report["findings"], json!([]), "{more}");
+    assert_eq!(report["findings"], json!([]), "{options}");
     report
 }
 
@@ -77,30 +77,31 @@ fn is_code(report: &Value) -> bool {
 }
 
 #[test]
-fn a_session_by_keys_and_one_by_touch_are_stored_as_they_were_answered() {
+fn sessions_by_keyboard_and_by_touch_are_stored_as_answered() {
     let Some(driver) = browser_driver() else { return };
     if Command::new("chromium").arg("--version").output().is_err() {
         return skip("no browser is installed (package chromium)");
     }
-    let made = every_design(3);
-    let served = made.serve(&[]);
-    let by_keys = take_part(&made, &served.address, &driver, "--width 1280 --language en --away-at 1 --interrupt-at 5");
+    let study = every_design(3);
+    let served = study.serve(&[]);
+    let by_keyboard =
+        take_part(&study, &served.address, &driver, "--width 1280 --language en --away-at 1 --interrupt-at 5");
     let dark = "--width 360 --height 640 --touch --scheme dark --language ar --reload-at 1 --offline-at 2";
-    let by_touch = take_part(&made, &served.address, &driver, dark);
-    for report in [&by_keys, &by_touch] {
-        eprintln!("apart at the start and later, ms: {}", report["apart_ms"]);
+    let by_touch = take_part(&study, &served.address, &driver, dark);
+    for report in [&by_keyboard, &by_touch] {
+        eprintln!("offset of the films at the start and later, ms: {}", report["offsets_ms"]);
         assert!(is_code(report) && report["trials"] == 10, "{report}");
-        // Two frames, in most of the trials: a machine under load is late to correct.
-        let apart = report["apart_ms"].as_array().unwrap();
-        let n_near = apart.iter().filter(|apart| apart[1].as_u64().unwrap() <= 80).count();
-        assert!(2 * n_near > apart.len(), "{report}");
+        // Two frames in most of the trials: a machine under load corrects late.
+        let offsets = report["offsets_ms"].as_array().unwrap();
+        let n_near = offsets.iter().filter(|offset| offset[1].as_u64().unwrap() <= 80).count();
+        assert!(2 * n_near > offsets.len(), "{report}");
     }
-    assert_eq!(by_keys["problems"], json!([]));
-    let withdrawn = take_part(&made, &served.address, &driver, "--touch --width 360 --language de --withdraw-at 2");
+    assert_eq!(by_keyboard["problems"], json!([]));
+    let withdrawn = take_part(&study, &served.address, &driver, "--touch --width 360 --language de --withdraw-at 2");
     assert_eq!(withdrawn["code"], Value::Null);
 
-    let votes = made.exported("votes");
-    assert_eq!(votes.len(), 20, "who withdrew has left nothing");
+    let votes = study.exported("votes");
+    assert_eq!(votes.len(), 20, "a withdrawal leaves no votes");
     let expected = [
         json!({ "side": "left" }),
         json!({ "side": "left" }),
@@ -118,18 +119,18 @@ fn a_session_by_keys_and_one_by_touch_are_stored_as_they_were_answered() {
         for (at, wanted) in [(7, &[90, 10, 90][..]), (9, &[90, 10, 90, 10])] {
             let scores = votes[at]["response"]["scores"].as_array().unwrap().clone();
             assert_eq!(scores.len(), wanted.len());
-            // A finger is not as exact as a key.
+            // Touch is less exact than the keyboard.
             let is_near = |(score, wanted): (&Value, &i64)| (score.as_i64().unwrap() - wanted).abs() <= 6;
             assert!(scores.iter().zip(wanted).all(is_near), "{scores:?}");
         }
     }
     let plays = |at: usize| votes[at]["plays"].as_u64().unwrap();
-    assert_eq!((plays(1), plays(11)), (1, 2), "the reload in the middle of a film counts as a play");
-    // A second, as far as the film still played when another page came to the front.
+    assert_eq!((plays(1), plays(11)), (1, 2), "a reload during a film counts as a play");
+    // The page was hidden for a second, which counts as far as the film was still playing.
     assert!(votes[1]["unfocused_secs"].as_f64().unwrap() >= 0.3, "{}", votes[1]);
 }
 
-/// What a script of the folder `browser` prints, run with these arguments.
+/// JSON printed by a script of the folder `browser`.
 fn script(driver: &Path, name: &str, args: &[&str]) -> Value {
     let mut command = Command::new("node");
     command.arg(format!("tests/it/study/browser/{name}.mjs")).args(args).env("ORATOR_DRIVER", driver);
@@ -139,28 +140,28 @@ fn script(driver: &Path, name: &str, args: &[&str]) -> Value {
 }
 
 #[test]
-fn a_browser_resumes_by_its_token_and_another_by_the_operators_link() {
+fn sessions_resume_by_token_and_by_the_operators_link() {
     let Some(driver) = browser_driver() else { return };
     if Command::new("chromium").arg("--version").output().is_err() {
         return skip("no browser is installed (package chromium)");
     }
-    let made = MadeStudy::new(3, 3, 4, 5).requiring_id();
-    let served = made.serve(&[]);
-    let page = |more: &str| format!("http://{}/{more}", served.address);
+    let study = MadeStudy::new(3, 3, 4, 5).requiring_id();
+    let served = study.serve(&[]);
+    let page = |path: &str| format!("http://{}/{path}", served.address);
     let visit = |url: &str| script(&driver, "visit", &["--url", url]);
-    let seen = |headings: [&str; 2], begins: u32| json!({ "headings": headings, "begins": begins, "fragment": "" });
-    assert_eq!(visit(&page("")), seen(["Your participant ID is missing", "Taking part"], 1));
+    let expected = |headings: [&str; 2], begins: u32| json!({ "headings": headings, "begins": begins, "fragment": "" });
+    assert_eq!(visit(&page("")), expected(["Your participant ID is missing", "Taking part"], 1));
     let recruited = page("?PROLIFIC_PID=p1");
-    assert_eq!(visit(&recruited), seen(["Which one is real?", "Welcome back"], 1));
+    assert_eq!(visit(&recruited), expected(["Which one is real?", "Welcome back"], 1));
 
     let operator = Client { token: served.operator_token.clone(), ..Client::new() };
     let progress = operator.get(&served.address, "/api/operator").unwrap().1;
     let token = progress["participants"][0]["token"].as_str().unwrap().to_owned();
     let first = Client { token, ..Client::new() };
     assert_eq!(first.answer(&served.address, 0, &fitting(0, true)).unwrap().0, 200);
-    assert_eq!(visit(&recruited), seen(["You have already started", "Taking part"], 1));
+    assert_eq!(visit(&recruited), expected(["You have already started", "Taking part"], 1));
 
-    // Another participant, who fails the attention check.
+    // A second participant fails the attention check.
     let mut inattentive = Client::new();
     inattentive.begin(&served.address, "p2").unwrap();
     for position in 0..4 {
@@ -181,14 +182,14 @@ fn a_browser_resumes_by_its_token_and_another_by_the_operators_link() {
         ["Total stalled time, s", "1"],
     ];
     assert_eq!(shown["quota"], json!(quota));
-    let places = shown["places"].as_array().unwrap();
-    assert_eq!((&places[0][0], &places[0][1], &places[0][2]), (&json!("1"), &json!("active"), &json!("1 of 4")));
-    assert_eq!((&places[1][1], &places[1][4]), (&json!("completed"), &json!("Link to resume")), "to its code");
+    let sessions = shown["sessions"].as_array().unwrap();
+    assert_eq!((&sessions[0][0], &sessions[0][1], &sessions[0][2]), (&json!("1"), &json!("active"), &json!("1 of 4")));
+    assert_eq!((&sessions[1][1], &sessions[1][4]), (&json!("completed"), &json!("Link to resume")), "link to the code");
     let link = shown["links"][0].as_str().unwrap();
-    assert_eq!(visit(link), seen(["Welcome back", "Welcome back"], 0));
+    assert_eq!(visit(link), expected(["Welcome back", "Welcome back"], 0));
 
-    // The first reply is lost, and the browser stores nothing: the address keeps the token.
-    let seen = script(&driver, "visit", &["--url", &page("?PROLIFIC_PID=p3"), "--adverse"]);
-    assert_eq!((&seen["headings"], &seen["begins"]), (&json!(["Which one is real?", "Welcome back"]), &json!(2)));
-    assert!(seen["fragment"].as_str().unwrap().starts_with("#resume="), "{seen}");
+    // The first reply is dropped and the browser has no storage: the address contains the token.
+    let visited = script(&driver, "visit", &["--url", &page("?PROLIFIC_PID=p3"), "--adverse"]);
+    assert_eq!((&visited["headings"], &visited["begins"]), (&json!(["Which one is real?", "Welcome back"]), &json!(2)));
+    assert!(visited["fragment"].as_str().unwrap().starts_with("#resume="), "{visited}");
 }

@@ -1,4 +1,4 @@
-//! `orator study serve` and `export`: a whole session, resumption, quotas, withdrawal, films.
+//! `orator study serve` and `export`: a complete session, resumption, quotas, withdrawal, films.
 
 use crate::fixtures::served_study::{Client, MadeStudy, fitting};
 use serde_json::{Value, json};
@@ -7,36 +7,36 @@ use std::process::Command;
 use std::time::Duration;
 
 #[test]
-fn a_session_from_consent_to_code_and_tables() {
+fn a_session_leads_from_consent_to_code_and_exported_tables() {
     let study = MadeStudy::new(2, 2, 4, 20);
     let served = study.serve(&[]);
     let address = served.address.clone();
     let mut client = Client::new();
     let (status, about) = client.get(&address, "/api/study").unwrap();
     assert_eq!((status, &about["title"], &about["n_trials"]), (200, &json!("A made-up study"), &json!(4)));
-    let (status, begun) = client.begin(&address, "p1").unwrap();
-    assert_eq!((status, &begun["state"]["position"]), (200, &json!(0)), "{begun}");
-    assert_eq!(begun["state"]["trial"], json!({ "task": 0, "phase": "training", "films": study.films[..2] }));
+    let (status, reply) = client.begin(&address, "p1").unwrap();
+    assert_eq!((status, &reply["state"]["position"]), (200, &json!(0)), "{reply}");
+    assert_eq!(reply["state"]["trial"], json!({ "task": 0, "phase": "training", "films": study.films[..2] }));
 
-    let (status, said) = client.answer(&address, 0, &fitting(0, true)).unwrap();
-    assert_eq!(status, 425, "before the films of 0.8 s can have ended: {said}");
+    let (status, reply) = client.answer(&address, 0, &fitting(0, true)).unwrap();
+    assert_eq!(status, 425, "before the films of 0.8 s can have ended: {reply}");
     std::thread::sleep(Duration::from_millis(800));
-    let (status, said) = client.answer(&address, 0, &fitting(0, false)).unwrap();
-    assert_eq!((status, &said["feedback"], &said["state"]["position"]), (200, &json!({ "side": "left" }), &json!(1)));
+    let (status, reply) = client.answer(&address, 0, &fitting(0, false)).unwrap();
+    assert_eq!((status, &reply["feedback"], &reply["state"]["position"]), (200, &json!({ "side": "left" }), &json!(1)));
     let again = client.answer(&address, 0, &fitting(0, false)).unwrap();
-    assert_eq!(again, (200, said), "the same answer again is acknowledged");
-    assert_eq!(client.answer(&address, 0, &fitting(0, true)).unwrap().0, 409, "another is not");
-    assert_eq!(client.answer(&address, 2, &fitting(2, true)).unwrap().0, 409, "nor one of a later trial");
+    assert_eq!(again, (200, reply), "the same answer is acknowledged again");
+    assert_eq!(client.answer(&address, 0, &fitting(0, true)).unwrap().0, 409, "a different answer is rejected");
+    assert_eq!(client.answer(&address, 2, &fitting(2, true)).unwrap().0, 409, "so is one to a later trial");
     assert_eq!(served.terminate(), Some(0));
 
     let served = study.serve(&[]);
     let address = served.address.clone();
     let (status, state) = client.get(&address, "/api/state").unwrap();
-    assert_eq!((status, &state["position"]), (200, &json!(1)), "the token outlives the server");
+    assert_eq!((status, &state["position"]), (200, &json!(1)), "the token is valid after a restart of the server");
     for position in 1..4 {
         std::thread::sleep(Duration::from_millis(800));
-        let (status, said) = client.answer(&address, position, &fitting(position, true)).unwrap();
-        assert_eq!((status, said.get("feedback")), (200, None), "{said}");
+        let (status, reply) = client.answer(&address, position, &fitting(position, true)).unwrap();
+        assert_eq!((status, reply.get("feedback")), (200, None), "{reply}");
     }
     let (_, state) = client.get(&address, "/api/state").unwrap();
     let code = state["completion"]["code"].as_str().unwrap();
@@ -54,8 +54,11 @@ fn a_session_from_consent_to_code_and_tables() {
     assert_eq!(votes.iter().map(|vote| vote["expected"].clone()).take(3).collect::<Vec<_>>(), expected);
     assert_eq!((&votes[2]["trial"], &votes[2]["clip"]), (&json!(3), &json!("ellen/2")));
     assert_eq!((&votes[2]["conditions"], &votes[3]["completed"]), (&json!(["real", "model"]), &json!(true)));
-    let people = study.exported("participants");
-    assert_eq!((people.len(), &people[0]["PROLIFIC_PID"], &people[0]["code"]), (1, &json!("p1"), &json!(code)));
+    let participants = study.exported("participants");
+    assert_eq!(
+        (participants.len(), &participants[0]["PROLIFIC_PID"], &participants[0]["code"]),
+        (1, &json!("p1"), &json!(code))
+    );
     study.export("csv");
     let table = fs::read_to_string(study.path().join("export/votes.csv")).unwrap();
     let row = table.lines().nth(2).unwrap();
@@ -64,23 +67,23 @@ fn a_session_from_consent_to_code_and_tables() {
 }
 
 #[test]
-fn places_are_given_in_order_and_those_of_who_left_again() {
+fn sessions_are_assigned_in_order_and_reassigned_after_withdrawal() {
     let study = MadeStudy::new(3, 2, 3, 5);
     let served = study.serve(&[]);
     let address = &served.address;
     let mut clients = [(); 3].map(|()| Client::new());
     assert_eq!(clients[0].begin(address, "a").unwrap().0, 200);
     assert_eq!(clients[1].begin(address, "b").unwrap().0, 200);
-    assert_eq!(clients[2].begin(address, "c").unwrap().0, 409, "two are wanted");
+    assert_eq!(clients[2].begin(address, "c").unwrap().0, 409, "the quota is two");
     assert_eq!(clients[0].post(address, "/api/withdraw", &json!({})).unwrap().0, 200);
-    assert_eq!(clients[2].begin(address, "c").unwrap().0, 200, "a place is free again");
+    assert_eq!(clients[2].begin(address, "c").unwrap().0, 200, "a session is free again");
     let places: Vec<Value> = study.exported("participants").into_iter().map(|mut row| row["place"].take()).collect();
     assert_eq!(places, [json!(2), json!(1)], "in the order of arrival");
-    // Who fails the attention check does not count as wanted.
+    // Participants who fail the attention check do not count towards the quota.
     for position in 0..3 {
         assert_eq!(clients[1].answer(address, position, &fitting(position, false)).unwrap().0, 200);
     }
-    assert_eq!(Client::new().begin(address, "b").unwrap().0, 409, "nobody takes part twice");
+    assert_eq!(Client::new().begin(address, "b").unwrap().0, 409, "no id takes part twice");
     assert_eq!(study.exported("participants").len(), 2);
     let mut fourth = Client::new();
     assert_eq!(fourth.begin(address, "d").unwrap().0, 200);
@@ -88,17 +91,17 @@ fn places_are_given_in_order_and_those_of_who_left_again() {
 
     let served = study.serve(&["--abandoned-after", "0"]);
     let mut fifth = Client::new();
-    assert_eq!(fifth.begin(&served.address, "e").unwrap().0, 200, "an abandoned place");
-    assert_eq!(clients[2].get(&served.address, "/api/state").unwrap().0, 410, "was given to another");
+    assert_eq!(fifth.begin(&served.address, "e").unwrap().0, 200, "an abandoned session");
+    assert_eq!(clients[2].get(&served.address, "/api/state").unwrap().0, 410, "was reassigned");
     assert_eq!(clients[2].answer(&served.address, 0, &fitting(0, true)).unwrap().0, 410);
-    assert_eq!(Client::new().begin(&served.address, "c").unwrap().0, 200, "who lost the place may begin anew");
+    assert_eq!(Client::new().begin(&served.address, "c").unwrap().0, 200, "a replaced participant may begin again");
     let operator = Client { token: served.operator_token.clone(), ..Client::new() };
     let quota = operator.get(&served.address, "/api/operator").unwrap().1["quota"].clone();
     assert_eq!((&quota["excluded"], &quota["withdrawn"], &quota["replaced"]), (&json!(1), &json!(1), &json!(0)));
 }
 
 #[test]
-fn a_withdrawal_leaves_no_byte() {
+fn a_withdrawal_removes_every_stored_byte() {
     let study = MadeStudy::new(60, 60, 12, 5);
     let served = study.serve(&[]);
     let address = &served.address;
@@ -113,21 +116,21 @@ fn a_withdrawal_leaves_no_byte() {
             leaver = client;
         }
     }
-    let people = study.exported("participants");
-    let of_leaver = people.iter().find(|row| row["PROLIFIC_PID"] == "pid-of-participant-020").unwrap();
+    let participants = study.exported("participants");
+    let of_leaver = participants.iter().find(|row| row["PROLIFIC_PID"] == "pid-of-participant-020").unwrap();
     let traces = ["participant", "code", "PROLIFIC_PID"].map(|key| of_leaver[key].as_str().unwrap().to_owned());
     let files = || fs::read_dir(study.path()).unwrap().map(|entry| entry.unwrap().path());
     let is_store = |path: &std::path::Path| path.to_str().unwrap().contains("responses.sqlite");
-    let holds = |trace: &str| {
+    let is_stored = |trace: &str| {
         let mut bytes = files().filter(|path| is_store(path)).map(|path| fs::read(path).unwrap());
         bytes.any(|bytes| bytes.windows(trace.len()).any(|window| window == trace.as_bytes()))
     };
-    assert!(traces.iter().all(|trace| holds(trace)));
+    assert!(traces.iter().all(|trace| is_stored(trace)));
     assert_eq!(leaver.post(address, "/api/withdraw", &json!({})).unwrap().0, 200);
     for trace in &traces {
-        assert!(!holds(trace), "{trace} is still in the database or its log");
+        assert!(!is_stored(trace), "{trace} is still in the database or its log");
     }
-    assert!(holds("pid-of-participant-021"), "others stay");
+    assert!(is_stored("pid-of-participant-021"), "other participants stay");
     assert_eq!(leaver.get(address, "/api/state").unwrap().0, 410);
     assert_eq!(leaver.post(address, "/api/withdraw", &json!({})).unwrap().0, 410);
     assert_eq!(leaver.answer(address, 0, &fitting(0, true)).unwrap().0, 410);
@@ -135,17 +138,17 @@ fn a_withdrawal_leaves_no_byte() {
 }
 
 #[test]
-fn a_study_that_was_changed_is_not_served() {
+fn a_changed_study_is_not_served() {
     let study = MadeStudy::new(1, 1, 2, 5);
     fs::write(study.folder.film(&study.films[1]), "another").unwrap();
     let mut command = Command::new(env!("CARGO_BIN_EXE_orator"));
-    let ended = command.args(["study", "serve", "--port", "0"]).arg(study.path()).output().unwrap();
-    let said = String::from_utf8(ended.stderr).unwrap();
-    assert!(ended.status.code() == Some(1) && said.contains(&study.films[1]), "{said}");
+    let output = command.args(["study", "serve", "--port", "0"]).arg(study.path()).output().unwrap();
+    let text = String::from_utf8(output.stderr).unwrap();
+    assert!(output.status.code() == Some(1) && text.contains(&study.films[1]), "{text}");
 }
 
 #[test]
-fn films_come_whole_in_ranges_and_by_head() {
+fn films_are_served_complete_in_ranges_and_by_head() {
     let study = MadeStudy::new(1, 1, 2, 5);
     let served = study.serve(&[]);
     let bytes = fs::read(study.folder.film(&study.films[0])).unwrap();

@@ -1,5 +1,5 @@
-//! `orator study serve` while its connections or its database are held by others: nobody is shut out for long, and who was
-//! refused has no place in the study.
+//! `orator study serve` while its connections or its database are in use: participants are not locked out for long, and
+//! rejected ones have no session.
 
 use crate::fixtures::served_study::{Client, MadeStudy};
 use orator_study::seal::StudySeal;
@@ -10,7 +10,7 @@ use std::io::{Read, Write};
 use std::net::{SocketAddr, TcpStream};
 use std::time::{Duration, Instant};
 
-/// Study whose first film, padded by a box `free`, exceeds what the sockets of a connection buffer.
+/// Study whose first film, padded by a `free` box, exceeds the socket buffers of a connection.
 fn study_with_large_film() -> MadeStudy {
     let study = MadeStudy::new(1, 1, 3, 5);
     let mut film = OpenOptions::new().append(true).open(study.folder.film(&study.films[0])).unwrap();
@@ -22,7 +22,7 @@ fn study_with_large_film() -> MadeStudy {
     study
 }
 
-/// Asks for `path` from the loopback address 127.0.0.`peer`.
+/// Requests `path` from the loopback address 127.0.0.`peer`.
 fn request(peer: u8, address: &str, path: &str) -> TcpStream {
     let runtime = tokio::runtime::Builder::new_current_thread().enable_io().build().unwrap();
     let mut stream = runtime.block_on(async {
@@ -32,12 +32,12 @@ fn request(peer: u8, address: &str, path: &str) -> TcpStream {
     });
     stream.set_nonblocking(false).unwrap();
     stream.set_read_timeout(Some(Duration::from_secs(60))).unwrap();
-    // A server that refuses the connection may close it before.
+    // A server that rejects the connection may close it first.
     let _ = stream.write_all(format!("GET {path} HTTP/1.1\r\nHost: localhost\r\n\r\n").as_bytes());
     stream
 }
 
-/// Status of the reply; 0: the connection ended without one.
+/// Status of the reply; 0 if the connection ended without a reply.
 fn status(mut stream: &TcpStream) -> u16 {
     let mut reply = [0; 12];
     let read = stream.read_exact(&mut reply);
@@ -45,23 +45,23 @@ fn status(mut stream: &TcpStream) -> u16 {
 }
 
 #[test]
-fn connections_that_read_nothing_shut_nobody_out() {
-    // A process of 192 files takes 64 connections, 16 of each peer.
+fn connections_that_do_not_read_do_not_block_others() {
+    // A process limited to 192 open files accepts 64 connections, 16 per peer.
     let study = study_with_large_film();
     let film = format!("/films/{}.mp4", study.films[0]);
     let served = study.serve_with_files(192, &[]);
     let films = |peer| (0..16).map(|_| request(peer, &served.address, &film)).collect::<Vec<_>>();
-    let begun = Instant::now();
+    let started = Instant::now();
     let first = films(1);
     assert!(first.iter().all(|stream| status(stream) == 200));
     let beyond = status(&request(1, &served.address, "/api/study"));
     assert!([0, 503].contains(&beyond), "connection 17 of a peer: {beyond}");
-    assert_eq!(status(&request(6, &served.address, "/api/study")), 200, "other peers have room");
+    assert_eq!(status(&request(6, &served.address, "/api/study")), 200, "other peers can connect");
 
     let others: Vec<TcpStream> = (2..5).flat_map(films).collect();
     assert!(others.iter().all(|stream| status(stream) == 200));
-    assert_eq!(status(&request(5, &served.address, "/api/study")), 200, "once films that are not read have ended");
-    let secs = begun.elapsed().as_secs_f64();
+    assert_eq!(status(&request(5, &served.address, "/api/study")), 200, "once the unread films have timed out");
+    let secs = started.elapsed().as_secs_f64();
     assert!((25.0..50.0).contains(&secs), "all connections were free again after {secs} s");
     drop((first, others));
     drop(served);
@@ -72,12 +72,12 @@ fn connections_that_read_nothing_shut_nobody_out() {
 }
 
 #[test]
-fn a_locked_database_refuses_in_time_and_gives_no_place_away() {
+fn a_locked_database_rejects_in_time_and_assigns_no_session() {
     let study = MadeStudy::new(9, 9, 3, 5);
     let served = study.serve(&[]);
     let other = Connection::open(study.folder.responses()).unwrap();
     other.execute_batch("BEGIN EXCLUSIVE").unwrap();
-    let begun = Instant::now();
+    let started = Instant::now();
     std::thread::scope(|scope| {
         let begins = [(); 6].map(|()| {
             scope.spawn(|| {
@@ -92,10 +92,10 @@ fn a_locked_database_refuses_in_time_and_gives_no_place_away() {
             assert_eq!(begin.join().unwrap(), (503, true));
         }
     });
-    assert!(begun.elapsed() < Duration::from_secs(10), "{:?}", begun.elapsed());
+    assert!(started.elapsed() < Duration::from_secs(10), "{:?}", started.elapsed());
     other.execute_batch("ROLLBACK").unwrap();
     drop(other);
     assert_eq!(Client::new().begin(&served.address, "later").unwrap().0, 200);
     let places: Vec<_> = study.exported("participants").into_iter().map(|row| row["place"].clone()).collect();
-    assert_eq!(places, [json!(1)], "who was refused has taken no place");
+    assert_eq!(places, [json!(1)], "a rejected request assigns no session");
 }

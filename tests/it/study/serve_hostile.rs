@@ -1,4 +1,4 @@
-//! Hostile input to `orator study serve`: each is refused with its status, and nothing of it is stored.
+//! Hostile input to `orator study serve` is rejected with the matching status, and none of it is stored.
 
 use crate::fixtures::served_study::{Client, MadeStudy, answer, fitting};
 use serde_json::{Value, json};
@@ -6,11 +6,11 @@ use std::io::{Read, Write};
 use std::net::TcpStream;
 use std::time::{Duration, Instant};
 
-/// Status of the reply to raw bytes; 0: the connection was closed without one.
+/// Status of the reply to raw bytes; 0 if the connection was closed without a reply.
 fn raw(address: &str, bytes: &[u8]) -> u16 {
     let mut stream = TcpStream::connect(address).unwrap();
     stream.set_read_timeout(Some(Duration::from_secs(20))).unwrap();
-    // A server that has refused already may close before all is written.
+    // A server that has already rejected the request may close the connection before all bytes are written.
     let _ = stream.write_all(bytes);
     status(&mut stream)
 }
@@ -35,7 +35,7 @@ fn post(address: &str, path: &str, token: &str, body: &[u8]) -> u16 {
 }
 
 #[test]
-fn no_path_leads_out_of_the_study() {
+fn request_paths_cannot_leave_the_study() {
     let study = MadeStudy::new(1, 1, 3, 5);
     let served = study.serve(&[]);
     let film = &study.films[0];
@@ -61,7 +61,7 @@ fn no_path_leads_out_of_the_study() {
         "/films/.mp4",
         "http://127.0.0.1/secret.json",
     ];
-    let of_film = [
+    let film_targets = [
         format!("/films/{film}"),
         format!("/films/{film}.mp4/"),
         format!("/films/{film}.mp4%00"),
@@ -70,10 +70,10 @@ fn no_path_leads_out_of_the_study() {
         format!("/films/./{film}.mp4"),
         format!("/films/{film}%2emp4%20"),
     ];
-    for target in escapes.into_iter().chain(of_film.iter().map(String::as_str)) {
+    for target in escapes.into_iter().chain(film_targets.iter().map(String::as_str)) {
         assert_eq!(get(&served.address, target), 404, "{target}");
     }
-    assert_eq!(get(&served.address, "/films/%ff%fe.mp4"), 400, "no UTF-8");
+    assert_eq!(get(&served.address, "/films/%ff%fe.mp4"), 400, "not UTF-8");
     assert_eq!(raw(&served.address, b"GET /\xff\xfe HTTP/1.1\r\nHost: localhost\r\n\r\n"), 400);
     for garbage in [&b"\x16\x03\x01\x02\x00\x01"[..], b"GET\r\n\r\n", b"GET / HTTP/9\r\n\r\n", b"\0\0\0\0\r\n\r\n"] {
         assert_eq!(raw(&served.address, garbage), 400);
@@ -84,8 +84,8 @@ fn no_path_leads_out_of_the_study() {
     assert!([414, 431].contains(&get(&served.address, &format!("/{}", "x".repeat(100_000)))));
 }
 
-/// Bodies that no address takes; `{T}` stands for text where a word belongs.
-fn wrong_bodies() -> Vec<Vec<u8>> {
+/// Request bodies that no endpoint accepts.
+fn invalid_bodies() -> Vec<Vec<u8>> {
     let good = answer(0, &fitting(0, true));
     let with = |key: &str, value: Value| {
         let mut body = good.clone();
@@ -129,14 +129,14 @@ fn wrong_bodies() -> Vec<Vec<u8>> {
 }
 
 #[test]
-fn what_is_no_answer_is_refused_and_nothing_is_stored() {
+fn invalid_answers_are_rejected_and_not_stored() {
     let study = MadeStudy::new(5, 5, 4, 5);
     let served = study.serve(&[]);
     let address = &served.address;
-    let mut bodies = wrong_bodies().into_iter().peekable();
+    let mut bodies = invalid_bodies().into_iter().peekable();
     let mut n = 0;
     while bodies.peek().is_some() {
-        // A participant may ask a hundred times at once.
+        // The rate limit allows a participant a hundred requests at once.
         let mut client = Client::new();
         client.begin(address, &format!("p{n}")).unwrap();
         for body in bodies.by_ref().take(90) {
@@ -167,21 +167,21 @@ fn what_is_no_answer_is_refused_and_nothing_is_stored() {
             405
         );
     }
-    assert_eq!(client.answer(address, 3, &fitting(3, true)).unwrap().0, 409, "another's position");
-    assert_eq!(client.answer(address, 4, &fitting(3, true)).unwrap().0, 409, "beyond the end");
+    assert_eq!(client.answer(address, 3, &fitting(3, true)).unwrap().0, 409, "not the current position");
+    assert_eq!(client.answer(address, 4, &fitting(3, true)).unwrap().0, 409, "past the last trial");
     assert!(study.exported("votes").is_empty());
 }
 
 #[test]
-fn who_begins_with_hostile_words_is_refused_and_so_is_a_forged_token() {
+fn hostile_begin_requests_and_forged_tokens_are_rejected() {
     let study = MadeStudy::new(2, 2, 4, 5);
     let served = study.serve(&[]);
     let address = &served.address;
     let good = json!({ "consent": true, "language": "en", "parameters": { "PROLIFIC_PID": "5f" } });
     let long = "x".repeat(129);
-    let wrong =
+    let hostile_texts =
         ["'; DROP TABLE participant; --", "<img src=x onerror=alert(1)>", "=1+1", "\u{0}", "\u{e9}", "a b", &long];
-    for hostile in wrong {
+    for hostile in hostile_texts {
         for key in ["consent", "language", "parameters"] {
             let mut body = good.clone();
             body[key] = json!(hostile);
@@ -202,7 +202,7 @@ fn who_begins_with_hostile_words_is_refused_and_so_is_a_forged_token() {
     let (mut one, mut other) = (Client::new(), Client::new());
     one.begin(address, "one").unwrap();
     other.begin(address, "other").unwrap();
-    let right = answer(0, &fitting(0, true)).to_string();
+    let valid = answer(0, &fitting(0, true)).to_string();
     let (token, half) = (one.token.clone(), one.token.len() / 2);
     let mixed = format!("{}{}", &token[..half], &other.token[half..]);
     let forged = ["", "x", &token[1..], &token[..token.len() - 1], &format!("{token}x"), &mixed, &token.to_uppercase()];
@@ -210,29 +210,29 @@ fn who_begins_with_hostile_words_is_refused_and_so_is_a_forged_token() {
     let elsewhere = foreign.serve(&[]);
     let mut stranger = Client::new();
     stranger.begin(&elsewhere.address, "stranger").unwrap();
-    let others = [stranger.token.as_str(), &served.operator_token, "\u{e9}", "a b", &"A".repeat(9000)];
-    for token in forged.into_iter().chain(others) {
-        assert_eq!(post(address, "/api/answer", token, right.as_bytes()), 401, "{token}");
+    let foreign_tokens = [stranger.token.as_str(), &served.operator_token, "\u{e9}", "a b", &"A".repeat(9000)];
+    for token in forged.into_iter().chain(foreign_tokens) {
+        assert_eq!(post(address, "/api/answer", token, valid.as_bytes()), 401, "{token}");
         assert_eq!(post(address, "/api/withdraw", token, b"{}"), 401, "{token}");
     }
-    let none =
+    let without_token =
         b"POST /api/answer HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/json\r\nContent-Length: 0\r\n\r\n";
-    assert_eq!(raw(address, none), 401);
+    assert_eq!(raw(address, without_token), 401);
     assert!(study.exported("votes").is_empty());
     for _ in 0..3 {
-        assert_eq!(post(address, "/api/answer", &token, right.as_bytes()), 200, "replayed");
+        assert_eq!(post(address, "/api/answer", &token, valid.as_bytes()), 200, "replayed");
     }
     assert_eq!(study.exported("votes").len(), 1);
-    let asked = (0..200).map(|_| one.get(address, "/api/state").unwrap().0);
-    assert!(asked.filter(|status| *status == 429).count() > 50, "one participant cannot ask without end");
-    assert_eq!(other.get(address, "/api/state").unwrap().0, 200, "others can");
+    let statuses = (0..200).map(|_| one.get(address, "/api/state").unwrap().0);
+    assert!(statuses.filter(|status| *status == 429).count() > 50, "requests of a participant are limited");
+    assert_eq!(other.get(address, "/api/state").unwrap().0, 200, "other participants are not affected");
 }
 
 #[test]
-fn who_sends_slowly_is_cut_off() {
+fn slow_senders_are_disconnected() {
     let study = MadeStudy::new(1, 1, 3, 5);
     let served = study.serve(&[]);
-    let begun = Instant::now();
+    let started = Instant::now();
     let open = |bytes: &[u8]| {
         let mut stream = TcpStream::connect(&served.address).unwrap();
         stream.set_read_timeout(Some(Duration::from_secs(20))).unwrap();
@@ -252,7 +252,7 @@ fn who_sends_slowly_is_cut_off() {
     assert_eq!(status(&mut half_body), 408);
     assert!([0, 408].contains(&status(&mut half_head)) && [0, 408].contains(&status(&mut silent)));
     trickle.join().unwrap();
-    assert!(begun.elapsed() < Duration::from_secs(15), "{:?}", begun.elapsed());
+    assert!(started.elapsed() < Duration::from_secs(15), "{:?}", started.elapsed());
 }
 
 #[test]
@@ -283,11 +283,11 @@ fn requests_that_name_another_host_are_misdirected() {
         "GET / HTTP/1.0\r\nHost: evil.example",
         "GET http://evil.example/ HTTP/1.1\r\nHost: localhost",
     ] {
-        let said = reply(address, head);
-        assert!(said[9..].starts_with("421 ") && said.contains("--host-name"), "{said}");
+        let text = reply(address, head);
+        assert!(text[9..].starts_with("421 ") && text.contains("--host-name"), "{text}");
         assert!(
-            said.contains("content-type: text/plain") && said.contains("x-content-type-options: nosniff"),
-            "{said}"
+            text.contains("content-type: text/plain") && text.contains("x-content-type-options: nosniff"),
+            "{text}"
         );
     }
     drop(served);

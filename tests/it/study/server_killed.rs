@@ -1,4 +1,4 @@
-//! A participant in a real browser, while the server is killed and started again throughout the session.
+//! A participant in a real browser while the server is killed and restarted throughout the session.
 
 use crate::fixtures::served_study::{Client, MadeStudy};
 use orator_test_support::skip::{browser_driver, skip};
@@ -28,7 +28,7 @@ fn a_browser_session_survives_kills_of_the_server() {
     browser.arg("tests/it/study/browser/participant.mjs").env("ORATOR_DRIVER", driver);
     browser.args(["--url", &format!("http://{}/", served.address), "--answers"]).arg(&answers);
     let mut browser = browser.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
-    // The page is there once the session has begun.
+    // The page is loaded once the session has begun.
     let operator = Client { token: served.operator_token.clone(), ..Client::new() };
     while operator.get(&served.address, "/api/operator").unwrap().1["quota"]["active"] != 1 {
         assert!(browser.try_wait().unwrap().is_none(), "the browser ended before the session began");

@@ -1,4 +1,4 @@
-//! Head and trunk beside the joints: they are learnt from the sound, spoken and measured; without them nothing changes.
+//! Head and trunk channels: they are trained on audio, generated and evaluated; without them nothing changes.
 
 use crate::fixtures::faults::stop::bytes;
 use crate::fixtures::gesture_dataset::{FPS, dataset, dataset_of, sample, with_posture};
@@ -17,7 +17,7 @@ use orator_gesture::generate::model::BEST;
 use orator_gesture::metrics::settings::MetricSettings;
 use orator_gesture::train::gan::train::train;
 
-/// Settings that learn in seconds.
+/// Settings of a training that takes seconds.
 fn settings(channels: &[PostureChannel]) -> GanConfig {
     GanConfig {
         channels: channels.to_vec(),
@@ -34,7 +34,7 @@ fn settings(channels: &[PostureChannel]) -> GanConfig {
 }
 
 #[test]
-fn head_and_trunk_follow_a_sound_that_was_not_trained_on() {
+fn head_and_trunk_follow_held_out_audio() {
     let folder = tempfile::tempdir().unwrap();
     let phases = [0.0, 0.7, 1.5, 2.2, 3.0, 3.8, 4.6, 5.5];
     let mut samples: Vec<_> = phases
@@ -44,9 +44,9 @@ fn head_and_trunk_follow_a_sound_that_was_not_trained_on() {
         .collect();
     let held_out = with_posture(sample("v-00000000-000000", 150, 1.1), 1.1);
     samples.push((Split::Validation, held_out.clone()));
-    let place = folder.path().join("dataset");
-    write_dataset(&place, "host", FPS, &samples).unwrap();
-    let dataset = Dataset::open(&place).unwrap();
+    let dataset_folder = folder.path().join("dataset");
+    write_dataset(&dataset_folder, "host", FPS, &samples).unwrap();
+    let dataset = Dataset::open(&dataset_folder).unwrap();
     let out = folder.path().join("out");
     let outcome = train(&dataset, &settings(&PostureChannel::ALL), &out, &Silent).unwrap();
     let errors = &outcome.validation.channels;
@@ -70,23 +70,23 @@ fn head_and_trunk_follow_a_sound_that_was_not_trained_on() {
             let mut metrics = result["metrics"].as_array().unwrap().iter();
             metrics.find(|metric| metric["name"] == name && metric["part"] == channel).unwrap()
         };
-        let value = |name: &str, who: &str| metric(name)["values"][who]["value"].as_f64();
-        let error = |who: &str| value("angle_error", who).unwrap();
+        let value = |name: &str, source: &str| metric(name)["values"][source]["value"].as_f64();
+        let error = |source: &str| value("angle_error", source).unwrap();
         assert!(error("prediction") < 0.5 * error("mean_pose"), "{}", metric("angle_error"));
-        // The tone repeats, so that copying is hard to beat here; it is measured, and no worse than standing still.
+        // The tone repeats, so that copying the nearest neighbour is hard to beat; it is better than the mean pose.
         assert!(error("nearest_neighbour") < error("mean_pose"), "{}", metric("angle_error"));
         assert!(error("prediction") < error("mismatched_prediction") && error("truth") == 0.0);
         let follows = value("angle_correlation", "prediction").unwrap();
         assert!(follows > 0.8, "{}", metric("angle_correlation"));
         assert_eq!(value("angle_correlation", "mean_pose"), None);
-        let speed = |who: &str| value("angular_speed", who).unwrap();
+        let speed = |source: &str| value("angular_speed", source).unwrap();
         assert!((0.5..1.5).contains(&(speed("prediction") / speed("truth"))) && speed("mean_pose") == 0.0);
         assert!(value("hellinger_angular_speed", "prediction") < value("hellinger_angular_speed", "mean_pose"));
     }
 }
 
 #[test]
-fn without_channels_the_bytes_are_those_of_a_dataset_without_them() {
+fn without_channels_the_posture_of_a_dataset_is_ignored() {
     let folder = tempfile::tempdir().unwrap();
     let few = |channels: &[PostureChannel]| GanConfig { batch: 2.into(), steps: 2.into(), ..settings(channels) };
     let (plain, posed) =
@@ -102,9 +102,9 @@ fn without_channels_the_bytes_are_those_of_a_dataset_without_them() {
     let hashes = [&plain, &posed].map(|dataset| dataset.hash().unwrap());
     assert_eq!(facts.replace(&hashes[0], &hashes[1]), other);
     let log = |files: &[(String, Vec<u8>)]| files.iter().find(|(name, _)| name == "metrics.jsonl").unwrap().1.clone();
-    assert!(log(&of_plain) == log(&of_posed), "what is not learnt has a say in the losses");
+    assert!(log(&of_plain) == log(&of_posed), "channels that are not trained affect the losses");
 
-    // One channel alone, of positions, whose bones have a loss; the other one is not spoken.
+    // The trunk only, with positions and their bone loss; the head is not generated.
     let trunk = GanConfig { representation: MotionRepresentation::Positions, ..few(&[PostureChannel::Trunk]) };
     let (_, facts, out) = trained(&posed, "c", trunk);
     assert!(facts.contains("\"channels\":[\"trunk\"]"), "{facts}");

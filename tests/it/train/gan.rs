@@ -1,5 +1,5 @@
-//! The generator's training end to end on a small made-up speaker whose arms follow the pitch of a tone: it learns,
-//! resumes exactly, stops when it breaks, and its checkpoint generates.
+//! End-to-end training of the generator on a small synthetic speaker whose arms follow the pitch of a tone: it learns,
+//! resumes exactly, stops on divergence, and its checkpoint generates.
 
 use crate::fixtures::faults::stop::{Shared, Stop, bytes};
 use crate::fixtures::gesture_dataset::{FPS, dataset, dataset_of, sample, with_posture};
@@ -23,10 +23,10 @@ fn settings() -> GanConfig {
 }
 
 #[test]
-fn a_training_stopped_at_a_step_ends_with_the_same_bytes() {
+fn a_training_stopped_at_a_step_resumes_to_identical_bytes() {
     let folder = tempfile::tempdir().unwrap();
     let dataset = dataset(&folder.path().join("dataset"));
-    // Behind a checkpoint, and behind a validation; `ORATOR_KILLS` (`make prove`): at every step.
+    // After a checkpoint and after a validation; with `ORATOR_KILLS` (`make prove`) at every step.
     let stops = if std::env::var("ORATOR_KILLS").is_ok() { vec![1, 2, 3, 4, 5, 6] } else { vec![3, 4] };
     let posed = dataset_of(&folder.path().join("posed"), with_posture);
     let channels = PostureChannel::ALL.to_vec();
@@ -45,33 +45,33 @@ fn a_training_stopped_at_a_step_ends_with_the_same_bytes() {
             },
         ),
     ] {
-        let place = |part: &str| folder.path().join(format!("{name}-{part}"));
-        let outcome = train(dataset, &settings, &place("whole"), &Silent).unwrap();
+        let out = |part: &str| folder.path().join(format!("{name}-{part}"));
+        let outcome = train(dataset, &settings, &out("whole"), &Silent).unwrap();
         assert_eq!((outcome.steps, outcome.n_examples, outcome.validation.n_windows), (6, 21, 4));
         assert_eq!(outcome.validation.split, "validation");
-        let whole = bytes(&place("whole"));
-        let names: Vec<&str> = whole.iter().map(|(name, _)| name.as_str()).collect();
+        let uninterrupted = bytes(&out("whole"));
+        let names: Vec<&str> = uninterrupted.iter().map(|(name, _)| name.as_str()).collect();
         assert!(
             ["metrics.jsonl", BEST, "step-0000004.safetensors", "step-0000006.safetensors"]
                 .iter()
                 .all(|n| names.contains(n))
         );
         for stop in stops {
-            let parts = place(&stop.to_string());
+            let parts = out(&stop.to_string());
             let progress = Shared(Stop::at(stop));
             let stopped = std::panic::catch_unwind(AssertUnwindSafe(|| train(dataset, &settings, &parts, &progress)));
             assert!(stopped.is_err());
             let resumed = train(dataset, &settings, &parts, &Silent).unwrap();
             assert_eq!((resumed.began_at, resumed.steps), ([0, 0, 2, 3, 4, 4][stop as usize - 1], 6));
-            for ((name, whole), (_, parts)) in whole.iter().zip(bytes(&parts)) {
-                assert!(*whole == parts, "{name} differs after a stop at step {stop}");
+            for ((name, expected), (_, resumed)) in uninterrupted.iter().zip(bytes(&parts)) {
+                assert!(*expected == resumed, "{name} differs after a stop at step {stop}");
             }
         }
     }
 }
 
 #[test]
-fn the_checkpoints_settings_win_and_differences_are_told() {
+fn settings_of_the_checkpoint_are_used_and_differences_reported() {
     let folder = tempfile::tempdir().unwrap();
     let dataset = dataset(&folder.path().join("dataset"));
     let out = folder.path().join("out");
@@ -84,28 +84,28 @@ fn the_checkpoints_settings_win_and_differences_are_told() {
         ..settings()
     };
     train(&dataset, &other, &out, &Shared(stop.clone())).unwrap();
-    let said = stop.said.lock().unwrap().join("\n");
+    let log = stop.said.lock().unwrap().join("\n");
     for key in ["gan.learning_rate", "gan.preset", "gan.representation"] {
-        assert!(said.contains(key), "{said}");
+        assert!(log.contains(key), "{log}");
     }
-    let whole = folder.path().join("whole");
-    train(&dataset, &settings(), &whole, &Silent).unwrap();
+    let uninterrupted = folder.path().join("whole");
+    train(&dataset, &settings(), &uninterrupted, &Silent).unwrap();
     let last = |folder: &Path| std::fs::read(orator_formats::checkpoint::path(folder, 6)).unwrap();
-    assert!(last(&out) == last(&whole), "the checkpoint's settings did not count");
+    assert!(last(&out) == last(&uninterrupted), "the checkpoint's settings were not used");
 
-    // Another speaker's dataset is refused, a grown one of the same speaker is told.
-    let grown = [
+    // Another speaker's dataset is rejected; a changed one of the same speaker is reported.
+    let other_samples = [
         (Split::Train, sample("d-00000000-000000", 99, 1.0)),
         (Split::Validation, sample("e-00000000-000000", 64, 4.0)),
     ];
     let second = folder.path().join("second");
-    write_dataset(&second, "host", FPS, &grown).unwrap();
+    write_dataset(&second, "host", FPS, &other_samples).unwrap();
     let stop = Stop::at(u64::MAX);
     let longer = GanConfig { steps: 7.into(), ..settings() };
     train(&Dataset::open(&second).unwrap(), &longer, &out, &Shared(stop.clone())).unwrap();
     assert!(stop.said.lock().unwrap().join("\n").contains("the dataset has changed"));
     let third = folder.path().join("third");
-    write_dataset(&third, "guest", FPS, &grown).unwrap();
+    write_dataset(&third, "guest", FPS, &other_samples).unwrap();
     let error = train(&Dataset::open(&third).unwrap(), &longer, &out, &Silent).unwrap_err();
     assert!(format!("{error:#}").contains("guest"), "{error:#}");
 }
@@ -115,7 +115,7 @@ fn patience_ends_a_training_whose_score_does_not_fall() {
     let folder = tempfile::tempdir().unwrap();
     let dataset = dataset(&folder.path().join("dataset"));
     let out = folder.path().join("out");
-    // Steps too small to change anything: the first score is never beaten.
+    // Steps are too small to change anything: no score is better than the first.
     let settings = GanConfig {
         steps: 40.into(),
         epoch_steps: 1.into(),
@@ -132,7 +132,7 @@ fn patience_ends_a_training_whose_score_does_not_fall() {
 }
 
 #[test]
-fn a_few_windows_are_learnt_by_heart_and_spoken() {
+fn a_few_windows_are_memorised_and_generated() {
     let folder = tempfile::tempdir().unwrap();
     let dataset_folder = folder.path().join("dataset");
     let long = sample("a-00000000-000000", 64 + 7 * 5, 0.0);
@@ -151,13 +151,13 @@ fn a_few_windows_are_learnt_by_heart_and_spoken() {
     let out = folder.path().join("out");
     let outcome = train(&dataset, &settings, &out, &Silent).unwrap();
     let validation = outcome.validation;
-    let (made, still) = (validation.generator, validation.mean_pose);
+    let (generated, mean_pose) = (validation.generator, validation.mean_pose);
     assert_eq!((validation.split.as_str(), outcome.n_examples), ("train", 8));
     let log = std::fs::read_to_string(out.join("metrics.jsonl")).unwrap();
     let l1 = |line: &str| serde_json::from_str::<serde_json::Value>(line).unwrap()["l1"].as_f64();
     assert!(log.lines().filter_map(l1).any(|l1| l1 < 0.1), "{log}");
-    assert!(made.l1 < 0.3 * still.l1 && made.pck > still.pck, "{validation:?}");
-    assert!((0.7..1.3).contains(&made.energy) && made.frechet < still.frechet, "{validation:?}");
+    assert!(generated.l1 < 0.3 * mean_pose.l1 && generated.pck > mean_pose.pck, "{validation:?}");
+    assert!((0.7..1.3).contains(&generated.energy) && generated.frechet < mean_pose.frechet, "{validation:?}");
     assert!(validation.bone_change_mm < 0.01 && validation.alarm.is_none(), "{validation:?}");
 
     let speaker = GestureGenerator::open(&out).unwrap();
@@ -172,27 +172,27 @@ fn a_few_windows_are_learnt_by_heart_and_spoken() {
     }
     let short = Sound { rate: 16_000, samples: long.sound.samples[..3_000].to_vec() };
     assert_eq!(speaker.motion(&short).unwrap().n_frames(), 2);
-    let nothing = Sound { rate: 16_000, samples: Vec::new() };
-    assert!(speaker.motion(&nothing).is_err());
+    let empty = Sound { rate: 16_000, samples: Vec::new() };
+    assert!(speaker.motion(&empty).is_err());
     assert!(speaker.motion(&Sound { rate: 8_000, ..short }).is_err());
     assert!(GestureGenerator::open(&dataset_folder.join("info.json")).is_err());
 }
 
 #[test]
-fn a_training_that_explodes_keeps_its_last_good_checkpoint() {
+fn a_diverging_training_and_unusable_windows_are_errors() {
     let folder = tempfile::tempdir().unwrap();
     let dataset = dataset(&folder.path().join("dataset"));
     let out = folder.path().join("out");
-    let wild = GanConfig { learning_rate: 1e30.into(), checkpoint_every: 1, steps: 50.into(), ..settings() };
-    let error = format!("{:#}", train(&dataset, &wild, &out, &Silent).unwrap_err());
+    let diverging = GanConfig { learning_rate: 1e30.into(), checkpoint_every: 1, steps: 50.into(), ..settings() };
+    let error = format!("{:#}", train(&dataset, &diverging, &out, &Silent).unwrap_err());
     assert!(error.contains("the training diverged") && error.contains("learning_rate"), "{error}");
-    let none = GanConfig { window_frames: 128, ..settings() };
-    assert!(format!("{:#}", train(&dataset, &none, &out, &Silent).unwrap_err()).contains("window"));
+    let too_long = GanConfig { window_frames: 128, ..settings() };
+    assert!(format!("{:#}", train(&dataset, &too_long, &out, &Silent).unwrap_err()).contains("window"));
     assert!(train(&dataset, &GanConfig { window_frames: 50, ..settings() }, &out, &Silent).is_err());
 }
 
 #[test]
-fn a_checkpoint_that_a_kill_left_over_goes_when_the_training_goes_on() {
+fn a_resumed_training_removes_leftover_checkpoints() {
     let folder = tempfile::tempdir().unwrap();
     let dataset = dataset(&folder.path().join("dataset"));
     let out = folder.path().join("out");

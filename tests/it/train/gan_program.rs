@@ -1,6 +1,6 @@
-//! Training by the program itself: killed or asked to end anywhere and resumed, it ends with the weights of a training
-//! that was left alone; and with two speakers each has a model of its own, which needs nothing but its file to generate.
-//! `ORATOR_KILLS` says how often it is killed (`make prove`: 20).
+//! Training by the program: killed or terminated at any time and resumed, it ends with the weights of an uninterrupted
+//! training; each of two speakers has a separate model, whose file is enough to generate. `ORATOR_KILLS` sets the
+//! number of kills (`make prove`: 20).
 
 use crate::fixtures::clips;
 use crate::fixtures::gesture_dataset::{FPS, sample};
@@ -26,7 +26,7 @@ epoch_steps = 4
 checkpoint_every = 3
 "#;
 
-/// A project of two speakers with a small dataset each.
+/// A project of two speakers, each with a small dataset.
 fn project(dir: &Path) {
     std::fs::write(dir.join("pipeline.toml"), CONFIG).unwrap();
     for (speaker, phase) in [("anna", 0.0), ("ben", 1.5)] {
@@ -49,15 +49,15 @@ fn train(dir: &Path, out: &str, steps: usize) -> Child {
 }
 
 #[test]
-fn killed_anywhere_a_training_resumes_to_the_same_weights() {
+fn a_training_killed_at_any_time_resumes_to_identical_weights() {
     let n_kills: u32 = std::env::var("ORATOR_KILLS").ok().and_then(|n| n.parse().ok()).unwrap_or(3);
     let folder = tempfile::tempdir().unwrap();
     let dir = folder.path();
     project(dir);
     let steps = 12;
-    let begun = Instant::now();
+    let started = Instant::now();
     assert!(train(dir, "calm", steps).wait().unwrap().success());
-    let whole = begun.elapsed();
+    let duration = started.elapsed();
     let read = |out: &str, file: &str| std::fs::read(dir.join(out).join(file)).unwrap();
     let last = "step-0000012.safetensors";
     let (mut n_killed, mut random, mut round) = (0, 0x9e37_79b9_7f4a_7c15_u64, 0);
@@ -67,13 +67,13 @@ fn killed_anywhere_a_training_resumes_to_the_same_weights() {
             random = random.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
             let share = (random >> 33) as f64 / f64::from(1u32 << 31);
             let mut child = train(dir, &out, steps);
-            std::thread::sleep(Duration::from_secs_f64(0.1 + share * whole.as_secs_f64()));
+            std::thread::sleep(Duration::from_secs_f64(0.1 + share * duration.as_secs_f64()));
             let ended = n_killed == n_kills || child.try_wait().unwrap().is_some();
             if ended {
                 assert!(child.wait().unwrap().success());
                 break;
             }
-            // By turns as a machine ends a process, and as it is asked to end.
+            // SIGKILL and SIGTERM in turn.
             match n_killed % 2 {
                 0 => child.kill().unwrap(),
                 _ => kill_process(Pid::from_child(&child), Signal::TERM).unwrap(),
@@ -86,16 +86,16 @@ fn killed_anywhere_a_training_resumes_to_the_same_weights() {
         }
         round += 1;
     }
-    eprintln!("killed {n_killed} trainings at work; weights, best and log are the same to the byte");
+    eprintln!("killed {n_killed} trainings; weights, best checkpoint and log are identical");
 }
 
 #[test]
-fn each_speaker_has_a_model_that_needs_only_its_file() {
+fn each_speaker_gets_a_model_whose_file_is_enough_to_generate() {
     let folder = tempfile::tempdir().unwrap();
     let dir = folder.path();
     project(dir);
     let run = |args: &str| orator(dir, args).status().unwrap().success();
-    assert!(!run("train gan --steps 2"), "which speaker?");
+    assert!(!run("train gan --steps 2"), "no speaker was given");
     assert!(!run("train gan --steps 2 --speaker carl"));
     for speaker in ["anna", "ben"] {
         assert!(run(&format!("train gan --steps 2 --speaker {speaker}")));
@@ -103,7 +103,7 @@ fn each_speaker_has_a_model_that_needs_only_its_file() {
     let models = ["anna", "ben"]
         .map(|speaker| std::fs::read(dir.join("work/gan").join(speaker).join("best.safetensors")).unwrap());
     assert!(models[0] != models[1]);
-    // Far from its project, the one file generates.
+    // The file generates without its project.
     let elsewhere = tempfile::tempdir().unwrap();
     std::fs::write(elsewhere.path().join("ben.safetensors"), &models[1]).unwrap();
     orator_formats::wav::write(&elsewhere.path().join("speech.wav"), &clips::tone(16_000, 2.0, 220.0)).unwrap();
@@ -114,13 +114,13 @@ fn each_speaker_has_a_model_that_needs_only_its_file() {
 }
 
 #[test]
-fn a_page_that_cannot_be_written_is_told_by_the_exit_code() {
+fn an_unwritable_training_page_sets_the_exit_code() {
     let folder = tempfile::tempdir().unwrap();
     let dir = folder.path();
     project(dir);
     std::fs::create_dir_all(dir.join("out/training.html/in the way")).unwrap();
     let train = |steps| train(dir, "out", steps).wait().unwrap().code();
-    assert_eq!(train(2), Some(2), "the model is there, its page is not");
+    assert_eq!(train(2), Some(2), "the model was written, its page was not");
     assert!(dir.join("out/best.safetensors").exists());
     std::fs::remove_dir_all(dir.join("out/training.html")).unwrap();
     assert_eq!(train(2), Some(0));
@@ -128,7 +128,7 @@ fn a_page_that_cannot_be_written_is_told_by_the_exit_code() {
 }
 
 #[test]
-fn each_speaker_gets_a_model_and_one_in_other_hands_is_left_to_them() {
+fn training_all_speakers_skips_those_locked_by_another_process() {
     let folder = tempfile::tempdir().unwrap();
     let dir = folder.path();
     project(dir);
@@ -144,5 +144,5 @@ fn each_speaker_gets_a_model_and_one_in_other_hands_is_left_to_them() {
     std::fs::remove_dir_all(dir.join("work/gan")).unwrap();
     std::fs::remove_file(dir.join("work/dataset/anna/info.json")).unwrap();
     assert_eq!(all(), Some(2));
-    assert!(model("ben").is_some(), "one that fails does not stop the others");
+    assert!(model("ben").is_some(), "a failing speaker does not stop the others");
 }

@@ -1,5 +1,5 @@
-//! The networks give what the same networks in PyTorch give (`fixtures/reference/networks_reference.py`), weights and
-//! inputs being filled by one formula on both sides.
+//! The networks agree with their PyTorch counterparts (`fixtures/reference/networks_reference.py`); one formula fills
+//! weights and inputs on both sides.
 
 use crate::fixtures::networks::{every_window, fill};
 use candle_core::{DType, Device, Tensor};
@@ -27,7 +27,7 @@ fn golden(name: &str) -> Golden {
     all.remove(name).unwrap()
 }
 
-fn agree(name: &str, y: &Tensor) -> anyhow::Result<()> {
+fn assert_agrees(name: &str, y: &Tensor) -> anyhow::Result<()> {
     let golden = golden(name);
     assert_eq!(y.dims(), golden.shape, "{name}");
     let y = y.flatten_all()?.to_vec1::<f64>()?;
@@ -44,22 +44,22 @@ fn generator_discriminator_and_lifter_agree_with_pytorch() -> anyhow::Result<()>
     let config = Config { width: 16, ..Config::from_preset(Preset::Light, 6) };
     let net = Generator::new(&mut params, &config)?;
     fill(&params)?;
-    agree("light", &net.forward(&pattern(&[2, 64, 427], 1.0)?, &[], 2 * generator::FRAMES_MULTIPLE, false)?)?;
+    assert_agrees("light", &net.forward(&pattern(&[2, 64, 427], 1.0)?, &[], 2 * generator::FRAMES_MULTIPLE, false)?)?;
 
     let mut params = Params::with_dtype(0, DType::F64);
     let net = Discriminator::new(&mut params, 12)?;
     fill(&params)?;
-    agree("discriminator", &net.forward(&pattern(&[2, 12, 63], 2.0)?, false)?)?;
+    assert_agrees("discriminator", &net.forward(&pattern(&[2, 12, 63], 2.0)?, false)?)?;
 
     let mut params = Params::with_dtype(0, DType::F64);
     let config = temporal::Config { n_in: 8, n_out: 9, channels: 12, widths: vec![3, 3, 3], dropout: 0.25 };
     let net = TemporalLifter::new(&mut params, "lifter", &config)?;
     fill(&params)?;
-    agree("temporal_lifter", &every_window(&net, &pattern(&[2, 8, 31], 3.0)?)?)
+    assert_agrees("temporal_lifter", &every_window(&net, &pattern(&[2, 8, 31], 3.0)?)?)
 }
 
 #[test]
-fn the_motion_encoder_agrees_with_pytorch_on_windows_and_on_whole_stretches() -> anyhow::Result<()> {
+fn the_motion_encoder_agrees_with_pytorch_on_windows_and_sequences() -> anyhow::Result<()> {
     let config = motion_encoder::Config { n_in: 12, channels: [10, 8, 6], hidden: [16, 12] };
     let mut params = Params::with_dtype(0, DType::F64);
     let net = AutoEncoder::new(&mut params, &config)?;
@@ -68,8 +68,8 @@ fn the_motion_encoder_agrees_with_pytorch_on_windows_and_on_whole_stretches() ->
     let std: Vec<f32> = (0..12).map(|i| 1.0 + 0.1 * i as f32).collect();
     net.encoder.set_statistics(&mean, &std)?;
     let x = net.encoder.normalised(&pattern(&[2, 12, 34], 4.0)?)?;
-    agree("motion_code", &net.encoder.forward(&x, &Mode::Eval)?)?;
-    agree("motion_back", &net.forward(&x, &Mode::Eval)?)?;
+    assert_agrees("motion_code", &net.encoder.forward(&x, &Mode::Eval)?)?;
+    assert_agrees("motion_back", &net.forward(&x, &Mode::Eval)?)?;
 
     let mut params = Params::with_dtype(0, DType::F32);
     let net = AutoEncoder::new(&mut params, &config)?;

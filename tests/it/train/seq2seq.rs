@@ -1,5 +1,5 @@
-//! Training of the sequence-to-sequence networks end to end on made-up motion that follows the pitch of a tone: it learns,
-//! resumes exactly, and its checkpoints generate for sounds of any length.
+//! End-to-end training of the sequence-to-sequence networks on synthetic motion that follows the pitch of a tone: it
+//! learns, resumes exactly, and its checkpoints generate for audio of any length.
 
 use crate::fixtures::animation::captures::{bvh, tone, write_capture, write_stereo};
 use crate::fixtures::faults::stop::{Shared, Stop, bytes};
@@ -30,7 +30,7 @@ fn open(dir: &Path, hold_out: &[&str]) -> anyhow::Result<CaptureFolder> {
 }
 
 #[test]
-fn a_training_stopped_at_a_step_ends_with_the_same_bytes() {
+fn a_training_stopped_at_a_step_resumes_to_identical_bytes() {
     let folder = tempfile::tempdir().unwrap();
     let dataset = dataset(&folder.path().join("dataset"));
     let source = TrainingSource::Dataset(&dataset);
@@ -41,31 +41,31 @@ fn a_training_stopped_at_a_step_ends_with_the_same_bytes() {
         (SequenceNetwork::Autoencoder, vec![2, 5]),
     ] {
         let settings = settings(network);
-        let place = |part: &str| folder.path().join(format!("{network:?}-{part}"));
-        let outcome = train(source, None, &settings, &place("whole"), &Silent).unwrap();
-        // 99 and 64 frames: a segment of 8 + 15 frames every five of them
+        let out = |part: &str| folder.path().join(format!("{network:?}-{part}"));
+        let outcome = train(source, None, &settings, &out("whole"), &Silent).unwrap();
+        // 99 and 64 frames: a segment of 8 + 15 frames every five frames.
         assert_eq!((outcome.steps, outcome.n_examples, outcome.n_words), (6, 16 + 9, 0));
         assert_eq!((outcome.validation.split.as_str(), outcome.validation.n_segments), ("validation", 8));
-        let whole = bytes(&place("whole"));
-        let names: Vec<&str> = whole.iter().map(|(name, _)| name.as_str()).collect();
+        let uninterrupted = bytes(&out("whole"));
+        let names: Vec<&str> = uninterrupted.iter().map(|(name, _)| name.as_str()).collect();
         assert!(
             ["metrics.jsonl", BEST, "step-0000004.safetensors", "step-0000006.safetensors"]
                 .iter()
                 .all(|name| names.contains(name))
         );
         for stop in stops {
-            let parts = place(&stop.to_string());
+            let parts = out(&stop.to_string());
             let progress = Shared(Stop::at(stop));
             let run = || train(source, None, &settings, &parts, &progress);
             assert!(std::panic::catch_unwind(AssertUnwindSafe(run)).is_err());
             let resumed = train(source, None, &settings, &parts, &Silent).unwrap();
             assert_eq!((resumed.began_at, resumed.steps), ([0, 0, 2, 3, 4, 4][stop as usize - 1], 6));
-            for ((name, whole), (_, parts)) in whole.iter().zip(bytes(&parts)) {
-                assert!(*whole == parts, "{name} of {network:?} differs after a stop at step {stop}");
+            for ((name, expected), (_, resumed)) in uninterrupted.iter().zip(bytes(&parts)) {
+                assert!(*expected == resumed, "{name} of {network:?} differs after a stop at step {stop}");
             }
         }
     }
-    // A checkpoint is not gone on from with other data; other settings than its own are told.
+    // A checkpoint is not resumed with other data; settings other than its own are reported.
     let captures = folder.path().join("captures");
     write_capture(&captures, "a", 4.0, 0.0, false);
     let captures = open(&captures, &[]).unwrap();
@@ -78,7 +78,7 @@ fn a_training_stopped_at_a_step_ends_with_the_same_bytes() {
 }
 
 #[test]
-fn the_loss_falls_and_the_dataset_is_spoken() {
+fn the_loss_falls_and_the_model_generates() {
     let folder = tempfile::tempdir().unwrap();
     let dataset = dataset(&folder.path().join("dataset"));
     let settings = Seq2seqConfig {
@@ -110,7 +110,7 @@ fn the_loss_falls_and_the_dataset_is_spoken() {
 }
 
 #[test]
-fn captures_with_and_without_words_speak_for_sounds_of_any_length() {
+fn models_of_captures_generate_for_audio_of_any_length() {
     let folder = tempfile::tempdir().unwrap();
     let dir = folder.path().join("captures");
     write_capture(&dir, "a", 6.0, 0.0, true);
@@ -129,10 +129,11 @@ fn captures_with_and_without_words_speak_for_sounds_of_any_length() {
         assert_eq!((words.len(), speaker.metadata.vocabulary.number("World")), (6, 3));
         for (secs, n_frames) in [(0.9, 18), (7.33, 146), (70.0, 1400)] {
             let sound = tone(secs, 1.0);
-            let (silent, said) = (speaker.poses(&sound, &[]).unwrap(), speaker.poses(&sound, &words).unwrap());
-            assert_eq!((silent.features.nrows(), said.features.nrows()), (n_frames, n_frames));
-            assert!(said.features != silent.features, "{network:?} does not hear words");
-            for poses in [silent, said] {
+            let (without_words, with_words) =
+                (speaker.poses(&sound, &[]).unwrap(), speaker.poses(&sound, &words).unwrap());
+            assert_eq!((without_words.features.nrows(), with_words.features.nrows()), (n_frames, n_frames));
+            assert!(with_words.features != without_words.features, "{network:?} does not depend on words");
+            for poses in [without_words, with_words] {
                 assert!(poses.features.iter().all(|v| v.is_finite()));
                 let back = Bvh::parse(&speaker.bvh(&poses).unwrap()).unwrap();
                 assert_eq!((back.n_frames, back.joints[0].name.as_str()), (n_frames, "Hips"));
@@ -144,14 +145,14 @@ fn captures_with_and_without_words_speak_for_sounds_of_any_length() {
 }
 
 #[test]
-fn what_is_wrong_with_captures_names_the_file() {
+fn errors_in_captures_name_the_file() {
     let folder = tempfile::tempdir().unwrap();
     let dir = folder.path();
-    let says = |case: &str, hold_out: &[&str], spoil: &dyn Fn(&Path)| {
+    let error_of = |case: &str, hold_out: &[&str], damage: &dyn Fn(&Path)| {
         let dir = dir.join(case);
         write_capture(&dir, "a", 3.0, 0.0, false);
         write_capture(&dir, "b", 3.0, 1.0, false);
-        spoil(&dir);
+        damage(&dir);
         let settings = settings(SequenceNetwork::Contextual);
         let out = dir.join("out");
         let trained = open(&dir, hold_out)
@@ -159,52 +160,53 @@ fn what_is_wrong_with_captures_names_the_file() {
         format!("{:#}", trained.unwrap_err())
     };
     let write = |dir: &Path, text: String| std::fs::write(dir.join("b.bvh"), text).unwrap();
-    let whole = bvh(3.0, 1.0);
-    let text = says("skeleton", &[], &|dir| write(dir, whole.replace("LeftHand", "LeftPaw")));
+    let valid = bvh(3.0, 1.0);
+    let text = error_of("skeleton", &[], &|dir| write(dir, valid.replace("LeftHand", "LeftPaw")));
     assert!(text.contains("b.bvh") && text.contains("other joints"), "{text}");
-    let text = says("held-out", &["b"], &|dir| write(dir, whole.replace("LeftHand", "LeftPaw")));
+    let text = error_of("held-out", &["b"], &|dir| write(dir, valid.replace("LeftHand", "LeftPaw")));
     assert!(text.contains("b.bvh") && text.contains("other joints"), "{text}");
-    let line = whole.lines().nth_back(9).unwrap().to_owned();
-    let text = says("nan", &[], &|dir| write(dir, whole.replace(&line, &line.replacen("0 ", "NaN ", 1))));
+    let line = valid.lines().nth_back(9).unwrap().to_owned();
+    let text = error_of("nan", &[], &|dir| write(dir, valid.replace(&line, &line.replacen("0 ", "NaN ", 1))));
     assert!(text.contains("b.bvh"), "{text}");
-    let text = says("no-motion", &[], &|dir| std::fs::remove_file(dir.join("b.bvh")).unwrap());
+    let text = error_of("no-motion", &[], &|dir| std::fs::remove_file(dir.join("b.bvh")).unwrap());
     assert!(text.contains("b.wav has no motion"), "{text}");
-    let text = says("no-sound", &[], &|dir| std::fs::remove_file(dir.join("b.wav")).unwrap());
+    let text = error_of("no-sound", &[], &|dir| std::fs::remove_file(dir.join("b.wav")).unwrap());
     assert!(text.contains("b.bvh has no audio"), "{text}");
-    let text = says("damaged-sound", &[], &|dir| std::fs::write(dir.join("b.wav"), "no sound").unwrap());
+    let text = error_of("damaged-sound", &[], &|dir| std::fs::write(dir.join("b.wav"), "no sound").unwrap());
     assert!(text.contains("b.wav"), "{text}");
     let other = |dir: &Path| {
         for file in ["a.bvh", "b.bvh"].map(|name| dir.join(name)) {
             std::fs::write(&file, std::fs::read_to_string(&file).unwrap().replace("LeftHand", "LeftPaw")).unwrap();
         }
     };
-    let text = says("joint", &[], &other);
+    let text = error_of("joint", &[], &other);
     assert!(text.contains("a.bvh") && text.contains("no joint LeftHand") && text.contains("LeftPaw"), "{text}");
-    let text = says("transcript", &[], &|dir| std::fs::write(dir.join("b.json"), "{").unwrap());
+    let text = error_of("transcript", &[], &|dir| std::fs::write(dir.join("b.json"), "{").unwrap());
     assert!(text.contains("b.json is not a valid transcript"), "{text}");
-    let text = says("short", &[], &|dir| ["a", "b"].iter().for_each(|name| write_capture(dir, name, 1.0, 0.0, false)));
+    let text =
+        error_of("short", &[], &|dir| ["a", "b"].iter().for_each(|name| write_capture(dir, name, 1.0, 0.0, false)));
     assert!(text.contains("no training motion is as long as a segment (30 frames)"), "{text}");
-    let text = says("unknown", &["z"], &|_| ());
+    let text = error_of("unknown", &["z"], &|_| ());
     assert!(text.contains("no z.bvh"), "{text}");
-    assert!(says("all", &["a", "b"], &|_| ()).contains("none remains"));
+    assert!(error_of("all", &["a", "b"], &|_| ()).contains("none remains"));
 }
 
-/// What a training says.
-fn told(captures: &CaptureFolder, vectors: Option<&WordVectors>, out: &Path) -> anyhow::Result<String> {
+/// Log of a training.
+fn training_log(captures: &CaptureFolder, vectors: Option<&WordVectors>, out: &Path) -> anyhow::Result<String> {
     let stop = Stop::at(u64::MAX);
     let settings = settings(SequenceNetwork::Words);
     train(TrainingSource::Captures(captures), vectors, &settings, out, &Shared(stop.clone()))?;
-    let said = stop.said.lock().unwrap().join("\n");
-    Ok(said)
+    let log = stop.said.lock().unwrap().join("\n");
+    Ok(log)
 }
 
 #[test]
-fn doubtful_transcripts_and_vectors_are_said_and_changed_captures_noticed() {
+fn doubtful_transcripts_and_changed_captures_are_reported() {
     let folder = tempfile::tempdir().unwrap();
     let dir = folder.path().join("captures");
     write_capture(&dir, "a", 4.0, 0.0, true);
     write_capture(&dir, "b", 3.0, 1.0, false);
-    // Stereo of 44.1 kHz beside mono of 16 kHz.
+    // Stereo at 44.1 kHz beside mono at 16 kHz.
     write_stereo(&dir.join("b.wav"), 3.0, 1.0);
     let words = |n: usize, word: &str| -> String { (0..n).map(|t| format!("{t}.2\t{t}.7\t{word}\n")).collect() };
     std::fs::write(dir.join("b.tsv"), words(9, "hello")).unwrap();
@@ -215,35 +217,35 @@ fn doubtful_transcripts_and_vectors_are_said_and_changed_captures_noticed() {
     };
     let (open, out) = (|| open(&dir, &[]).unwrap(), |name: &str| folder.path().join(name));
     let english = table("hello 1 2 3\nso 4 5 6\n").unwrap();
-    let said = told(&open(), Some(&english), &out("a")).unwrap();
+    let log = training_log(&open(), Some(&english), &out("a")).unwrap();
     let late = "b.tsv: 6 of 9 words are said after the end of the sound (3.00 s), the first `hello` at 3.20 s";
-    assert!(said.contains(late) && said.contains("1 of 2 words have pretrained vectors"), "{said}");
+    assert!(log.contains(late) && log.contains("1 of 2 words have pretrained vectors"), "{log}");
     assert_eq!(open().rate, 16_000);
     assert!(SequenceGenerator::open(&out("a")).unwrap().metadata.vocabulary.words() == ["hello", "world"]);
     let german = table("hallo 1 2\n").unwrap();
-    assert!(told(&open(), Some(&german), &out("b")).unwrap().contains("0 of 2 words have pretrained vectors"));
-    let error = format!("{:#}", told(&open(), Some(&german), &out("a")).unwrap_err());
+    assert!(training_log(&open(), Some(&german), &out("b")).unwrap().contains("0 of 2 words have pretrained vectors"));
+    let error = format!("{:#}", training_log(&open(), Some(&german), &out("a")).unwrap_err());
     assert!(error.contains("have 2 dimensions") && error.contains("those of the checkpoint"), "{error}");
     std::fs::write(folder.path().join("vectors.safetensors"), "cut").unwrap();
     assert!(WordVectors::open(&folder.path().join("vectors.safetensors")).is_err());
 
-    // Empty, and a hundred thousand words.
+    // An empty transcript, and one of a hundred thousand words.
     for (text, note) in
         [(String::new(), "b.tsv: the transcript holds no word"), (words(100_000, "hello"), "99997 of 100000")]
     {
         std::fs::write(dir.join("b.tsv"), text).unwrap();
-        let said = told(&open(), None, &out(&note.len().to_string())).unwrap();
-        assert!(said.contains(note), "{said}");
+        let log = training_log(&open(), None, &out(&note.len().to_string())).unwrap();
+        assert!(log.contains(note), "{log}");
     }
 
-    // Of the same length, other content.
+    // Equal length, different content.
     std::fs::write(dir.join("b.tsv"), words(3, "hello")).unwrap();
-    told(&open(), None, &out("c")).unwrap();
-    assert!(!told(&open(), None, &out("c")).unwrap().contains("have changed"));
+    training_log(&open(), None, &out("c")).unwrap();
+    assert!(!training_log(&open(), None, &out("c")).unwrap().contains("have changed"));
     std::fs::write(dir.join("b.tsv"), words(3, "hullo")).unwrap();
-    assert!(told(&open(), None, &out("c")).unwrap().contains("the data have changed"));
+    assert!(training_log(&open(), None, &out("c")).unwrap().contains("the data have changed"));
     let file = dir.join("b.bvh");
     std::fs::write(&file, std::fs::read_to_string(&file).unwrap().replace("LeftHand", "LeftPaw")).unwrap();
-    let error = format!("{:#}", told(&open(), None, &out("c")).unwrap_err());
+    let error = format!("{:#}", training_log(&open(), None, &out("c")).unwrap_err());
     assert!(error.contains("b.bvh") && error.contains("other joints"), "{error}");
 }

@@ -1,4 +1,4 @@
-//! `orator train seq2seq` by the program itself: where things lie when nothing is named, and the page of the training.
+//! `orator train seq2seq` by the program: default paths, and the page of the training.
 
 use crate::fixtures::animation::captures::write_capture;
 use crate::fixtures::gesture_dataset::{FPS, sample};
@@ -23,7 +23,7 @@ fn orator(dir: &Path, args: &str) -> Output {
     command.args(args.split_whitespace()).current_dir(dir).output().unwrap()
 }
 
-/// The answer of a command that succeeds.
+/// JSON answer of a successful command.
 fn answer(dir: &Path, args: &str) -> serde_json::Value {
     let output = orator(dir, &format!("{args} --json"));
     assert!(output.status.success(), "{args}: {}", String::from_utf8_lossy(&output.stderr));
@@ -31,7 +31,7 @@ fn answer(dir: &Path, args: &str) -> serde_json::Value {
 }
 
 #[test]
-fn a_training_lies_in_the_work_folder_with_a_page_of_its_curves() {
+fn a_training_is_saved_in_the_work_folder_with_its_page() {
     let folder = tempfile::tempdir().unwrap();
     let dir = folder.path();
     std::fs::write(dir.join("pipeline.toml"), CONFIG).unwrap();
@@ -42,12 +42,12 @@ fn a_training_lies_in_the_work_folder_with_a_page_of_its_curves() {
     write_dataset(&dir.join("work/dataset/anna"), "anna", FPS, &samples).unwrap();
     let trained = answer(dir, "train seq2seq");
     let out = dir.join("work/seq2seq/anna");
-    let place = std::path::Path::new(trained["page"].as_str().unwrap());
-    assert_eq!(place.canonicalize().unwrap(), out.join("training.html").canonicalize().unwrap());
+    let path = std::path::Path::new(trained["page"].as_str().unwrap());
+    assert_eq!(path.canonicalize().unwrap(), out.join("training.html").canonicalize().unwrap());
     let page = || std::fs::read_to_string(out.join("training.html")).unwrap();
     let written = page();
-    for words in ["Training of anna", "L1 error", "Motion energy", "Score", "Gradient norm", "strip", "20 steps"] {
-        assert!(written.contains(words), "{words}");
+    for text in ["Training of anna", "L1 error", "Motion energy", "Score", "Gradient norm", "strip", "20 steps"] {
+        assert!(written.contains(text), "{text}");
     }
     assert!(
         !written.contains("PCK")
@@ -60,14 +60,14 @@ fn a_training_lies_in_the_work_folder_with_a_page_of_its_curves() {
 }
 
 #[test]
-fn captures_need_a_place_and_have_a_page_without_poses() {
+fn captures_need_an_output_folder_and_have_a_page_without_poses() {
     let folder = tempfile::tempdir().unwrap();
     let dir = folder.path();
     write_capture(&dir.join("takes"), "a", 4.0, 0.0, true);
-    let refused = orator(dir, "train seq2seq --captures takes");
-    assert!(!refused.status.success() && String::from_utf8_lossy(&refused.stderr).contains("--out"));
-    let refused = orator(dir, "train seq2seq --out model");
-    assert!(String::from_utf8_lossy(&refused.stderr).contains("pipeline.toml"), "{refused:?}");
+    let rejected = orator(dir, "train seq2seq --captures takes");
+    assert!(!rejected.status.success() && String::from_utf8_lossy(&rejected.stderr).contains("--out"));
+    let rejected = orator(dir, "train seq2seq --out model");
+    assert!(String::from_utf8_lossy(&rejected.stderr).contains("pipeline.toml"), "{rejected:?}");
     let set = "--set seq2seq.batch=3 --set seq2seq.hidden=8 --set seq2seq.epoch_steps=4";
     answer(dir, &format!("train seq2seq --captures takes --steps 8 --out model {set}"));
     let page = std::fs::read_to_string(dir.join("model/training.html")).unwrap();

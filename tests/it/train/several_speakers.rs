@@ -1,5 +1,5 @@
-//! One network of several speakers, told apart by an embedding: it generates as each of them, goes on to the bit, and gives a
-//! new speaker a start.
+//! One network for several speakers, distinguished by an embedding: it generates as each of them, resumes bit-exactly,
+//! and initialises the training of a new speaker.
 
 use crate::fixtures::faults::stop::bytes;
 use crate::fixtures::gesture_dataset::{FPS, sample};
@@ -71,7 +71,7 @@ fn as_speaker(folder: &Path, name: &str) -> anyhow::Result<GestureGenerator> {
 }
 
 #[test]
-fn each_speaks_with_a_body_of_its_own() {
+fn each_speaker_is_generated_with_its_own_skeleton() {
     let folder = tempfile::tempdir().unwrap();
     let dir = folder.path();
     let (anna, ben) = (speaker(dir, "anna", 0.0, 1.0), speaker(dir, "ben", 1.5, 1.2));
@@ -79,11 +79,11 @@ fn each_speaks_with_a_body_of_its_own() {
     let both = dir.join("both");
     train_with_callback(&[&anna, &ben], &settings(), None, &both, &Silent, ignore).unwrap();
 
-    let said = Sound { rate: 16_000, samples: (0..48_000).map(|n| (n as f32 * 0.05).sin() * 0.3).collect() };
+    let audio = Sound { rate: 16_000, samples: (0..48_000).map(|n| (n as f32 * 0.05).sin() * 0.3).collect() };
     let motion = |name: &str| -> Array3<f32> {
         let generator = as_speaker(&both, name).unwrap();
         assert_eq!(generator.name(), name);
-        generator.motion(&said).unwrap().joints
+        generator.motion(&audio).unwrap().joints
     };
     let (of_anna, of_ben) = (motion("anna"), motion("ben"));
     let elbow = parent(L_WRIST).unwrap();
@@ -96,7 +96,7 @@ fn each_speaks_with_a_body_of_its_own() {
     let error = format!("{:#}", as_speaker(&both, "carl").err().unwrap());
     assert!(error.contains("\"carl\"") && error.contains("anna, ben"), "{error}");
 
-    // Stopped and gone on with, it ends with the same bytes.
+    // Stopped and resumed, it ends with identical bytes.
     let parts = dir.join("parts");
     let half = GanConfig { steps: 3.into(), ..settings() };
     train_with_callback(&[&anna, &ben], &half, None, &parts, &Silent, ignore).unwrap();
@@ -108,17 +108,17 @@ fn each_speaks_with_a_body_of_its_own() {
     let names = |out: &Path| bytes(out).into_iter().map(|(name, _)| name).collect::<Vec<_>>();
     assert_eq!(names(&both), names(&parts));
 
-    // A new speaker begins with what both taught, and is alone in its own network.
+    // A new speaker is initialised from both, and is the only speaker of its network.
     let carl = speaker(dir, "carl", 0.7, 0.9);
-    begins_as_the_nearest(&both, &carl);
+    assert_starts_from_nearest_speaker(&both, &carl);
     let of_carl = dir.join("carl-gan");
     train_with_callback(&[&carl], &settings(), Some(&both), &of_carl, &Silent, ignore).unwrap();
     let model = GestureGenerator::open(&of_carl).unwrap().metadata;
     assert_eq!((model.name.as_str(), model.network.n_speakers), ("carl", 1));
-    let learnt: Vec<&str> = model.videos.iter().map(|video| video.speaker.as_str()).collect();
-    assert!(["anna", "ben", "carl"].iter().all(|name| learnt.contains(name)), "{learnt:?}");
-    learns_its_layer_alone(&both, &carl, &dir.join("layer"));
-    // And the other way round.
+    let trained_on: Vec<&str> = model.videos.iter().map(|video| video.speaker.as_str()).collect();
+    assert!(["anna", "ben", "carl"].iter().all(|name| trained_on.contains(name)), "{trained_on:?}");
+    assert_trains_only_speaker_layer(&both, &carl, &dir.join("layer"));
+    // Two speakers can also be initialised from a single one.
     train_with_callback(&[&anna, &ben], &settings(), Some(&of_carl), &dir.join("all"), &Silent, ignore).unwrap();
     assert_eq!(as_speaker(&dir.join("all"), "ben").unwrap().metadata.network.n_speakers, 1);
 
@@ -127,21 +127,21 @@ fn each_speaks_with_a_body_of_its_own() {
     assert!(format!("{error:#}").contains("both of speaker anna"), "{error:#}");
 }
 
-/// What all speakers share stays as it was where it has no rate.
-fn learns_its_layer_alone(both: &Path, new: &Dataset, out: &Path) {
+/// The weights shared by all speakers do not change at a learning rate of 0.
+fn assert_trains_only_speaker_layer(both: &Path, new: &Dataset, out: &Path) {
     let settings = GanConfig { shared_rate: 0.0.into(), ..settings() };
     train_with_callback(&[new], &settings, Some(both), out, &Silent, &mut |_| ()).unwrap();
-    let begun = Contents::read(&both.join(BEST)).unwrap().part(GENERATOR);
-    let learnt = Contents::read(&checkpoint::path(out, 6)).unwrap().part("training.generator.");
+    let initial = Contents::read(&both.join(BEST)).unwrap().part(GENERATOR);
+    let trained = Contents::read(&checkpoint::path(out, 6)).unwrap().part("training.generator.");
     let values = |tensor: &Tensor| tensor.flatten_all().unwrap().to_vec1::<f32>().unwrap();
-    for (name, tensor) in learnt.iter().filter(|(name, _)| name.contains(".conv.") || name.starts_with("last")) {
-        assert_eq!(values(tensor), values(&begun[name]), "{name}");
+    for (name, tensor) in trained.iter().filter(|(name, _)| name.contains(".conv.") || name.starts_with("last")) {
+        assert_eq!(values(tensor), values(&initial[name]), "{name}");
     }
-    assert!(values(&learnt[SPEAKER_WEIGHT]) != values(&begun[SPEAKER_WEIGHT].narrow(0, 0, 1).unwrap()));
+    assert!(values(&trained[SPEAKER_WEIGHT]) != values(&initial[SPEAKER_WEIGHT].narrow(0, 0, 1).unwrap()));
 }
 
-/// A new speaker begins with that layer of those a model knows, or their mean, by which the error is least.
-fn begins_as_the_nearest(both: &Path, new: &Dataset) {
+/// A new speaker starts from the layer of a known speaker, or their mean, with the least error.
+fn assert_starts_from_nearest_speaker(both: &Path, new: &Dataset) {
     let normal = speaker_metadata::normalisation(new).unwrap();
     let loader = WindowLoader::load(new, Split::Train, &normal, 32, 5).unwrap();
     let of =
@@ -150,7 +150,7 @@ fn begins_as_the_nearest(both: &Path, new: &Dataset) {
     let windows = JoinedWindows::new(vec![loader]);
     let trainer = PretrainedModel::read(both).unwrap().trainer(vec![metadata], of, &windows).unwrap();
     let batch = windows.batch_changed(&(0..windows.len()).collect::<Vec<_>>(), &[]).unwrap();
-    let begun = trainer.error(&batch).unwrap();
+    let initial_error = trainer.error(&batch).unwrap();
 
     let model = Contents::read(&both.join(BEST)).unwrap();
     let mut layers = model.part(GENERATOR);
@@ -164,16 +164,16 @@ fn begins_as_the_nearest(both: &Path, new: &Dataset) {
         trainer.error(&batch).unwrap()
     });
     let least = errors.into_iter().fold(f64::INFINITY, f64::min);
-    assert!(begun == least && errors.iter().any(|error| *error > least), "{begun} of {errors:?}");
+    assert!(initial_error == least && errors.iter().any(|error| *error > least), "{initial_error} of {errors:?}");
 }
 
 #[test]
-fn the_commands_train_all_speak_as_one_and_measure_each() {
+fn the_commands_train_all_speakers_and_generate_and_evaluate_each() {
     let folder = tempfile::tempdir().unwrap();
     let dir = folder.path();
-    let made = dir.join("work/dataset");
-    std::fs::create_dir_all(&made).unwrap();
-    let _two = (speaker(&made, "anna", 0.0, 1.0), speaker(&made, "ben", 1.5, 1.2));
+    let datasets = dir.join("work/dataset");
+    std::fs::create_dir_all(&datasets).unwrap();
+    let _two = (speaker(&datasets, "anna", 0.0, 1.0), speaker(&datasets, "ben", 1.5, 1.2));
     std::fs::write(dir.join("pipeline.toml"), CONFIG).unwrap();
     let trained = orator(dir, "train gan --speaker all");
     assert_eq!((trained.code, trained.json["speaker"].as_str()), (0, Some("anna, ben")), "{}", trained.errors);
@@ -187,15 +187,15 @@ fn the_commands_train_all_speak_as_one_and_measure_each() {
     let generate = |more: &str| {
         orator(dir, &format!("generate --checkpoint work/gan/all --audio speech.wav --out motion.bvh {more}"))
     };
-    let silent = generate("");
-    assert!(silent.code != 0 && silent.errors.contains("--speaker"), "{}", silent.errors);
-    let spoken = generate("--speaker ben");
-    assert_eq!((spoken.code, spoken.json["speaker"].as_str()), (0, Some("ben")), "{}", spoken.errors);
+    let unnamed = generate("");
+    assert!(unnamed.code != 0 && unnamed.errors.contains("--speaker"), "{}", unnamed.errors);
+    let named = generate("--speaker ben");
+    assert_eq!((named.code, named.json["speaker"].as_str()), (0, Some("ben")), "{}", named.errors);
     for name in ["anna", "ben"] {
-        let measured = orator(
+        let evaluated = orator(
             dir,
             &format!("evaluate --dataset work/dataset/{name} --checkpoint work/gan/all --split validation"),
         );
-        assert_eq!(measured.code, 0, "{}", measured.errors);
+        assert_eq!(evaluated.code, 0, "{}", evaluated.errors);
     }
 }

@@ -1,4 +1,4 @@
-//! Windows that are read from the shards one by one are those of intervals held in memory, to the bit.
+//! Windows from_shards from the shards one by one are bit-identical to those of intervals in memory.
 
 use crate::fixtures::gesture_dataset::{dataset_of, with_posture};
 use orator_base::types::posture::PostureChannel;
@@ -15,15 +15,15 @@ fn values(batch: &WindowBatch) -> Vec<Vec<f32>> {
 }
 
 #[test]
-fn windows_from_shards_are_those_from_memory() {
+fn windows_from_shards_equal_those_from_memory() {
     let folder = tempfile::tempdir().unwrap();
     let dataset = dataset_of(folder.path(), with_posture);
     let normal = normalisation_with_channels(&dataset, &PostureChannel::ALL).unwrap();
-    let load = |most_bytes| WindowLoader::load_within(most_bytes, &dataset, Split::Train, &normal, 32, 3).unwrap();
-    let (held, read) = (load(usize::MAX), load(0));
-    assert_eq!(held.len(), read.len());
-    let which: Vec<usize> = (0..held.len()).collect();
-    assert_eq!(values(&held.batch(&which).unwrap()), values(&read.batch(&which).unwrap()));
+    let load = |max_bytes| WindowLoader::load_within(max_bytes, &dataset, Split::Train, &normal, 32, 3).unwrap();
+    let (in_memory, from_shards) = (load(usize::MAX), load(0));
+    assert_eq!(in_memory.len(), from_shards.len());
+    let indices: Vec<usize> = (0..in_memory.len()).collect();
+    assert_eq!(values(&in_memory.batch(&indices).unwrap()), values(&from_shards.batch(&indices).unwrap()));
     let material = TrainingMaterial::measure(&[&dataset], 32);
     let config = GanConfig {
         recipe: GanRecipe::Auto,
@@ -37,15 +37,17 @@ fn windows_from_shards_are_those_from_memory() {
     for step in 0..20 {
         let changes = changes(&settings, step, dataset.info().fps);
         // First, last and others.
-        let which: Vec<usize> = (0..changes.len()).map(|i| (i * 7 + step) % held.len()).collect();
-        let [held, read] = [&held, &read].map(|loader| loader.batch_changed(&which, &changes).unwrap());
+        let indices: Vec<usize> = (0..changes.len()).map(|i| (i * 7 + step) % in_memory.len()).collect();
+        let [in_memory, from_shards] =
+            [&in_memory, &from_shards].map(|loader| loader.batch_changed(&indices, &changes).unwrap());
         assert!(!changes.is_empty());
-        assert_eq!(values(&held), values(&read), "step {step}");
+        assert_eq!(values(&in_memory), values(&from_shards), "step {step}");
     }
-    for (interval, frames) in held.parts(50) {
-        let [held, read] = [&held, &read].map(|loader| loader.part(interval, frames.clone()).unwrap());
-        assert_eq!(values(&held), values(&read), "{interval} {frames:?}");
+    for (interval, frames) in in_memory.parts(50) {
+        let [in_memory, from_shards] =
+            [&in_memory, &from_shards].map(|loader| loader.part(interval, frames.clone()).unwrap());
+        assert_eq!(values(&in_memory), values(&from_shards), "{interval} {frames:?}");
     }
     let poses = |loader: &WindowLoader| loader.poses(50).map(|pose| pose.unwrap()).collect::<Vec<_>>();
-    assert_eq!(poses(&held), poses(&read));
+    assert_eq!(poses(&in_memory), poses(&from_shards));
 }

@@ -112,7 +112,7 @@ mod tests {
         })
     }
 
-    fn seen(hand: &HandJoints, angle: f32) -> SeenHand {
+    fn observed(hand: &HandJoints, angle: f32) -> SeenHand {
         hand.map(|[x, y, _]| {
             let (x, y) = (x as f32, y as f32);
             Some([100.0 + angle.cos() * x - angle.sin() * y, 50.0 + angle.sin() * x + angle.cos() * y])
@@ -122,11 +122,11 @@ mod tests {
     #[test]
     fn the_view_is_normalised_and_invertible() {
         let hand = spread_hand();
-        let upright = HandView::new(&seen(&hand, 0.0), Side::Right).unwrap();
-        let turned = HandView::new(&seen(&hand.map(|p| p.map(|v| 3.0 * v)), 2.0), Side::Right).unwrap();
+        let upright = HandView::new(&observed(&hand, 0.0), Side::Right).unwrap();
+        let turned = HandView::new(&observed(&hand.map(|p| p.map(|v| 3.0 * v)), 2.0), Side::Right).unwrap();
         assert!(upright.numbers.iter().zip(&turned.numbers).all(|(a, b)| (a - b).abs() < 1e-4));
         for side in [Side::Left, Side::Right] {
-            let view = HandView::new(&seen(&hand, 0.0), side).unwrap();
+            let view = HandView::new(&observed(&hand, 0.0), side).unwrap();
             let back = view.hand(&view.target(&hand));
             let worst =
                 (0..N_HAND).flat_map(|j| (0..3).map(move |k| (j, k))).map(|(j, k)| (back[j][k] - hand[j][k]).abs());
@@ -136,8 +136,8 @@ mod tests {
 
     #[test]
     fn a_left_hand_equals_the_mirrored_right_hand() {
-        let right = HandView::new(&seen(&spread_hand(), 0.3), Side::Right).unwrap();
-        let mirrored = seen(&spread_hand(), 0.3).map(|p| p.map(|[x, y]| [640.0 - x, y]));
+        let right = HandView::new(&observed(&spread_hand(), 0.3), Side::Right).unwrap();
+        let mirrored = observed(&spread_hand(), 0.3).map(|p| p.map(|[x, y]| [640.0 - x, y]));
         let left = HandView::new(&mirrored, Side::Left).unwrap();
         assert!(right.numbers.iter().zip(&left.numbers).all(|(a, b)| (a - b).abs() < 1e-4));
     }

@@ -218,7 +218,7 @@ mod tests {
     }
 
     #[test]
-    fn attempts_of_ended_processes_are_removed_despite_clock_skew_and_others_stay() {
+    fn only_attempts_of_ended_processes_are_removed_despite_clock_skew() {
         let dir = tempfile::tempdir().unwrap();
         let (own, here) = (std::process::id(), machine());
         let (dead, start) = (ended_process(), started(own).unwrap());

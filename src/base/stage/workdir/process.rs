@@ -70,7 +70,7 @@ mod tests {
     }
 
     #[test]
-    fn starts_and_machines_are_known_here() {
+    fn start_times_and_host_ids_are_available() {
         let own = started(std::process::id()).unwrap();
         assert!(own >= started(1).unwrap_or(0));
         assert_eq!(machine().len(), 16);

@@ -126,7 +126,7 @@ mod tests {
         shapes(batch).iter().enumerate().map(|(i, shape)| pattern(shape, 11.0 * i as f64)).collect()
     }
 
-    fn own(v: &[Tensor], mask: Option<DropMask>) -> Result<Tensor> {
+    fn fused(v: &[Tensor], mask: Option<DropMask>) -> Result<Tensor> {
         let inputs = DecoderInputs { previous: &v[0], state: &v[1], keys: &v[2..4] };
         decode(&inputs, &DecoderWeights { gru: &v[4], weight: &v[5], bias: &v[6] }, 3, mask)
     }
@@ -153,9 +153,9 @@ mod tests {
     fn decoder_equals_the_composed_one_and_gradients_are_correct() -> Result<()> {
         for batch in [2, 9] {
             let inputs = inputs(batch)?;
-            let off = max_difference(&inputs, |v| own(v, None), composed)?;
-            let error = worst(&inputs, |v| own(v, None))?;
-            let dropped = worst(&inputs, |v| own(v, Some(DropMask::new(9, 0.5))))?;
+            let off = max_difference(&inputs, |v| fused(v, None), composed)?;
+            let error = worst(&inputs, |v| fused(v, None))?;
+            let dropped = worst(&inputs, |v| fused(v, Some(DropMask::new(9, 0.5))))?;
             assert!(off < 1e-12 && error < 1e-7 && dropped < 1e-7, "{off:e} {error:e} {dropped:e}");
         }
         Ok(())
@@ -165,17 +165,17 @@ mod tests {
     fn any_number_of_threads_gives_the_same_bits() -> Result<()> {
         let shapes = shapes(150);
         let shapes: Vec<&[usize]> = shapes.iter().map(Vec::as_slice).collect();
-        check_thread_independence(&shapes, 4, |v| own(v, Some(DropMask::new(3, 0.5))))
+        check_thread_independence(&shapes, 4, |v| fused(v, Some(DropMask::new(3, 0.5))))
     }
 
     #[test]
     fn mismatched_shapes_are_errors() -> Result<()> {
         let good = inputs(2)?;
-        assert!(own(&good, None).is_ok());
+        assert!(fused(&good, None).is_ok());
         for (which, dim) in [(1, 0), (2, 2), (4, 0), (5, 1), (6, 0)] {
             let mut v = good.clone();
             v[which] = v[which].narrow(dim, 0, 1)?;
-            assert!(own(&v, None).is_err(), "{which}");
+            assert!(fused(&v, None).is_err(), "{which}");
         }
         Ok(())
     }

@@ -52,7 +52,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn of_overlapping_boxes_the_better_is_retained() {
+    fn the_better_of_overlapping_boxes_is_retained() {
         let at = |x: f32, score: f32| from_corners([x, 0.0, x + 10.0, 10.0], score).unwrap();
         assert!((overlap(&at(0.0, 1.0), &at(5.0, 1.0)) - 1.0 / 3.0).abs() < 1e-6);
         let kept = non_max_suppression(vec![at(0.0, 0.5), at(1.0, 0.9), at(8.0, 0.7)], 0.45);
@@ -62,7 +62,7 @@ mod tests {
     }
 
     #[test]
-    fn only_persons_with_a_score_and_an_area() {
+    fn only_persons_with_a_score_and_an_area_are_returned() {
         let rows = [
             [10.0, 20.0, 30.0, 60.0, 0.8],
             [0.0; 5],

@@ -140,7 +140,7 @@ mod tests {
     }
 
     #[test]
-    fn of_two_hands_in_one_position_the_less_certain_is_a_duplicate() {
+    fn the_less_certain_of_two_hands_in_one_position_is_a_duplicate() {
         let visible_points = |left, right| visibility([left, right], &mut body());
         assert_eq!(visible_points(hand(300.0, 300.0, 0.9), hand(100.0, 300.0, 0.99)), ([Some(21); 2], [false; 2]));
         assert_eq!(
@@ -153,7 +153,7 @@ mod tests {
     }
 
     #[test]
-    fn points_behind_the_other_hand_or_outside_the_picture_are_invisible() {
+    fn points_behind_the_other_hand_or_outside_the_image_are_invisible() {
         let left = visibility([hand(130.0, 290.0, 0.96), hand(100.0, 300.0, 0.99)], &mut body()).0;
         assert!(left[0].is_some_and(|n| (12..21).contains(&n)) && left[1] == Some(21), "{left:?}");
         let visible_points = |y: f64| visibility([hand(300.0, y, 0.9), None], &mut body()).0[0];

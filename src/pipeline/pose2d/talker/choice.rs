@@ -101,7 +101,7 @@ mod tests {
     }
 
     #[test]
-    fn without_a_clear_match_nobody_is_chosen() {
+    fn without_a_clear_match_no_speaker_is_chosen() {
         let (first, second, third) = (Mouth::new(SECS, 1), Mouth::new(SECS, 2), Mouth::new(SECS, 3));
         let voice = third.voice(SECS, 0.0);
         assert_eq!(speaker_of(&voice, &[opened(&first, 0), opened(&second, 0)]), None);

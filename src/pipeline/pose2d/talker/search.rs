@@ -140,7 +140,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn people_are_associated_by_overlap_and_the_background_is_ignored() {
+    fn persons_are_associated_by_overlap_and_the_background_is_ignored() {
         let at = |x: f32, width: f32| PersonBox { x, y: 0.0, width, height: 200.0, score: 0.9 };
         let mut people = Vec::new();
         associate(&mut people, 0, &[at(0.0, 100.0), at(300.0, 80.0), at(600.0, 10.0)]);

@@ -1,4 +1,4 @@
-// The study's page in headless Chromium: opened, acted on by keys alone or by touch alone, and looked at by axe-core.
+// Opens the study's page in headless Chromium, operates it by keyboard only or by touch only, and audits it with axe-core.
 
 import { readFileSync } from "node:fs";
 import { createRequire } from "node:module";
@@ -7,36 +7,36 @@ import { join, resolve } from "node:path";
 const packages = createRequire(join(resolve(process.env.ORATOR_DRIVER ?? "target/driver"), "/"));
 const puppeteer = packages("puppeteer-core");
 
-const PATIENCE_MS = 180_000;
+const TIMEOUT_MS = 180_000;
 
 export const launch = () =>
   puppeteer.launch({
     executablePath: process.env.CHROMIUM ?? "/usr/bin/chromium",
-    protocolTimeout: 4 * PATIENCE_MS,
+    protocolTimeout: 4 * TIMEOUT_MS,
     args: ["--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage", "--no-first-run", "--mute-audio"],
   });
 
-// Blocks the storage of the page and loses the first reply to a request to begin.
+// Blocks the storage of the page and drops the first reply to a request to begin.
 function makeAdverse() {
   const blocked = () => {
     throw new DOMException("blocked", "SecurityError");
   };
   Object.defineProperty(window, "localStorage", { get: blocked });
   const { fetch } = window;
-  let isLost = false;
+  let isDropped = false;
   window.fetch = async (url, options) => {
     const reply = await fetch(url, options);
-    if (isLost || url !== "api/begin") return reply;
-    isLost = true;
-    throw new TypeError("the reply was lost");
+    if (isDropped || url !== "api/begin") return reply;
+    isDropped = true;
+    throw new TypeError("the reply was dropped");
   };
 }
 
-// A page at `url`; `touch`: acted on by touch, by keys otherwise; `adverse`: see `makeAdverse`.
+// Opens a page at `url`; `touch`: operated by touch instead of by keyboard; `adverse`: see `makeAdverse`.
 export async function open(browser, url, { width = 1280, height = 800, touch = false, scheme = "light", language = "en", adverse = false }) {
   const context = await browser.createBrowserContext();
   const page = await context.newPage();
-  page.setDefaultTimeout(PATIENCE_MS);
+  page.setDefaultTimeout(TIMEOUT_MS);
   await page.setViewport({ width, height, hasTouch: touch, isMobile: touch, deviceScaleFactor: 1 });
   await page.emulateMediaFeatures([{ name: "prefers-color-scheme", value: scheme }]);
   await page.evaluateOnNewDocument((code) => {
@@ -51,11 +51,11 @@ export async function open(browser, url, { width = 1280, height = 800, touch = f
   const origin = new URL(url).origin;
   page.on("request", (request) => {
     const address = request.url();
-    if (!address.startsWith(origin) && !address.startsWith("data:")) problems.push(`it wants ${address}`);
+    if (!address.startsWith(origin) && !address.startsWith("data:")) problems.push(`request to another origin: ${address}`);
   });
   await page.goto(url);
-  // Out of sight for some time: the focus is no longer feigned, and another page stands in front.
-  const lookAway = async (ms) => {
+  // Hides the page for some time: focus emulation is off, and another page is in front.
+  const hidePage = async (ms) => {
     await session.send("Emulation.setFocusEmulationEnabled", { enabled: false });
     const other = await context.newPage();
     await other.bringToFront();
@@ -64,33 +64,33 @@ export async function open(browser, url, { width = 1280, height = 800, touch = f
     await page.bringToFront();
     await session.send("Emulation.setFocusEmulationEnabled", { enabled: true });
   };
-  return { page, context, problems, lookAway, hands: touch ? fingers(page) : keys(page) };
+  return { page, context, problems, hidePage, input: touch ? touchInput(page) : keyboardInput(page) };
 }
 
-// Acts on an element by keys alone: the focus goes there by Tab.
-function keys(page) {
-  const reach = async (selector) => {
+// Operates elements by keyboard only, which are focused with Tab.
+function keyboardInput(page) {
+  const focus = async (selector) => {
     const target = await page.waitForSelector(selector);
     for (let presses = 0; presses < 60; presses += 1) {
       if (await target.evaluate((node) => node === document.activeElement)) return target;
       await page.keyboard.press("Tab");
     }
-    throw new Error(`the focus does not come to ${selector}`);
+    throw new Error(`Tab does not reach ${selector}`);
   };
   return {
     async press(selector) {
-      await reach(selector);
+      await focus(selector);
       await page.keyboard.press("Space");
     },
     async choose(index) {
       await page.keyboard.press(`${index + 1}`);
     },
     async type(selector, text) {
-      await reach(selector);
+      await focus(selector);
       await page.keyboard.type(text);
     },
     async slide(selector, value) {
-      await reach(selector);
+      await focus(selector);
       await page.keyboard.press("Home");
       for (let k = 0; k < Math.floor(value / 10); k += 1) await page.keyboard.press("PageUp");
       for (let k = 0; k < value % 10; k += 1) await page.keyboard.press("ArrowRight");
@@ -102,10 +102,10 @@ function keys(page) {
   };
 }
 
-// Acts on an element by touch alone.
-function fingers(page) {
-  // A finger finds a control that stands still and can be used: films that load move what is below them.
-  const isStill = (node) =>
+// Operates elements by touch only.
+function touchInput(page) {
+  // A control can be tapped if it is enabled and does not move: films that load move the elements below them.
+  const isTappable = (node) =>
     new Promise((resolve) => {
       const { x, y } = node.getBoundingClientRect();
       const wait = () => requestAnimationFrame(() => requestAnimationFrame(compare));
@@ -118,7 +118,7 @@ function fingers(page) {
   const tap = async (selector) => {
     const target = await page.waitForSelector(selector);
     do await target.scrollIntoView();
-    while (!(await target.evaluate(isStill)));
+    while (!(await target.evaluate(isTappable)));
     await target.tap();
   };
   return {
@@ -134,7 +134,7 @@ function fingers(page) {
       const box = await target.boundingBox();
       const isMirrored = await page.evaluate(() => document.documentElement.dir === "rtl");
       const share = isMirrored ? 1 - value / 100 : value / 100;
-      // The thumb's width is left out of the way of its middle.
+      // The centre of the thumb travels the width of the slider minus that of the thumb.
       await page.touchscreen.tap(box.x + 8 + share * (box.width - 16), box.y + box.height / 2);
     },
     submit: () => tap("main form button[type=submit]"),
@@ -143,14 +143,14 @@ function fingers(page) {
 
 const axe = () => readFileSync(packages.resolve("axe-core/axe.min.js"), "utf8");
 
-// What shuts people out of what is shown: serious findings of axe-core, a page that must be scrolled sideways, targets
-// that are too small for a finger.
+// Accessibility problems: serious findings of axe-core, pages that must be scrolled horizontally, targets that are too
+// small for touch.
 export async function audit(page) {
   if (!(await page.evaluate(() => "axe" in window))) await page.evaluate(axe());
   return page.evaluate(async () => {
     const { violations } = await window.axe.run(document, { resultTypes: ["violations"] });
-    const grave = violations.filter(({ impact }) => ["serious", "critical"].includes(impact));
-    const found = grave.map(({ id, nodes }) => `${id}: ${nodes.map(({ html }) => html.slice(0, 120)).join(" | ")}`);
+    const serious = violations.filter(({ impact }) => ["serious", "critical"].includes(impact));
+    const found = serious.map(({ id, nodes }) => `${id}: ${nodes.map(({ html }) => html.slice(0, 120)).join(" | ")}`);
     const { scrollWidth, clientWidth } = document.documentElement;
     if (scrollWidth > clientWidth) found.push(`${scrollWidth} px wide in a window of ${clientWidth}`);
     for (const node of document.querySelectorAll("button, select, .choices label, .agree, input:not([type=checkbox], [type=radio])")) {

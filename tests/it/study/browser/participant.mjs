@@ -1,10 +1,10 @@
-// Participants who take part in a study by a rule.
+// Simulated participants that answer a study by a rule.
 //
 //   node participant.mjs --url URL --answers FILE [--seed N] [--participants N] [--at-once N]
 //
 // FILE: {"scores": {FILM: 0 to 1}, "numbers": {FILM: NUMBER}, "certainty": 0 to 1}. The film of the higher score is
-// chosen, with the probability `certainty`; one film alone is taken for real above 0.5; sliders are set to the score.
-// An attention check is answered with the number of its film. One line of JSON a participant is printed.
+// chosen, with the probability `certainty`; a single film is judged real above 0.5; sliders are set to the score.
+// An attention check is answered with the number of its film. Prints one line of JSON per participant.
 //
 // For tests of the page: --touch, --width, --height, --scheme dark, --language CODE, --audit (axe-core at every step),
 // --pictures DIR, --reload-at POSITION, --offline-at POSITION, --away-at POSITION, --interrupt-at POSITION,
@@ -27,7 +27,7 @@ const { values: options } = parseArgs({
 const rule = { scores: {}, numbers: {}, certainty: 1, ...(options.answers ? JSON.parse(readFileSync(options.answers, "utf8")) : {}) };
 const at = (name) => (options[name] === undefined ? -1 : Number(options[name]));
 
-// Numbers from 0 to 1 that a seed fixes (mulberry32).
+// Seeded random numbers from 0 to 1 (mulberry32).
 function random(seed) {
   let state = seed >>> 0;
   return () => {
@@ -38,8 +38,8 @@ function random(seed) {
   };
 }
 
-// What the page shows.
-const look = (page) =>
+// State of the page: kind of step, films and options.
+const readView = (page) =>
   page.evaluate(() => {
     const has = (selector) => Boolean(document.querySelector(selector));
     const films = [...document.querySelectorAll("main .films video")].map((video) => video.src.match(/([0-9a-f]{16})\.mp4/)?.[1]);
@@ -55,7 +55,7 @@ const look = (page) =>
     return { kind, films, options, heading, inTurn: has(".films.stack") };
   });
 
-// What the page says and how its films stand, for who asks why it does not go on.
+// Diagnostics of a page that does not continue: its texts and the state of its films.
 const describe = (page) =>
   page.evaluate(() => {
     const { hidden, activeElement } = document;
@@ -63,26 +63,26 @@ const describe = (page) =>
       const { readyState, networkState, paused, ended, seeking, currentTime, duration, playbackRate } = video;
       return { readyState, networkState, paused, ended, seeking, currentTime, duration, playbackRate, error: video.error?.message };
     });
-    const words = (selector) => [...document.querySelectorAll(selector)].map((node) => node.textContent);
-    return { hidden, focus: activeElement?.outerHTML.slice(0, 120), status: words("#status"), buttons: words("main button"), films };
+    const texts = (selector) => [...document.querySelectorAll(selector)].map((node) => node.textContent);
+    return { hidden, focus: activeElement?.outerHTML.slice(0, 120), status: texts("#status"), buttons: texts("main button"), films };
   });
 
 // Index of the option that the rule chooses.
-function chosen({ films, options: values }, draw) {
-  const follows = draw() < rule.certainty;
+function chooseOption({ films, options: values }, draw) {
+  const followsRule = draw() < rule.certainty;
   const scores = films.map((film) => rule.scores[film] ?? 0.5);
-  if (films.length === 1) return (scores[0] > 0.5) === follows ? 0 : 1;
-  const lead = (scores[1] - scores[0]) * (follows ? 1 : -1);
-  if (values.length === 2) return lead === 0 ? Math.floor(2 * draw()) : Number(lead > 0);
-  return Math.max(0, Math.min(4, 2 + Math.sign(lead) * Math.ceil(2 * Math.abs(lead))));
+  if (films.length === 1) return (scores[0] > 0.5) === followsRule ? 0 : 1;
+  const difference = (scores[1] - scores[0]) * (followsRule ? 1 : -1);
+  if (values.length === 2) return difference === 0 ? Math.floor(2 * draw()) : Number(difference > 0);
+  return Math.max(0, Math.min(4, 2 + Math.sign(difference) * Math.ceil(2 * Math.abs(difference))));
 }
 
 async function participate(browser, seed) {
   const draw = random(seed);
   const { width, height, touch, scheme, language } = options;
   const size = { width: width ? Number(width) : undefined, height: height ? Number(height) : undefined };
-  const { page, context, problems, lookAway, hands } = await open(browser, options.url, { ...size, touch, scheme, language });
-  const report = { seed, steps: [], findings: [], apart_ms: [], trials: 0, answers: [], code: null, problems };
+  const { page, context, problems, hidePage, input } = await open(browser, options.url, { ...size, touch, scheme, language });
+  const report = { seed, steps: [], findings: [], offsets_ms: [], trials: 0, answers: [], code: null, problems };
   page.on("request", (request) => request.url().endsWith("/api/answer") && report.answers.push(JSON.parse(request.postData())));
   let position = 0;
   let hasReloaded = false;
@@ -96,79 +96,79 @@ async function participate(browser, seed) {
     if (options.audit) report.findings.push(...(await audit(page)).map((finding) => `${name}: ${finding}`));
   };
   const isOpen = (selector) => page.waitForSelector(`${selector}:not(:disabled)`);
-  // Waits until another step is shown, with what `shown` names in it.
-  const leave = async (act, shown = "main .main") => {
+  // Performs `act` and waits for another step that contains `selector`.
+  const nextStep = async (act, selector = "main .main") => {
     await page.evaluate(() => (document.querySelector("h1").dataset.isOld = "yes"));
     await act();
-    const isNew = (selector) => document.querySelector("h1")?.dataset.isOld !== "yes" && document.querySelector(selector);
-    await page.waitForFunction(isNew, {}, shown);
+    const isNew = (wanted) => document.querySelector("h1")?.dataset.isOld !== "yes" && document.querySelector(wanted);
+    await page.waitForFunction(isNew, {}, selector);
   };
-  // The mute film is stopped by the browser as it begins.
+  // Rejects the first play of the muted film, as a browser does that stops it.
   const interrupt = () =>
     page.evaluate(() => {
-      const mute = document.querySelectorAll("main video")[1];
-      mute.play = () => {
-        delete mute.play;
+      const muted = document.querySelectorAll("main video")[1];
+      muted.play = () => {
+        delete muted.play;
         return Promise.reject(new DOMException("stopped", "AbortError"));
       };
     });
-  const seeTogether = async () => {
+  const watchTogether = async () => {
     if (position === at("interrupt-at")) await interrupt();
-    await hands.press("main form button[type=button]");
+    await input.press("main form button[type=button]");
     if (position === at("away-at")) {
       await page.waitForFunction(() => document.querySelector("video").currentTime > 0);
-      await lookAway(1000);
+      await hidePage(1000);
     }
     await isOpen("main form fieldset");
     const { startOffsetMs, maxOffsetMs } = await page.$eval(".films", (stage) => ({ ...stage.dataset }));
-    report.apart_ms.push([Number(startOffsetMs), Number(maxOffsetMs)]);
+    report.offsets_ms.push([Number(startOffsetMs), Number(maxOffsetMs)]);
   };
-  const seeInTurn = async (n, after) => {
+  const watchInTurn = async (n, after) => {
     for (let k = 0; k < n; k += 1) {
-      await hands.press(`.score:nth-child(${k + 1}) button`);
+      await input.press(`.score:nth-child(${k + 1}) button`);
       await page.waitForSelector(`.score:nth-child(${k + 1}) button[data-seen]`);
       await after(k);
     }
   };
   const answer = async (view) => {
     if (position === at("withdraw-at")) {
-      await hands.press("#footer button");
+      await input.press("#footer button");
       await page.waitForSelector("dialog[open]");
       await step("withdrawal");
-      await leave(() => hands.press("dialog button:last-child"), "main .text");
+      await nextStep(() => input.press("dialog button:last-child"), "main .text");
       await step("withdrawn");
       return false;
     }
     if (position === at("reload-at") && !hasReloaded) {
       hasReloaded = true;
-      await hands.press("main form button[type=button]");
+      await input.press("main form button[type=button]");
       await page.waitForFunction(() => document.querySelector("video").currentTime > 0.3);
       await page.reload();
       await page.waitForSelector("main .main");
       await step("resumed");
-      await leave(() => hands.press("main .main"));
+      await nextStep(() => input.press("main .main"));
       return true;
     }
     if (view.kind === "sliders") {
-      await seeInTurn(view.films.length, async (k) => {
+      await watchInTurn(view.films.length, async (k) => {
         const score = Math.round(100 * (rule.scores[view.films[k]] ?? draw()));
-        const input = `.score:nth-child(${k + 1}) input`;
+        const slider = `.score:nth-child(${k + 1}) input`;
         await isOpen(`.score:nth-child(${k + 1}) fieldset`);
-        await hands.slide(input, score);
+        await input.slide(slider, score);
       });
-    } else if (view.inTurn) await seeInTurn(view.films.length, async () => {});
-    else await seeTogether();
-    if (view.kind === "choice") await hands.choose(chosen(view, draw));
-    if (view.kind === "check") await hands.type("#number", `${view.films.map((film) => rule.numbers[film]).find(Boolean) ?? 11}`);
+    } else if (view.inTurn) await watchInTurn(view.films.length, async () => {});
+    else await watchTogether();
+    if (view.kind === "choice") await input.choose(chooseOption(view, draw));
+    if (view.kind === "check") await input.type("#number", `${view.films.map((film) => rule.numbers[film]).find(Boolean) ?? 11}`);
     await step(`${view.kind}-answered`);
-    await leave(async () => {
+    await nextStep(async () => {
       if (position === at("offline-at")) {
         await page.setOfflineMode(true);
-        await hands.submit();
+        await input.submit();
         await page.waitForFunction(() => /[1-9]/.test(document.querySelector("#status").textContent));
         await step("offline");
         await page.setOfflineMode(false);
-      } else await hands.submit();
+      } else await input.submit();
     });
     position += 1;
     report.trials += 1;
@@ -177,21 +177,21 @@ async function participate(browser, seed) {
   const session = async () => {
     await page.waitForSelector("main .main");
     for (;;) {
-      const view = await look(page);
+      const view = await readView(page);
       await step(view.kind);
       if (view.kind === "consent") {
-        await hands.press("#agree");
+        await input.press("#agree");
         await isOpen("main .main");
-        await leave(() => hands.press("main .main"));
+        await nextStep(() => input.press("main .main"));
       } else if (view.kind === "sound") {
-        await hands.press("main button[type=button]");
+        await input.press("main button[type=button]");
         await isOpen("main fieldset");
-        await hands.type("#tones", "3");
-        await leave(() => hands.submit());
+        await input.type("#tones", "3");
+        await nextStep(() => input.submit());
       } else if (view.kind === "end") {
         report.code = await page.$eval("#code", (input) => input.value);
         break;
-      } else if (view.kind === "text") await leave(() => hands.press("main .main"));
+      } else if (view.kind === "text") await nextStep(() => input.press("main .main"));
       else if (!(await answer(view))) break;
     }
   };
@@ -207,11 +207,11 @@ async function participate(browser, seed) {
 const browser = await launch();
 try {
   const seed = Number(options.seed ?? 1);
-  const waiting = Array.from({ length: Number(options.participants ?? 1) }, (_, k) => seed + k);
-  const line = async () => {
-    for (let next = waiting.shift(); next !== undefined; next = waiting.shift()) console.log(JSON.stringify(await participate(browser, next)));
+  const seeds = Array.from({ length: Number(options.participants ?? 1) }, (_, k) => seed + k);
+  const worker = async () => {
+    for (let next = seeds.shift(); next !== undefined; next = seeds.shift()) console.log(JSON.stringify(await participate(browser, next)));
   };
-  await Promise.all(Array.from({ length: Number(options["at-once"] ?? 1) }, line));
+  await Promise.all(Array.from({ length: Number(options["at-once"] ?? 1) }, worker));
 } finally {
   await browser.close();
 }

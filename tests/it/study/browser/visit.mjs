@@ -1,9 +1,9 @@
-// A visitor who agrees, reads the instructions and begins, then loads the page again. Prints a line of JSON: the
-// headings after both, the number of requests to begin, and the fragment that the address still has.
+// A visitor who consents, reads the instructions, begins, and then reloads the page. Prints one line of JSON: the headings
+// after both, the number of requests to begin, and the fragment of the address.
 //
 //   node visit.mjs --url URL [--adverse]
 //
-// --adverse: the browser stores nothing, and the first reply to a request to begin is lost.
+// --adverse: the browser has no storage, and the first reply to a request to begin is dropped.
 
 import { parseArgs } from "node:util";
 import { launch, open } from "./page.mjs";
@@ -11,21 +11,21 @@ import { launch, open } from "./page.mjs";
 const { values: options } = parseArgs({ options: { url: { type: "string" }, adverse: { type: "boolean" } } });
 const browser = await launch();
 try {
-  const { page, hands } = await open(browser, options.url, { adverse: options.adverse });
+  const { page, input } = await open(browser, options.url, { adverse: options.adverse });
   let begins = 0;
   page.on("request", (request) => (begins += request.url().endsWith("/api/begin") ? 1 : 0));
   const heading = () => page.$eval("h1", (h1) => h1.textContent);
-  const leave = async () => {
+  const nextStep = async () => {
     await page.evaluate(() => (document.querySelector("h1").dataset.isOld = "yes"));
-    await hands.press("main .main");
+    await input.press("main .main");
     await page.waitForFunction(() => document.querySelector("h1").dataset.isOld !== "yes");
   };
   await page.waitForSelector("main .main");
   if (await page.$("#agree")) {
-    await hands.press("#agree");
+    await input.press("#agree");
     await page.waitForSelector("main .main:not(:disabled)");
-    await leave();
-    await leave();
+    await nextStep();
+    await nextStep();
   }
   const headings = [await heading()];
   await page.reload();

@@ -1,5 +1,5 @@
-//! A training that begins with another speaker's model: weights of the one, normalisation and skeleton of the other, and the
-//! videos of both in the list.
+//! A training initialised from another speaker's model starts with its weights, uses its own normalisation and
+//! skeleton, and lists the videos of both.
 
 use crate::fixtures::faults::stop::{Shared, Stop, bytes};
 use crate::fixtures::gesture_dataset::{FPS, sample};
@@ -30,7 +30,7 @@ fn settings() -> GanConfig {
 }
 
 #[test]
-fn it_takes_the_weights_and_keeps_its_own_body() {
+fn weights_are_initialised_and_the_skeleton_is_its_own() {
     let folder = tempfile::tempdir().unwrap();
     let dir = folder.path();
     let (anna, ben) = (speaker(dir, "anna", 0.0), speaker(dir, "ben", 1.5));
@@ -40,8 +40,8 @@ fn it_takes_the_weights_and_keeps_its_own_body() {
     let ignore = &mut |_: ValidatedStep| ();
     let of_ben = dir.join("ben-gan");
     train_with_callback(&[&ben], &settings(), Some(&of_anna), &of_ben, &Shared(stop.clone()), ignore).unwrap();
-    let said = stop.said.lock().unwrap().join("\n");
-    assert!(said.contains("initialising from ") && said.contains("(trained on anna)"), "{said}");
+    let log = stop.said.lock().unwrap().join("\n");
+    assert!(log.contains("initialising from ") && log.contains("(trained on anna)"), "{log}");
 
     let model = GestureGenerator::open(&of_ben).unwrap().metadata;
     assert_eq!(model.name, "ben");
@@ -53,13 +53,13 @@ fn it_takes_the_weights_and_keeps_its_own_body() {
     let speakers: Vec<&str> = model.videos.iter().map(|video| video.speaker.as_str()).collect();
     assert!(speakers.contains(&"anna") && speakers.contains(&"ben"), "{speakers:?}");
     let weights = |out: &Path| std::fs::read(checkpoint::path(out, 3)).unwrap();
-    assert!(weights(&of_ben) != weights(&alone), "the weights had no say");
+    assert!(weights(&of_ben) != weights(&alone), "the initial weights had no effect");
 
-    // One that goes on has begun, and ends with the same bytes.
+    // A resumed training needs no initial model, and ends with identical bytes.
     let parts = dir.join("ben-parts");
     let half = GanConfig { warmup_steps: 0.into(), final_lr_ratio: 1.0.into(), ..settings() };
-    let whole = dir.join("ben-whole");
-    train_with_callback(&[&ben], &half, Some(&of_anna), &whole, &Silent, ignore).unwrap();
+    let uninterrupted = dir.join("ben-whole");
+    train_with_callback(&[&ben], &half, Some(&of_anna), &uninterrupted, &Silent, ignore).unwrap();
     train_with_callback(
         &[&ben],
         &GanConfig { steps: 3.into(), ..half.clone() },
@@ -71,12 +71,12 @@ fn it_takes_the_weights_and_keeps_its_own_body() {
     .unwrap();
     train_with_callback(&[&ben], &half, None, &parts, &Silent, ignore).unwrap();
     let last = |out: &Path| std::fs::read(checkpoint::path(out, 6)).unwrap();
-    assert!(last(&whole) == last(&parts));
-    assert!(bytes(&whole).iter().any(|(name, _)| name == BEST));
+    assert!(last(&uninterrupted) == last(&parts));
+    assert!(bytes(&uninterrupted).iter().any(|(name, _)| name == BEST));
 }
 
 #[test]
-fn what_cannot_be_begun_with_is_named() {
+fn unsuitable_initial_models_are_named() {
     let folder = tempfile::tempdir().unwrap();
     let dir = folder.path();
     let (anna, ben) = (speaker(dir, "anna", 0.0), speaker(dir, "ben", 1.5));

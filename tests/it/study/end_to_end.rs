@@ -1,4 +1,4 @@
-//! `make demo-study` in small: built, served, answered in Chromium by participants with a known preference, analysed.
+//! A small `make demo-study`: a study is built, served, answered in Chromium with a known preference, and analysed.
 
 use crate::fixtures::study::films::speaker;
 use orator_test_support::skip::{browser_driver, skip};
@@ -7,7 +7,7 @@ use std::fs;
 use std::path::Path;
 use std::process::Command;
 
-/// Short films, few of them: side by side, once by choice and once by preference.
+/// Study with few short films shown side by side, once for a choice and once for a preference.
 const STUDY: &str = r#"
 title = "Small"
 participants = 3
@@ -47,7 +47,7 @@ fn analysis(dir: &Path) -> Value {
 }
 
 #[test]
-fn a_study_of_scripted_participants_finds_their_preference() {
+fn the_analysis_finds_the_preference_of_scripted_participants() {
     let Some(driver) = browser_driver() else { return };
     if !Path::new("/usr/bin/chromium").exists() {
         return skip("no browser is installed (package chromium)");
@@ -61,13 +61,13 @@ fn a_study_of_scripted_participants_finds_their_preference() {
     let mut script = Command::new(Path::new(env!("CARGO_MANIFEST_DIR")).join(".ci/demo-study"));
     script.arg(dir).arg("3").env("ORATOR", env!("CARGO_BIN_EXE_orator")).env("ORATOR_DRIVER", driver);
     let output = script.env("CERTAINTY", "1").env("AT_ONCE", "3").output().unwrap();
-    let [said, failed] = [&output.stdout, &output.stderr].map(|text| String::from_utf8_lossy(text).into_owned());
-    assert!(output.status.success(), "{said}\n{failed}");
-    assert!(said.contains("the analysis finds the preference"), "{said}");
+    let [printed, errors] = [&output.stdout, &output.stderr].map(|text| String::from_utf8_lossy(text).into_owned());
+    assert!(output.status.success(), "{printed}\n{errors}");
+    assert!(printed.contains("the analysis finds the preference"), "{printed}");
     let page = fs::read_to_string(dir.join("analysis.html")).unwrap();
     assert!(page.contains("real-or-generated") && page.contains("Registered hypotheses"));
 
-    // What was sealed counts as registered, and nothing where a sealed file was changed.
+    // Sealed hypotheses count as registered, unless a sealed file was changed.
     let registered = analysis(dir);
     let seal: Value = serde_json::from_slice(&fs::read(dir.join("study/seal.json")).unwrap()).unwrap();
     assert_eq!(registered["seal"], seal["seal"]);

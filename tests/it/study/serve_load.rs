@@ -1,5 +1,5 @@
-//! `orator study serve` with many participants at once: killed in the middle of it, and under load, no acknowledged
-//! answer is lost and none stands twice. `ORATOR_KILLS` says how often it is killed (50 if it does not).
+//! `orator study serve` with many concurrent participants: killed repeatedly and under load, it loses and duplicates no
+//! acknowledged answer. `ORATOR_KILLS` sets the number of kills (default: 50).
 
 use crate::fixtures::served_study::{Client, MadeStudy, fitting};
 use serde_json::Value;
@@ -8,10 +8,10 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-/// Name at the recruiting site, place from 1 and response of an answer.
+/// Responses by recruiting id and number of the trial, from 1.
 type Answers = BTreeMap<(String, u64), Value>;
 
-/// Answers as exported; panics where one stands twice.
+/// Exported answers; panics on a duplicate.
 fn stored(study: &MadeStudy) -> Answers {
     let names = study.exported("participants").into_iter();
     let names: BTreeMap<String, String> = names
@@ -19,15 +19,15 @@ fn stored(study: &MadeStudy) -> Answers {
         .collect();
     let mut answers = Answers::new();
     for vote in study.exported("votes") {
-        let who = names[vote["participant"].as_str().unwrap()].clone();
-        let twice = answers.insert((who, vote["trial"].as_u64().unwrap()), vote["response"].clone());
-        assert!(twice.is_none(), "an answer stands twice: {vote}");
+        let participant = names[vote["participant"].as_str().unwrap()].clone();
+        let former = answers.insert((participant, vote["trial"].as_u64().unwrap()), vote["response"].clone());
+        assert!(former.is_none(), "duplicate answer: {vote}");
     }
     answers
 }
 
 #[test]
-fn killed_in_the_middle_the_server_keeps_every_acknowledged_answer() {
+fn a_killed_server_loses_no_acknowledged_answer() {
     const TRIALS: usize = 12;
     let n_kills: u32 = std::env::var("ORATOR_KILLS").ok().and_then(|n| n.parse().ok()).unwrap_or(50);
     let study = MadeStudy::new(3000, 3000, TRIALS, 5);
@@ -40,22 +40,22 @@ fn killed_in_the_middle_the_server_keeps_every_acknowledged_answer() {
             scope.spawn(move || {
                 for session in 0.. {
                     let (mut client, pid) = (Client::new(), format!("t{thread}s{session}"));
-                    let here = || address.lock().unwrap().clone();
-                    let begun = client.begin(&here(), &pid).filter(|(status, _)| *status == 200);
-                    let mut position = if begun.is_some() { 0 } else { TRIALS };
+                    let current = || address.lock().unwrap().clone();
+                    let session_reply = client.begin(&current(), &pid).filter(|(status, _)| *status == 200);
+                    let mut position = if session_reply.is_some() { 0 } else { TRIALS };
                     while position < TRIALS && !is_over.load(Ordering::Relaxed) {
                         let response = fitting(position, (thread + session + position) % 2 == 0);
-                        match client.answer(&here(), position, &response) {
+                        match client.answer(&current(), position, &response) {
                             Some((200, _)) => {
                                 position += 1;
                                 acknowledged.lock().unwrap().insert((pid.clone(), position as u64), response);
                             }
-                            Some((status, said)) => assert!([429, 503].contains(&status), "{status} {said}"),
-                            // Killed; the same answer is sent again to its successor.
+                            Some((status, reply)) => assert!([429, 503].contains(&status), "{status} {reply}"),
+                            // The server was killed; the answer is sent again to the next one.
                             None => std::thread::sleep(Duration::from_millis(5)),
                         }
                     }
-                    if begun.is_none() {
+                    if session_reply.is_none() {
                         std::thread::sleep(Duration::from_millis(5));
                     }
                     if is_over.load(Ordering::Relaxed) {
@@ -78,41 +78,44 @@ fn killed_in_the_middle_the_server_keeps_every_acknowledged_answer() {
     for (answer, response) in &acknowledged {
         assert_eq!(stored.get(answer), Some(response), "{answer:?} was acknowledged");
     }
-    assert!(acknowledged.len() > 8 * TRIALS, "{} answers are too few to tell", acknowledged.len());
+    assert!(acknowledged.len() > 8 * TRIALS, "only {} answers were acknowledged", acknowledged.len());
     eprintln!("{n_kills} kills; {} answers acknowledged, {} stored", acknowledged.len(), stored.len());
 }
 
 #[test]
-fn two_hundred_at_once_lose_and_double_nothing() {
-    const CROWD: usize = 200;
+fn two_hundred_concurrent_participants_lose_and_duplicate_no_answer() {
+    const N_PARTICIPANTS: usize = 200;
     const TRIALS: usize = 10;
-    let study = MadeStudy::new(CROWD, CROWD, TRIALS, 5);
+    let study = MadeStudy::new(N_PARTICIPANTS, N_PARTICIPANTS, TRIALS, 5);
     let served = study.serve(&[]);
     let times = Mutex::new(Vec::new());
     std::thread::scope(|scope| {
-        for who in 0..CROWD {
+        for participant in 0..N_PARTICIPANTS {
             let (address, times) = (&served.address, &times);
             scope.spawn(move || {
                 let mut client = Client::new();
-                assert_eq!(client.begin(address, &format!("p{who}")).unwrap().0, 200);
+                assert_eq!(client.begin(address, &format!("p{participant}")).unwrap().0, 200);
                 for position in 0..TRIALS {
-                    let begun = Instant::now();
-                    assert_eq!(client.answer(address, position, &fitting(position, who % 3 == 0)).unwrap().0, 200);
-                    times.lock().unwrap().push(begun.elapsed());
+                    let started = Instant::now();
+                    assert_eq!(
+                        client.answer(address, position, &fitting(position, participant % 3 == 0)).unwrap().0,
+                        200
+                    );
+                    times.lock().unwrap().push(started.elapsed());
                 }
             });
         }
     });
     let stored = stored(&study);
-    assert_eq!(stored.len(), CROWD * TRIALS);
-    for ((who, trial), response) in &stored {
-        let who: usize = who[1..].parse().unwrap();
-        assert_eq!(*response, fitting(*trial as usize - 1, who.is_multiple_of(3)));
+    assert_eq!(stored.len(), N_PARTICIPANTS * TRIALS);
+    for ((id, trial), response) in &stored {
+        let participant: usize = id[1..].parse().unwrap();
+        assert_eq!(*response, fitting(*trial as usize - 1, participant.is_multiple_of(3)));
     }
     let mut times = times.into_inner().unwrap();
     times.sort();
     eprintln!(
-        "{} answers of {CROWD} at once: median {:?}, 99 % within {:?}",
+        "{} answers of {N_PARTICIPANTS} participants at once: median {:?}, 99 % within {:?}",
         times.len(),
         times[times.len() / 2],
         times[times.len() * 99 / 100]

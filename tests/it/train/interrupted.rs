@@ -1,6 +1,6 @@
-//! A training that is watched and stopped: Ctrl-C and SIGTERM end it after the step at hand with a checkpoint from which it
-//! ends in the bytes of one that was left alone; in a pipe it says how far it is; its page lies there from the first
-//! validation on; a dataset alone is enough, and one without windows is told why.
+//! Interrupted trainings: Ctrl-C and SIGTERM end a training after the current step with a checkpoint from which it
+//! resumes to identical bytes; progress is printed to pipes; the training page exists from the first validation on; a
+//! dataset alone is enough, and the error of one without windows gives the reason.
 
 use crate::fixtures::gesture_dataset::{FPS, sample};
 use crate::fixtures::write_dataset::write_dataset;
@@ -13,20 +13,20 @@ use std::io::{BufRead, BufReader, Read};
 use std::path::Path;
 use std::process::{Command, Stdio};
 
-/// Steps of a network's training: enough for a signal to find it at work.
+/// Training steps of a network, enough for a signal to arrive during training.
 fn steps(network: &str) -> usize {
     if network == "gan" { 20 } else { 200 }
 }
 
-fn anna(dir: &Path, samples: &[(Split, Sample)]) {
+fn write_anna(dir: &Path, samples: &[(Split, Sample)]) {
     write_dataset(&dir.join("data/anna"), "anna", FPS, samples).unwrap();
 }
 
-fn enough() -> [(Split, Sample); 2] {
+fn sufficient_samples() -> [(Split, Sample); 2] {
     [(Split::Train, sample("a-00000000-000000", 99, 0.0)), (Split::Validation, sample("c-00000000-000000", 128, 4.0))]
 }
 
-/// `orator train NETWORK` of a dataset alone, in a folder without a configuration.
+/// `orator train NETWORK` with a dataset only, in a folder without a configuration.
 fn train(dir: &Path, network: &str, out: &str) -> Command {
     let small = match network {
         "gan" => "--set gan.batch=2 --set gan.window_frames=32 --set gan.epoch_steps=6",
@@ -41,38 +41,39 @@ fn train(dir: &Path, network: &str, out: &str) -> Command {
     command
 }
 
-/// Starts a training and sends it a signal when it says a line that begins so: exit code, answer, and what was said.
-fn signalled(mut training: Command, line_of_step: &str, signal: Signal) -> (Option<i32>, Value, String) {
+/// Starts a training, signals it at the first line with `prefix`, and returns exit code, answer and progress lines.
+fn signalled(mut training: Command, prefix: &str, signal: Signal) -> (Option<i32>, Value, String) {
     let mut child = training.spawn().unwrap();
-    let mut said = String::new();
+    let mut text = String::new();
     let mut lines = BufReader::new(child.stderr.take().unwrap());
-    while lines.read_line(&mut said).unwrap() > 0 {
-        if said.lines().last().is_some_and(|line| line.starts_with(line_of_step)) {
+    while lines.read_line(&mut text).unwrap() > 0 {
+        if text.lines().last().is_some_and(|line| line.starts_with(prefix)) {
             kill_process(Pid::from_child(&child), signal).unwrap();
             break;
         }
     }
-    lines.read_to_string(&mut said).unwrap();
+    lines.read_to_string(&mut text).unwrap();
     let output = child.wait_with_output().unwrap();
-    (output.status.code(), serde_json::from_slice(&output.stdout).unwrap(), said)
+    (output.status.code(), serde_json::from_slice(&output.stdout).unwrap(), text)
 }
 
-fn stopped_twice(network: &str) {
+fn assert_stops_twice(network: &str) {
     let folder = tempfile::tempdir().unwrap();
     let dir = folder.path();
-    anna(dir, &enough());
-    // A dataset alone: the checkpoints go to the folder of its speaker.
-    let out_of_calm = format!("work/{network}/anna");
-    let calm = train(dir, network, "").output().unwrap();
-    let said = String::from_utf8(calm.stderr).unwrap();
-    assert!(calm.status.success(), "{said}");
+    write_anna(dir, &sufficient_samples());
+    // With a dataset only, checkpoints are saved in the folder of its speaker.
+    let uninterrupted_out = format!("work/{network}/anna");
+    let uninterrupted = train(dir, network, "").output().unwrap();
+    let text = String::from_utf8(uninterrupted.stderr).unwrap();
+    assert!(uninterrupted.status.success(), "{text}");
     assert!(
-        said.lines().any(|line| line.contains(" of data/anna; writing checkpoints") && line.ends_with(&out_of_calm))
+        text.lines()
+            .any(|line| line.contains(" of data/anna; writing checkpoints") && line.ends_with(&uninterrupted_out))
     );
-    // Twenty lines of a training, however short, and none on standard output.
-    let lines = said.lines().filter(|line| line.starts_with("step ") && line.ends_with(" left"));
-    assert_eq!(lines.count(), 20, "{said}");
-    assert_eq!(String::from_utf8(calm.stdout).unwrap().lines().count(), 1);
+    // A training of any length prints twenty lines, none of them on standard output.
+    let lines = text.lines().filter(|line| line.starts_with("step ") && line.ends_with(" left"));
+    assert_eq!(lines.count(), 20, "{text}");
+    assert_eq!(String::from_utf8(uninterrupted.stdout).unwrap().lines().count(), 1);
 
     let n_steps = steps(network);
     let line = |twentieth: usize| format!("step {} of {n_steps}: ", n_steps * twentieth / 20);
@@ -92,43 +93,43 @@ fn stopped_twice(network: &str) {
     let (code, answer, second) = signalled(train(dir, network, "stopped"), &line(12), Signal::TERM);
     assert_eq!(code, Some(143), "{second}");
     assert!(answer["step"].as_u64().unwrap() > step && second.contains("resuming from"), "{answer} {second}");
-    // An epoch is over: its validation was said, and the page is there before the training ends.
-    let said = first + &second;
+    // After an epoch its validation was printed, and the page exists before the training ends.
+    let text = first + &second;
     let validation = format!("step {}: validation L1 ", n_steps * 6 / 20);
-    assert!(said.contains(&validation) && said.contains(", score ") && answer["best_step"].is_u64(), "{said}");
+    assert!(text.contains(&validation) && text.contains(", score ") && answer["best_step"].is_u64(), "{text}");
     assert!(dir.join("stopped/training.html").is_file());
 
     assert!(train(dir, network, "stopped").output().unwrap().status.success());
     let last = format!("step-{n_steps:07}.safetensors");
     for file in [&last, "best.safetensors", "metrics.jsonl", "training.html"] {
         let read = |out: &str| std::fs::read(dir.join(out).join(file)).unwrap();
-        assert!(read("stopped") == read(&out_of_calm), "{network}: {file} differs");
+        assert!(read("stopped") == read(&uninterrupted_out), "{network}: {file} differs");
     }
 }
 
 #[test]
-fn a_stopped_gan_goes_on_to_the_same_bytes() {
-    stopped_twice("gan");
+fn a_stopped_gan_training_resumes_to_identical_bytes() {
+    assert_stops_twice("gan");
 }
 
 #[test]
-fn a_stopped_sequence_network_goes_on_to_the_same_bytes() {
-    stopped_twice("seq2seq");
+fn a_stopped_seq2seq_training_resumes_to_identical_bytes() {
+    assert_stops_twice("seq2seq");
 }
 
 #[test]
-fn a_dataset_without_windows_is_told_why_and_what_mends_it() {
+fn a_dataset_without_windows_is_an_error_with_reason_and_remedy() {
     let folder = tempfile::tempdir().unwrap();
     let dir = folder.path();
-    let refused = |network: &str| {
+    let error_of = |network: &str| {
         let output = train(dir, network, "out").output().unwrap();
         assert_eq!(output.status.code(), Some(1));
         String::from_utf8(output.stderr).unwrap()
     };
     let held_out = |n_frames| (Split::Validation, sample("c-00000000-000000", n_frames, 4.0));
-    anna(dir, &[held_out(64)]);
+    write_anna(dir, &[held_out(64)]);
     for network in ["gan", "seq2seq"] {
-        let text = refused(network);
+        let text = error_of(network);
         assert!(
             text.contains("the train split is empty (validation has 1 interval, 4.3 s, test has 0 intervals"),
             "{text}"
@@ -136,24 +137,24 @@ fn a_dataset_without_windows_is_told_why_and_what_mends_it() {
         assert!(text.contains("import it again with other shares"), "{text}");
     }
     std::fs::remove_dir_all(dir.join("data")).unwrap();
-    anna(dir, &[(Split::Train, sample("a-00000000-000000", 20, 0.0)), held_out(64)]);
+    write_anna(dir, &[(Split::Train, sample("a-00000000-000000", 20, 0.0)), held_out(64)]);
     for (network, name, frames) in [("gan", "window", 32), ("seq2seq", "segment", 23)] {
-        let text = refused(network);
+        let text = error_of(network);
         let expected =
             format!("the only interval of the train split has 20 frames (1.3 s), but a {name} needs {frames} frames");
         assert!(text.contains(&expected) && text.contains("add footage with longer speech"), "{text}");
     }
     std::fs::remove_dir_all(dir.join("data")).unwrap();
-    anna(dir, &[(Split::Train, sample("a-00000000-000000", 50, 0.0)), held_out(64)]);
+    write_anna(dir, &[(Split::Train, sample("a-00000000-000000", 50, 0.0)), held_out(64)]);
     let output = train(dir, "gan", "out").args(["--set", "gan.window_frames=64"]).output().unwrap();
     let text = String::from_utf8(output.stderr).unwrap();
     assert!(text.contains("use `--set gan.window_frames=32` for shorter ones"), "{text}");
 }
 
 #[test]
-fn a_sequence_network_without_a_held_out_split_says_why() {
+fn seq2seq_without_a_held_out_split_reports_the_reason() {
     let folder = tempfile::tempdir().unwrap();
-    anna(folder.path(), &[(Split::Train, sample("a-00000000-000000", 99, 0.0))]);
+    write_anna(folder.path(), &[(Split::Train, sample("a-00000000-000000", 99, 0.0))]);
     let dataset = Dataset::open(folder.path().join("data/anna")).unwrap();
     let needed = orator_gesture::train::no_window::NeededFrames { name: "window", n_frames: 64, key: None };
     let cause = orator_gesture::train::no_window::cause(&dataset, Split::Validation, needed).unwrap();
@@ -163,7 +164,7 @@ fn a_sequence_network_without_a_held_out_split_says_why() {
     );
     let settings = orator_dataset::config::Seq2seqConfig { steps: 0, batch: 3, hidden: 8, ..Default::default() };
     let out = folder.path().join("out");
-    let ended =
+    let result =
         orator_gesture::train::seq2seq::train::train(TrainingSource::Dataset(&dataset), None, &settings, &out, &Silent);
-    assert!(format!("{:#}", ended.unwrap_err()).contains("nothing to train"));
+    assert!(format!("{:#}", result.unwrap_err()).contains("nothing to train"));
 }

@@ -1,4 +1,4 @@
-//! Programs side by side, and killed between any two renames: nothing is lost, nothing forgotten comes back.
+//! Concurrent processes, and processes killed between any two renames: no data is lost and no forgotten data returns.
 
 use crate::fixtures::figures::swinging;
 use crate::fixtures::gesture_dataset::{FPS, sample};
@@ -26,7 +26,7 @@ fn orator(dir: &Path, args: &str) -> Command {
     command
 }
 
-fn ended(command: &mut Command) -> (i32, String) {
+fn finish(command: &mut Command) -> (i32, String) {
     let Output { status, stdout, stderr } = command.output().unwrap();
     let text = String::from_utf8_lossy(&stdout) + String::from_utf8_lossy(&stderr);
     (status.code().unwrap_or(-1), text.into_owned())
@@ -48,60 +48,63 @@ fn bytes_under(folder: &Path) -> BTreeMap<String, Vec<u8>> {
 }
 
 #[test]
-fn a_video_is_not_forgotten_while_it_is_trained_on() {
+fn forget_fails_while_a_training_uses_the_video() {
     let folder = tempfile::tempdir().unwrap();
     let dir = folder.path();
     project(dir);
     let before = bytes_under(&dir.join("work/dataset/host"));
     let mut training =
         orator(dir, "train gan --steps 100000").stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
-    let begun = Instant::now();
+    let started = Instant::now();
     while !dir.join("work/gan/host/best.safetensors").exists() {
-        assert!(begun.elapsed() < Duration::from_secs(300) && training.try_wait().unwrap().is_none());
+        assert!(started.elapsed() < Duration::from_secs(300) && training.try_wait().unwrap().is_none());
         std::thread::sleep(Duration::from_millis(20));
     }
-    let (code, said) = ended(&mut orator(dir, FORGET));
-    assert_eq!(code, 1, "{said}");
-    let who = format!("is in use by `orator train gan` (process {})", training.id());
-    assert!(said.contains("nothing was removed") && said.contains(&who), "{said}");
+    let (code, text) = finish(&mut orator(dir, FORGET));
+    assert_eq!(code, 1, "{text}");
+    let holder = format!("is in use by `orator train gan` (process {})", training.id());
+    assert!(text.contains("nothing was removed") && text.contains(&holder), "{text}");
     assert!(bytes_under(&dir.join("work/dataset/host")) == before);
-    // Others may listen to what is learnt so far.
+    // Other processes may generate with the latest checkpoint.
     orator_formats::wav::write(&dir.join("a.wav"), &sample("a-00000000-000000", 30, 0.0).sound).unwrap();
-    let (code, said) = ended(&mut orator(dir, "generate --checkpoint work/gan/host --audio a.wav --out a.npy"));
-    assert_eq!(code, 0, "{said}");
+    let (code, text) = finish(&mut orator(dir, "generate --checkpoint work/gan/host --audio a.wav --out a.npy"));
+    assert_eq!(code, 0, "{text}");
     training.kill().unwrap();
     training.wait().unwrap();
-    let (code, said) = ended(&mut orator(dir, FORGET));
-    assert!(code == 0 && said.contains("\"found\":[]"), "{said}");
+    let (code, text) = finish(&mut orator(dir, FORGET));
+    assert!(code == 0 && text.contains("\"found\":[]"), "{text}");
     assert!(!dir.join("work/gan/host").exists() && verify(&dir.join("work/dataset/host"), true, &Silent).is_ok());
     assert_eq!(files_under(&dir.join("work")).iter().filter(|(name, _)| name.contains("a-00000000")).count(), 0);
 }
 
 #[test]
-fn readers_keep_writers_away_and_are_named() {
+fn readers_block_writers_and_are_named_in_the_error() {
     let folder = tempfile::tempdir().unwrap();
     let dir = folder.path();
     project(dir);
     let dataset = dir.join("work/dataset/host");
     let open = Dataset::open(&dataset).unwrap();
     for verb in [FORGET, "--json import work/dataset/host --speaker host --out work/dataset/host --force"] {
-        let (code, said) = ended(&mut orator(dir, verb));
-        let who = format!("(process {}); wait", std::process::id());
-        assert!(code == 1 && said.contains(&who), "{verb}: {said}");
+        let (code, text) = finish(&mut orator(dir, verb));
+        let holder = format!("(process {}); wait", std::process::id());
+        assert!(code == 1 && text.contains(&holder), "{verb}: {text}");
     }
-    let (code, said) = ended(&mut orator(dir, "dataset verify work/dataset/host"));
-    assert_eq!(code, 0, "readers share: {said}");
+    let (code, text) = finish(&mut orator(dir, "dataset verify work/dataset/host"));
+    assert_eq!(code, 0, "readers share the lock: {text}");
     drop(open);
-    assert_eq!(ended(&mut orator(dir, FORGET)).0, 0);
+    assert_eq!(finish(&mut orator(dir, FORGET)).0, 0);
     assert!(Dataset::open(&dataset).is_ok());
-    assert!(!files_under(dir).iter().any(|(name, _)| name.ends_with("host.lock")), "locks go with their programs");
+    assert!(
+        !files_under(dir).iter().any(|(name, _)| name.ends_with("host.lock")),
+        "locks are removed with their processes"
+    );
 }
 
 fn has_strace() -> bool {
     Command::new("strace").arg("-V").output().is_ok_and(|output| output.status.success())
 }
 
-/// Runs a verb under strace, which does `inject` to system calls; whether it ended well.
+/// Runs a verb under strace, which injects the faults `inject` into system calls; returns whether the verb succeeded.
 fn injected(dir: &Path, inject: &[&str], verb: &str) -> bool {
     let mut command = Command::new("strace");
     command.args(["-f", "-qq", "-o", "/dev/null", "-e", "trace=rename,renameat,renameat2,fsync,unlink,unlinkat,rmdir"]);
@@ -111,7 +114,7 @@ fn injected(dir: &Path, inject: &[&str], verb: &str) -> bool {
 }
 
 #[test]
-fn a_dataset_survives_a_kill_and_a_failing_disk_at_every_rename() {
+fn a_dataset_survives_kills_and_disk_errors_at_every_rename() {
     if !has_strace() {
         return skip("no strace");
     }
@@ -124,42 +127,42 @@ fn a_dataset_survives_a_kill_and_a_failing_disk_at_every_rename() {
     write("first", 0.0);
     let import = |source: &str| {
         let _ = std::fs::remove_dir_all(dir.join("out"));
-        let (code, said) = ended(&mut orator(dir, &format!("import {source} --speaker host --out out")));
-        assert_eq!(code, 0, "{said}");
+        let (code, text) = finish(&mut orator(dir, &format!("import {source} --speaker host --out out")));
+        assert_eq!(code, 0, "{text}");
         bytes_under(&dir.join("out"))
     };
     let import_with = |inject: &[&str]| injected(dir, inject, "import new --speaker host --out out --force");
     let (new, old) = (import("new"), import("first"));
     assert!(new != old && import_with(&[]) && bytes_under(&dir.join("out")) == new);
     let no_exchange = "inject=renameat2:error=EINVAL";
-    for what in ["signal=KILL", "error=EIO"] {
-        for (others, call) in [(&[][..], "renameat2"), (&[no_exchange][..], "rename,renameat")] {
+    for fault in ["signal=KILL", "error=EIO"] {
+        for (more, call) in [(&[][..], "renameat2"), (&[no_exchange][..], "rename,renameat")] {
             let mut n_stopped = 0;
             for when in 1..10 {
                 import("first");
-                let stop = format!("inject={call}:{what}:when={when}");
-                let is_done = import_with(&[others, &[stop.as_str()]].concat());
-                // What comes next finds one of them whole.
-                let (code, said) = ended(&mut orator(dir, "dataset info out"));
-                assert_eq!(code, 0, "{stop}: {said}");
+                let stop = format!("inject={call}:{fault}:when={when}");
+                let is_done = import_with(&[more, &[stop.as_str()]].concat());
+                // The next command finds the old or the new dataset complete.
+                let (code, text) = finish(&mut orator(dir, "dataset info out"));
+                assert_eq!(code, 0, "{stop}: {text}");
                 let now = bytes_under(&dir.join("out"));
                 assert!(now == if is_done { new.clone() } else { old.clone() }, "{stop}: neither the old nor the new");
-                assert!(import_with(others), "{stop}: the next import");
+                assert!(import_with(more), "{stop}: the next import");
                 assert!(bytes_under(&dir.join("out")) == new);
-                let left = files_under(dir).into_iter().filter(|(name, _)| name.starts_with(".out"));
-                assert_eq!(left.count(), 0, "{stop}: left over");
+                let leftovers = files_under(dir).into_iter().filter(|(name, _)| name.starts_with(".out"));
+                assert_eq!(leftovers.count(), 0, "{stop}: left over");
                 if is_done {
                     break;
                 }
                 n_stopped += 1;
             }
-            assert_eq!(n_stopped, 1 + others.len(), "{call}: renames of a replacement");
+            assert_eq!(n_stopped, 1 + more.len(), "{call}: renames of a replacement");
         }
     }
 }
 
 #[test]
-fn a_forget_that_is_killed_at_any_removal_is_finished_by_the_next() {
+fn a_forget_killed_at_any_removal_is_completed_by_the_next() {
     if !has_strace() {
         return skip("no strace");
     }
@@ -175,14 +178,14 @@ fn a_forget_that_is_killed_at_any_removal_is_finished_by_the_next() {
             }
             let kill = format!("inject=unlink,unlinkat,rmdir:signal=KILL:when={when}");
             let is_done = injected(dir, &[&kill], FORGET);
-            // Where only removing the old dataset was left, the next one no longer knows the video, and removes it.
-            ended(&mut orator(dir, FORGET));
-            let told = |bytes: &[u8]| bytes.windows(10).any(|window| window == b"a-00000000");
+            // If only the old dataset remained to be removed, the next forget finds no video and removes that dataset.
+            finish(&mut orator(dir, FORGET));
+            let contains_video = |bytes: &[u8]| bytes.windows(10).any(|window| window == b"a-00000000");
             for (name, bytes) in bytes_under(&dir.join("work")) {
-                assert!(!told(name.as_bytes()) && !told(&bytes), "{kill}: {name}");
+                assert!(!contains_video(name.as_bytes()) && !contains_video(&bytes), "{kill}: {name}");
             }
             if is_done {
-                assert!(when > 3, "killed at {when} places");
+                assert!(when > 3, "killed at {when} calls");
                 break;
             }
         }
@@ -190,14 +193,14 @@ fn a_forget_that_is_killed_at_any_removal_is_finished_by_the_next() {
 }
 
 #[test]
-fn a_disk_that_fails_late_leaves_a_record_or_a_failure_and_never_both() {
+fn a_late_disk_error_leaves_either_a_record_or_a_failure() {
     if !has_strace() {
         return skip("no strace");
     }
     let project = Project::with_clips("late", 1, 1.0);
     for when in 1..40 {
         let _ = std::fs::remove_dir_all(project.work());
-        // The failing call is counted in each thread; the first of them belong to the table of hashes too.
+        // The failing call is counted per thread; the first calls also include those of the hash cache.
         let fails = format!("inject=fsync:error=EIO:when={when}");
         let is_done = injected(project.dir(), &[&fails], "run --to extract");
         let files = files_under(&project.work().join("extract"));
@@ -208,11 +211,11 @@ fn a_disk_that_fails_late_leaves_a_record_or_a_failure_and_never_both() {
             return;
         }
     }
-    panic!("the disk fails for ever");
+    panic!("no run succeeded");
 }
 
 #[test]
-fn a_table_of_hashes_that_two_programs_write_at_once_fails_neither() {
+fn concurrent_writes_of_the_hash_cache_succeed() {
     let dir = tempfile::tempdir().unwrap();
     let file = dir.path().join("hashes.json");
     std::thread::scope(|scope| {
@@ -227,7 +230,7 @@ fn a_table_of_hashes_that_two_programs_write_at_once_fails_neither() {
 }
 
 #[test]
-fn two_films_written_to_one_file_at_once_leave_one_whole_film() {
+fn concurrent_animations_to_one_file_leave_one_complete_video() {
     let dir = tempfile::tempdir().unwrap();
     npy::write(&dir.path().join("q.npy"), &swinging(4, 20)).unwrap();
     let start = || orator(dir.path(), "animate q.npy --out q.mp4").stderr(Stdio::piped()).spawn().unwrap();
@@ -236,5 +239,5 @@ fn two_films_written_to_one_file_at_once_leave_one_whole_film() {
         assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     }
     assert!(probe::probe(&dir.path().join("q.mp4")).is_ok());
-    assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), 2, "no attempt is left");
+    assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), 2, "no attempt file remains");
 }
