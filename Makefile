@@ -1,11 +1,11 @@
-# make demo    everything on a synthetic speaker, from a bare machine to a trained model and its motion
+# make demo    the complete pipeline on a synthetic speaker, from a bare machine to a trained model and its motion
 # make demo-study   a user study of that speaker: films, server, scripted participants in a browser, analysis
-# make check   format, clippy and the quick tests: no root, no other program, a few minutes
+# make check   format, clippy and the quick tests: needs neither root nor other programs, takes a few minutes
 # make test    everything CI runs
-# make test-data   the tests that the last `make test` skipped, with the real data and the models that ORATOR_DATA names
-# make prove   the long proofs and the speeds
-# make build   target/release/orator, and orator-lab beside it
-# Needs Debian 12 (x86-64) and Rust. The rest is installed by the scripts in .ci/setup.
+# make test-data   the tests that the last `make test` skipped, with the real data and models in ORATOR_DATA
+# make prove   the long-running tests and the benchmarks
+# make build   target/release/orator and target/release/orator-lab
+# Requires Debian 12 (x86-64) and Rust. The scripts in .ci/setup install all other dependencies.
 
 SHELL := /bin/bash
 .SHELLFLAGS := -euo pipefail -c
@@ -21,7 +21,7 @@ export ORATOR_READERS ?= $(abspath $(TARGET)/readers)
 export ORATOR_ALIGNER ?= $(abspath $(TARGET)/aligner)
 export ORATOR_MODELS ?= $(abspath $(TARGET)/models)
 export ORATOR_BLENDER ?= $(abspath $(TARGET)/blender)
-# A text that differs from its snapshot is an error.
+# A mismatch with a snapshot is an error.
 export INSTA_UPDATE := no
 export ORATOR_GLTF_VALIDATOR ?= $(abspath $(TARGET)/validator)
 export ORATOR_VRM ?= $(abspath $(TARGET)/vrm)
@@ -36,7 +36,7 @@ models: build ; @.ci/setup/models.sh
 build: setup runtime
 	cargo build --release --locked --workspace
 
-# Integration tests that start no other program, load no ONNX Runtime and end within seconds.
+# Integration tests that do not start other programs or load ONNX Runtime and take a few seconds.
 QUICK := house:: wording:: lift:: segment::segment cli::guide cli::completions animate::animate:: animate::bvh animate::motion_files \
 	dataset::shard:: dataset::dataset_verify dataset::import_readers evaluate::metrics evaluate::golden_metrics \
 	train::networks train::operators robustness::runner
@@ -66,19 +66,19 @@ test-data: build
 prove prove-rule prove-people prove-cluster: build models aligner loader
 	.ci/$@
 
-# Simulated studies through the analysis: coverage of its intervals, errors of its tests, power.
+# The study analysis on simulated studies: coverage of the intervals, error rates of the tests, power.
 prove-study:
 	cargo test --release --locked --test it -- --ignored --nocapture study::coverage
 
-# The synthetic speaker from its videos to its motion: a rendered person seen by the models for real people, or, where
-# they cannot be had, a figure in a suit of markers. A model begins with SPEECH minutes of the same figure without video
-# and goes on with what the videos gave; it is judged on videos that it did not see. DEMO: the folder; DRAW and STEPS: how
-# much of it.
+# The synthetic speaker from videos to generated motion: a rendered person with the models for real people, or, if these
+# are not available, a drawn figure in a marker suit. A model is trained on SPEECH minutes of the same speaker without
+# video, fine-tuned on the dataset of the videos, and evaluated on held-out videos. DEMO: output folder; DRAW, STEPS:
+# amount of video and of training.
 DEMO := $(TARGET)/demo
 DRAW := --videos 6
 STEPS :=
 SPEECH := 20
-# This rule is learnt in fewer steps than the recipe would give it.
+# Number of training steps, which for this rule can be lower than that of the recipe.
 SPOKEN_STEPS := 1200
 
 demo: build
@@ -100,8 +100,8 @@ demo: build
 	@printf '\nfiles:\n'; ls -d $(addprefix $(DEMO)/,videos/host work/dataset/host work/gan/host/best.safetensors \
 		motion.npy motion.bvh motion.glb motion.mp4 contact_sheet.png evaluation.html)
 
-# A user study of the synthetic speaker: built, served on this machine, answered in Chromium by scripted participants with
-# a known preference, analysed.
+# A user study of the synthetic speaker: built, served on this machine, answered in Chromium by scripted participants
+# with a known preference, and analysed.
 STUDY := $(TARGET)/demo-study
 
 demo-study: build browser driver

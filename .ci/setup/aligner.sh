@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# The aligner of words as a Python package, in the folder ORATOR_ALIGNER, and a voice whose word times its tests know.
+# Installs the word aligner as a Python package in the folder ORATOR_ALIGNER, and espeak-ng, whose word times are known.
 . "$(dirname "$0")/lib.sh"
 
 need_packages libespeak-ng1 espeak-ng-data

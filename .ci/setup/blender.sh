@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Blender as a Python module, in the folder ORATOR_BLENDER. It is made for Python 3.11; where that cannot be had its
-# tests skip, and say so.
+# Installs Blender as a Python module in the folder ORATOR_BLENDER. The module requires Python 3.11; if that is not
+# available, its tests are skipped and listed.
 . "$(dirname "$0")/lib.sh"
 
 list=tests/blender.txt

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# The browser that the tests open pages in.
+# Installs Chromium, with which the tests open pages.
 . "$(dirname "$0")/lib.sh"
 
 command -v chromium >/dev/null || install_packages chromium

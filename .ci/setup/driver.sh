@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# puppeteer-core, which drives the installed browser, and axe-core, which finds what shuts people out (Apache-2.0 and
-# MPL-2.0), in the folder ORATOR_DRIVER; versions and hashes are those of the lock file in the folder driver.
+# Installs puppeteer-core, which controls the installed browser, and axe-core, which finds accessibility problems
+# (Apache-2.0 and MPL-2.0), in the folder ORATOR_DRIVER; the lock file in the folder driver pins versions and hashes.
 . "$(dirname "$0")/lib.sh"
 
 folder=${ORATOR_DRIVER:-$target/driver}

@@ -1,10 +1,10 @@
 # shellcheck shell=bash
-# What the installers beside this file share. Each of them installs one thing, asks for root only where a Debian package
-# is missing, does nothing where all is there, and can be run from any folder.
+# Functions of the installers in this folder. Each installer installs one dependency, asks for root only if a Debian
+# package is missing, does nothing if everything is installed, and can be run from any folder.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/../.."
 
-# The folder of build outputs; what is installed without root goes below it.
+# Folder of build outputs, and of everything that is installed without root.
 # shellcheck disable=SC2034
 target=${CARGO_TARGET_DIR:-target}
 
@@ -25,7 +25,7 @@ install_packages() {
     "${root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get install -y -q --no-install-recommends "$@" </dev/null
 }
 
-# Installs those of the named packages that are missing.
+# Installs the given Debian packages if they are missing.
 need_packages() {
     local missing=() package
     for package in "$@"; do
@@ -34,7 +34,7 @@ need_packages() {
     [ ${#missing[@]} -eq 0 ] || install_packages "${missing[@]}"
 }
 
-# Installs node and npm where they are missing.
+# Installs node and npm if they are missing.
 need_npm() {
     local missing=()
     command -v node >/dev/null || missing+=(nodejs)
@@ -42,7 +42,7 @@ need_npm() {
     [ ${#missing[@]} -eq 0 ] || install_packages "${missing[@]}"
 }
 
-# Unpacks a package of npm at a version, whose hash is checked, into a folder.
+# Downloads an npm package at a version, checks its hash and unpacks it into a folder.
 npm_package() {
     local name=$1 version=$2 sha256=$3 folder=$4 packed
     mkdir -p "$folder"
@@ -53,8 +53,8 @@ npm_package() {
     rm "$packed"
 }
 
-# Sets `python` to the first of the named Pythons that has pip and, where a version is given first ("3.11", or "3" for
-# any), that version; installs Debian's where there is none. Fails where that does not help.
+# Sets `python` to the first of the given Pythons that has pip and the version in the first argument ("3.11", or "3" for
+# any); if there is none, installs the Python of Debian and tries again. Fails if there is still none.
 find_python() {
     local version=$1 try again
     shift
@@ -72,8 +72,8 @@ find_python() {
     return 1
 }
 
-# Installs the Python packages of a list into a folder of their own, and keeps a copy of the list there as the mark that
-# all of them are in place.
+# Installs the Python packages of a list into a separate folder, and copies the list there to mark the installation as
+# complete.
 pip_folder() {
     local list=$1 folder=$2
     shift 2
@@ -84,5 +84,5 @@ pip_folder() {
     say "$folder"
 }
 
-# True where the packages of a list are in a folder already.
+# Succeeds if the packages of a list are already installed in a folder.
 pip_folder_is_there() { cmp -s "$1" "$2/.installed"; }

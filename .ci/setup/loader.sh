@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# autocannon, a load generator (MIT), in the folder ORATOR_LOADER; versions and hashes are those of the lock file in the
-# folder loader.
+# Installs autocannon, a load generator (MIT), in the folder ORATOR_LOADER; the lock file in the folder loader pins
+# versions and hashes.
 . "$(dirname "$0")/lib.sh"
 
 folder=${ORATOR_LOADER:-$target/loader}

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# The pose models for real people, by the program's own `models fetch`, in the folder ORATOR_MODELS. Where ORATOR_DATA has
-# models or what they are made of, those serve as a mirror; what no place has is told and left out.
+# Installs the pose models for real people with `orator models fetch` in the folder ORATOR_MODELS. If ORATOR_DATA has
+# models or their source files, it is used as a mirror; models that no source has are reported and skipped.
 . "$(dirname "$0")/lib.sh"
 
 folder=${ORATOR_MODELS:-$target/models}

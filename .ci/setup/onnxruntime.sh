@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# ONNX Runtime (MIT): its library is taken out of the Python wheel; the hashes of both are checked.
+# Installs the library of ONNX Runtime (MIT) from the Python wheel; the hashes of both are checked.
 . "$(dirname "$0")/lib.sh"
 
 version=1.31.1

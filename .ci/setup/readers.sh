@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# The Python packages that the tests open datasets, checkpoints and logs with, in the folder ORATOR_READERS.
+# Installs the Python packages with which the tests read datasets, checkpoints and logs in the folder ORATOR_READERS.
 . "$(dirname "$0")/lib.sh"
 
 list=tests/readers.txt

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# The spell checker, in the folder ORATOR_SPELLING.
+# Installs the spell checker in the folder ORATOR_SPELLING.
 . "$(dirname "$0")/lib.sh"
 
 list=tests/spelling.txt

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Debian packages that the program is built with and watched by (strace, in one test), and the parts of the Rust toolchain.
+# Installs the Debian packages for building and testing the program (strace for one test) and the Rust components.
 . "$(dirname "$0")/lib.sh"
 
 need_packages libavformat-dev libavcodec-dev libavfilter-dev libavutil-dev libswscale-dev libswresample-dev \

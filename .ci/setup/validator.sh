@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# The Khronos glTF validator (Apache-2.0), in the folder ORATOR_GLTF_VALIDATOR; the hash of its package is checked.
+# Installs the Khronos glTF validator (Apache-2.0) in the folder ORATOR_GLTF_VALIDATOR; the package hash is checked.
 . "$(dirname "$0")/lib.sh"
 
 version=2.0.0-dev.3.10

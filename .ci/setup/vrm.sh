@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# The VRM reader three-vrm with three.js (all MIT), in the folder ORATOR_VRM; the hashes of their packages are checked.
+# Installs the VRM reader three-vrm and three.js (all MIT) in the folder ORATOR_VRM; the package hashes are checked.
 . "$(dirname "$0")/lib.sh"
 
 folder=${ORATOR_VRM:-$target/vrm}

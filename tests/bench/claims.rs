@@ -10,27 +10,27 @@ use serde_json::json;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 
-/// The claims of a plan alone: workers share tiny units that take no time. Units a second, and operations on the shared
-/// folder a unit.
+/// Overhead of the claims of a plan: workers share units that take no time. Measures units per second, and operations
+/// on the shared folder per unit.
 #[derive(clap::Args)]
 pub(crate) struct Args {
-    /// Units of the plan.
+    /// Number of units in the plan.
     #[arg(long, default_value_t = 100_000, value_name = "N")]
     units: usize,
-    /// Workers at a time.
+    /// Number of concurrent workers.
     #[arg(long, default_value_t = 8, value_name = "N")]
     workers: usize,
 }
 
-/// A folder that counts what it is asked.
-struct Counted {
+/// A shared folder that counts its operations.
+struct CountingFolder {
     folder: DiskFolder,
     created: AtomicUsize,
     read: AtomicUsize,
     listed: AtomicUsize,
 }
 
-impl SharedFolder for Counted {
+impl SharedFolder for CountingFolder {
     fn create(&self, name: &str, bytes: &[u8]) -> Result<bool> {
         self.created.fetch_add(1, Ordering::Relaxed);
         self.folder.create(name, bytes)
@@ -51,14 +51,14 @@ impl SharedFolder for Counted {
 pub(crate) fn run(args: &Args, progress: &dyn Progress) -> Result<Report> {
     ensure!(args.units > 0 && args.workers > 0, "units and workers must be more than 0");
     let dir = tempfile::tempdir()?;
-    let folder = Counted {
+    let folder = CountingFolder {
         folder: DiskFolder(dir.path().to_owned()),
         created: AtomicUsize::new(0),
         read: AtomicUsize::new(0),
         listed: AtomicUsize::new(0),
     };
     let task = progress.begin("claims", args.units as u64);
-    let begun = Instant::now();
+    let start = Instant::now();
     let work = |worker: usize| -> Result<usize> {
         let watch = BeatWatch::new(Duration::from_secs(180), "");
         let name = format!("worker-{worker}");
@@ -67,15 +67,15 @@ pub(crate) fn run(args: &Args, progress: &dyn Progress) -> Result<Report> {
             Claims::new(&folder, ClaimOptions { worker: name.clone(), needs, order, retries: false }, watch);
         let mut n_done = 0;
         loop {
-            match claims.next(begun.elapsed())? {
+            match claims.next(start.elapsed())? {
                 NextUnit::Claimed(claim) => {
                     let end = UnitEnd { worker: name.clone(), error: None, secs: 0.0 };
-                    ensure!(claims.end(claim, &end)?, "nobody takes over from the living");
+                    ensure!(claims.end(claim, &end)?, "a unit of a live worker was taken over");
                     task.advance(1);
                     n_done += 1;
                 }
                 NextUnit::Wait(_) => std::thread::sleep(Duration::from_millis(20)),
-                NextUnit::Blocked => bail!("what is in the way: {:?}", claims.blocked()),
+                NextUnit::Blocked => bail!("blocked units: {:?}", claims.blocked()),
                 NextUnit::AllEnded => return Ok(n_done),
             }
         }
@@ -83,13 +83,13 @@ pub(crate) fn run(args: &Args, progress: &dyn Progress) -> Result<Report> {
     let done: Vec<usize> = std::thread::scope(|scope| {
         let workers: Vec<_> = (0..args.workers).map(|worker| scope.spawn(move || work(worker))).collect();
         let ended =
-            workers.into_iter().map(|worker| worker.join().unwrap_or_else(|_| anyhow::bail!("a worker is lost")));
+            workers.into_iter().map(|worker| worker.join().unwrap_or_else(|_| anyhow::bail!("a worker panicked")));
         ended.collect::<Result<_>>()
     })?;
     ensure!(done.iter().sum::<usize>() == args.units, "{done:?} units done of {}", args.units);
-    let secs = begun.elapsed().as_secs_f64();
-    let of = |counter: &AtomicUsize| counter.load(Ordering::Relaxed) as f64 / args.units as f64;
-    let (created, read, listed) = (of(&folder.created), of(&folder.read), of(&folder.listed));
+    let secs = start.elapsed().as_secs_f64();
+    let per_unit = |counter: &AtomicUsize| counter.load(Ordering::Relaxed) as f64 / args.units as f64;
+    let (created, read, listed) = (per_unit(&folder.created), per_unit(&folder.read), per_unit(&folder.listed));
     let rate = args.units as f64 / secs;
     let text = format!(
         "{} units by {} workers in {secs:.1} s: {rate:.0} a second; a unit takes {created:.2} files to create (a draft, its flush, a \

@@ -1,4 +1,4 @@
-//! The command line of the benchmark: which part is measured, and how the result is shown.
+//! Command line of the benchmark: selects the part to measure and prints the result.
 
 use super::bodies::{animate, render};
 use super::report::{Bars, Report};
@@ -16,10 +16,10 @@ use std::process::ExitCode;
 pub(crate) struct Cli {
     #[command(subcommand)]
     part: Option<Part>,
-    /// Print one JSON object on standard output instead of text for people.
+    /// Print one JSON object on standard output instead of text.
     #[arg(long, global = true)]
     json: bool,
-    /// Passed by `cargo bench`; without effect.
+    /// Passed by `cargo bench`; ignored.
     #[arg(long, global = true, hide = true)]
     bench: bool,
 }
@@ -67,18 +67,18 @@ impl Part {
     }
 }
 
-/// Measures the part that a command line names, for callers other than `main`.
+/// Measures the part selected by the command line `args`, for callers other than `main`.
 ///
 /// # Errors
-/// An unknown argument, no part, or a measurement that failed.
-pub(crate) fn measure(words: impl IntoIterator<Item = impl Into<OsString>>, progress: &dyn Progress) -> Result<Report> {
+/// Fails on an unknown argument, a missing part, or a failed measurement.
+pub(crate) fn measure(args: impl IntoIterator<Item = impl Into<OsString>>, progress: &dyn Progress) -> Result<Report> {
     let program = OsString::from("bench");
-    let cli = Cli::try_parse_from(std::iter::once(program).chain(words.into_iter().map(Into::into)))?;
+    let cli = Cli::try_parse_from(std::iter::once(program).chain(args.into_iter().map(Into::into)))?;
     cli.part.context("no part to measure")?.measure(progress)
 }
 
 /// Parses the command line, measures, prints the result. Exit code 1 after an error.
-#[allow(clippy::print_stdout)] // the result of the program
+#[allow(clippy::print_stdout)] // prints the result
 pub(crate) fn main() -> ExitCode {
     let cli = Cli::parse();
     let Some(part) = &cli.part else {

@@ -25,8 +25,9 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex};
 use std::time::Instant;
 
-/// Shards written and read, beside a plain copy of the same files on the same disk; and windows loaded, beside what a
-/// training takes of them. All files are flushed to the disk on both sides, all that is read is in the page cache.
+/// Writing and reading of shards, compared with a plain copy of the same files on the same disk; and loading of
+/// windows, compared with the rate of training. All written files are flushed to disk, all files read are in the page
+/// cache.
 #[derive(clap::Args)]
 pub(crate) struct Args {
     /// Seconds of motion in the dataset, in intervals of 20 s; about 52 kB each.
@@ -35,40 +36,40 @@ pub(crate) struct Args {
     /// Rounds; each measures every variant once.
     #[arg(long, default_value_t = 5, value_name = "N")]
     rounds: usize,
-    /// Steps of training measured, with the preset `light`.
+    /// Number of training steps to measure, with the preset `light`.
     #[arg(long, default_value_t = 8, value_name = "N")]
     steps: usize,
-    /// A folder on the disk to measure, which gets a temporary one.
+    /// A folder on the disk to measure; a temporary folder is created in it.
     #[arg(long, default_value = ".", value_name = "DIR")]
     dir: PathBuf,
 }
 
 const FPS: FrameRate = FrameRate::new(15, 1);
 const INTERVAL_SECS: usize = 20;
-/// Intervals of a video.
+/// Intervals per video.
 const PER_VIDEO: usize = 15;
 
 pub(crate) fn run(args: &Args, progress: &dyn Progress) -> Result<Report> {
     let n_intervals = args.secs / INTERVAL_SECS;
     ensure!(args.rounds > 0 && args.steps > 1, "nothing to measure: there must be rounds and at least 2 steps");
     ensure!(n_intervals > 2 * PER_VIDEO, "{} s are too few: the bench needs more than two videos of 300 s", args.secs);
-    let place = args.dir.join(format!("bench-{}", std::process::id()));
-    fs::create_dir_all(&place).with_context(|| format!("making the folder {}", place.display()))?;
-    let measured = measure(args, n_intervals, &place, progress);
-    fs::remove_dir_all(&place).with_context(|| format!("removing {}", place.display()))?;
+    let folder = args.dir.join(format!("bench-{}", std::process::id()));
+    fs::create_dir_all(&folder).with_context(|| format!("creating the folder {}", folder.display()))?;
+    let measured = measure(args, n_intervals, &folder, progress);
+    fs::remove_dir_all(&folder).with_context(|| format!("removing {}", folder.display()))?;
     measured
 }
 
-fn measure(args: &Args, n_intervals: usize, place: &Path, progress: &dyn Progress) -> Result<Report> {
+fn measure(args: &Args, n_intervals: usize, folder: &Path, progress: &dyn Progress) -> Result<Report> {
     let mut samples: Vec<Sample> = (0..16).map(random_interval).collect();
-    let (written, copied) = (place.join("written"), place.join("copied"));
+    let (written, copied) = (folder.join("written"), folder.join("copied"));
     let (mut write, mut copy, mut read, mut plain) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
     let mut bytes = 0;
     let task = progress.begin("dataset", args.rounds as u64);
     for _ in 0..args.rounds {
-        for folder in [&written, &copied] {
-            let _ = fs::remove_dir_all(folder);
-            fs::create_dir(folder).with_context(|| format!("making {}", folder.display()))?;
+        for output in [&written, &copied] {
+            let _ = fs::remove_dir_all(output);
+            fs::create_dir(output).with_context(|| format!("creating {}", output.display()))?;
         }
         write.push(secs_of(|| {
             write_all(&written, &mut samples, n_intervals)?;
@@ -78,41 +79,41 @@ fn measure(args: &Args, n_intervals: usize, place: &Path, progress: &dyn Progres
         bytes = all.iter().map(|path| Ok(path.metadata()?.len())).sum::<Result<u64>>()?;
         copy.push(secs_of(|| all.iter().try_for_each(|path| copy_file(path, &copied)))?);
         read.push(secs_of(|| read_all(&written))?);
-        plain.push(secs_of(|| all.iter().try_for_each(|path| pour(path, &mut std::io::sink())))?);
+        plain.push(secs_of(|| all.iter().try_for_each(|path| copy_bytes(path, &mut std::io::sink())))?);
         task.advance(1);
     }
     drop(task);
     let mb = bytes as f64 / 1e6;
-    let ratio = |of: &[f64]| median(copy.iter().zip(of).map(|(copy, secs)| copy / secs).collect());
-    let [of_write, of_read] = [ratio(&write), ratio(&read)];
+    let ratio = |times: &[f64]| median(copy.iter().zip(times).map(|(copy, secs)| copy / secs).collect());
+    let [write_ratio, read_ratio] = [ratio(&write), ratio(&read)];
     let [write, copy, read, plain] = [write, copy, read, plain].map(|secs| mb / median(secs));
 
-    let loaded = loader(args, &written, &place.join("gan"))?;
-    let Loaded { n_windows, load_secs, windows_a_second, trained_a_second } = loaded;
+    let loaded = loader(args, &written, &folder.join("gan"))?;
+    let LoadingRates { n_windows, load_secs, windows_a_second, trained_a_second } = loaded;
     let hours = (n_intervals * INTERVAL_SECS) as f64 / 3600.0;
-    let of_training = windows_a_second / trained_a_second;
-    // An epoch, loading included.
+    let loader_ratio = windows_a_second / trained_a_second;
+    // Ratio for the first epoch, which includes loading.
     let epoch = n_windows as f64 / (load_secs + n_windows as f64 / windows_a_second) / trained_a_second;
     let text = format!(
         "{mb:.0} MB, {n_intervals} intervals of {INTERVAL_SECS} s, median of {} rounds\n\
          plain copy      {copy:8.0} MB/s\n\
-         shards written  {write:8.0} MB/s: {of_write:.2} of the copy\n\
-         shards read     {read:8.0} MB/s: {of_read:.2} of the copy (plain reading: {plain:.0} MB/s)\n\
+         shards written  {write:8.0} MB/s: {write_ratio:.2} of the copy\n\
+         shards read     {read:8.0} MB/s: {read_ratio:.2} of the copy (plain reading: {plain:.0} MB/s)\n\
          windows loaded  {windows_a_second:8.0} a second, 64 frames, stride 5, drawn at random, with log-mel\n\
-         windows trained {trained_a_second:8.1} a second, preset light: the loader is {of_training:.0} x as fast, with the \
+         windows trained {trained_a_second:8.1} a second, preset light: the loader is {loader_ratio:.0} x as fast, with the \
          reading of {hours:.1} h ({load_secs:.1} s) in a first epoch {epoch:.0} x",
         args.rounds
     );
     let facts = json!({
         "mb": mb, "copy_mb_a_second": copy, "write_mb_a_second": write, "read_mb_a_second": read,
-        "plain_read_mb_a_second": plain, "write_ratio": of_write, "read_ratio": of_read,
+        "plain_read_mb_a_second": plain, "write_ratio": write_ratio, "read_ratio": read_ratio,
         "windows_a_second": windows_a_second, "trained_windows_a_second": trained_a_second,
-        "loader_ratio": of_training, "loader_ratio_first_epoch": epoch, "load_secs": load_secs,
+        "loader_ratio": loader_ratio, "loader_ratio_first_epoch": epoch, "load_secs": load_secs,
     });
     Ok(Report { text, facts })
 }
 
-/// An interval of noise: its bytes are as hard to write as any.
+/// An interval of noise, which cannot be compressed.
 fn random_interval(seed: u64) -> Sample {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let n_frames = FPS.frames_in(INTERVAL_SECS as f64);
@@ -132,7 +133,7 @@ fn random_interval(seed: u64) -> Sample {
     }
 }
 
-/// Writes a dataset of intervals drawn from `samples` in turn; the second video is for validation.
+/// Writes a dataset of intervals that cycle through `samples`; the second video is the validation split.
 fn write_all(dir: &Path, samples: &mut [Sample], n_intervals: usize) -> Result<()> {
     let writer = DatasetWriter::new(dir, About::new("bench", FPS), 256 << 20);
     for first in (0..n_intervals).step_by(PER_VIDEO) {
@@ -151,7 +152,7 @@ fn write_all(dir: &Path, samples: &mut [Sample], n_intervals: usize) -> Result<(
     Ok(())
 }
 
-/// Reads every interval, hashes checked.
+/// Reads every interval and checks its hash.
 fn read_all(dir: &Path) -> Result<()> {
     let dataset = Dataset::open(dir)?;
     Split::ALL.iter().flat_map(|split| dataset.samples(*split)).try_for_each(|sample| dataset.read(&sample).map(drop))
@@ -173,37 +174,38 @@ fn files(folder: &Path) -> Result<Vec<PathBuf>> {
     Ok(files)
 }
 
-/// A copy byte by byte: no file system may share the blocks.
+/// Copies a file through memory, so that the file system cannot share its blocks.
 fn copy_file(path: &Path, folder: &Path) -> Result<()> {
     let to = folder.join(path.file_name().unwrap_or_default());
     let mut file = File::create(&to).with_context(|| format!("writing {}", to.display()))?;
-    pour(path, &mut file)?;
+    copy_bytes(path, &mut file)?;
     Ok(file.sync_all()?)
 }
 
-fn pour(path: &Path, to: &mut dyn Write) -> Result<()> {
+/// Copies the bytes of a file to a writer.
+fn copy_bytes(path: &Path, to: &mut dyn Write) -> Result<()> {
     let mut file = File::open(path).with_context(|| format!("reading {}", path.display()))?;
-    let mut piece = vec![0; 1 << 20];
+    let mut block = vec![0; 1 << 20];
     loop {
-        match file.read(&mut piece)? {
+        match file.read(&mut block)? {
             0 => return Ok(()),
-            n => to.write_all(&piece[..n])?,
+            n => to.write_all(&block[..n])?,
         }
     }
 }
 
-/// Windows of a step.
+/// Windows per training step.
 const BATCH: usize = 32;
 
-struct Loaded {
+struct LoadingRates {
     n_windows: usize,
     load_secs: f64,
     windows_a_second: f64,
     trained_a_second: f64,
 }
 
-/// Batches as training draws them, then training itself, on the same dataset.
-fn loader(args: &Args, dir: &Path, out: &Path) -> Result<Loaded> {
+/// Loads random batches as training does, then trains on the same dataset.
+fn loader(args: &Args, dir: &Path, out: &Path) -> Result<LoadingRates> {
     let settings = config::GanConfig {
         recipe: config::GanRecipe::Paper,
         preset: config::NetworkPreset::Light,
@@ -227,27 +229,27 @@ fn loader(args: &Args, dir: &Path, out: &Path) -> Result<Loaded> {
     let mut rng = ChaCha8Rng::seed_from_u64(1337);
     let (mut n_loaded, start) = (0, Instant::now());
     while start.elapsed().as_secs_f64() < 2.0 {
-        let which: Vec<usize> = (0..BATCH).map(|_| rng.random_range(0..examples.len())).collect();
-        n_loaded += examples.batch(&which)?.poses.dim(0)?;
+        let indices: Vec<usize> = (0..BATCH).map(|_| rng.random_range(0..examples.len())).collect();
+        n_loaded += examples.batch(&indices)?.poses.dim(0)?;
     }
     let windows_a_second = n_loaded as f64 / start.elapsed().as_secs_f64();
     let n_windows = examples.len();
     drop(examples);
 
-    let steps = Steps::default();
+    let steps = StepTimes::default();
     train::train(&dataset, &settings, out, &steps)?;
-    let at = steps.at.lock().map(|at| at.clone()).unwrap_or_default();
-    let gaps = at.windows(2).map(|pair| (pair[1] - pair[0]).as_secs_f64()).collect();
-    Ok(Loaded { n_windows, load_secs, windows_a_second, trained_a_second: BATCH as f64 / median(gaps) })
+    let ends = steps.ends.lock().map(|ends| ends.clone()).unwrap_or_default();
+    let durations = ends.windows(2).map(|pair| (pair[1] - pair[0]).as_secs_f64()).collect();
+    Ok(LoadingRates { n_windows, load_secs, windows_a_second, trained_a_second: BATCH as f64 / median(durations) })
 }
 
-/// Notes when each step of a training ends.
+/// Records the end time of each training step.
 #[derive(Clone, Default)]
-struct Steps {
-    at: Arc<Mutex<Vec<Instant>>>,
+struct StepTimes {
+    ends: Arc<Mutex<Vec<Instant>>>,
 }
 
-impl Progress for Steps {
+impl Progress for StepTimes {
     fn begin(&self, label: &str, _total: u64) -> Box<dyn Task> {
         if label.starts_with("train") { Box::new(self.clone()) } else { Box::new(Silent) }
     }
@@ -255,10 +257,10 @@ impl Progress for Steps {
     fn say(&self, _line: &str) {}
 }
 
-impl Task for Steps {
+impl Task for StepTimes {
     fn advance(&self, steps: u64) {
-        if let (1, Ok(mut at)) = (steps, self.at.lock()) {
-            at.push(Instant::now());
+        if let (1, Ok(mut ends)) = (steps, self.ends.lock()) {
+            ends.push(Instant::now());
         }
     }
 

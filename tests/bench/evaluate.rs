@@ -23,14 +23,15 @@ use serde_json::json;
 use std::sync::Mutex;
 use std::time::Instant;
 
-/// Evaluation of predicted motion beside the ground truth, in memory: all metrics, all baselines, all draws and the page. How long
-/// each part takes, and the most memory. Motion and sound are those of the synthetic speaker, 15 frames a second.
+/// Evaluation of predicted motion against the ground truth, in memory: all metrics, baselines and bootstrap draws, and
+/// the report page. Measures the time of each part and the peak memory. Motion and audio are those of the synthetic
+/// speaker at 15 fps.
 #[derive(clap::Args)]
 pub(crate) struct Args {
     /// Hours of motion.
     #[arg(long, default_value_t = 1.0, value_name = "HOURS")]
     hours: f64,
-    /// Clips that they are cut into.
+    /// Number of clips into which the motion is cut.
     #[arg(long, default_value_t = 60, value_name = "N")]
     clips: usize,
     /// Threads.
@@ -40,7 +41,7 @@ pub(crate) struct Args {
 
 const FPS: FrameRate = FrameRate::new(15, 1);
 
-/// When each part began.
+/// Start time of each part.
 #[derive(Default)]
 struct Stopwatch(Mutex<Vec<(String, Instant)>>);
 
@@ -72,7 +73,7 @@ pub(crate) fn run(args: &Args, progress: &dyn Progress) -> Result<Report> {
     let parts = watch.0.into_inner().unwrap_or_default();
     let secs = |a: &(String, Instant), b: &(String, Instant)| b.1.duration_since(a.1).as_secs_f64();
     let times: Vec<(&str, f64)> = parts.windows(2).map(|two| (two[0].0.as_str(), secs(&two[0], &two[1]))).collect();
-    let all: f64 = times.iter().map(|(_, secs)| secs).sum();
+    let total: f64 = times.iter().map(|(_, secs)| secs).sum();
     let peak = child::own_peak_mib();
     let mut lines = vec![format!(
         "{:.2} h of motion in {} clips, {} figures, {} blocks, {} threads",
@@ -84,14 +85,14 @@ pub(crate) fn run(args: &Args, progress: &dyn Progress) -> Result<Report> {
     )];
     lines.extend(times.iter().map(|(part, secs)| format!("{part:24}{secs:8.2} s")));
     let cpu = child::own_cpu_secs() - before_cpu;
-    lines.push(format!("{:24}{all:8.2} s, {cpu:.1} s of processor time", "all"));
+    lines.push(format!("{:24}{total:8.2} s, {cpu:.1} s of processor time", "all"));
     lines.push(format!(
         "page {:.1} MB; peak memory {peak:.0} MiB, of that before evaluation {before_mib:.0} MiB",
         html.len() as f64 / 1e6
     ));
     let facts = json!({
         "hours": args.hours,
-        "secs": all,
+        "secs": total,
         "cpu_secs": cpu,
         "parts": times.iter().map(|(part, secs)| json!({ "part": part, "secs": secs })).collect::<Vec<_>>(),
         "peak_mib": peak,
@@ -101,20 +102,20 @@ pub(crate) fn run(args: &Args, progress: &dyn Progress) -> Result<Report> {
     Ok(Report { text: lines.join("\n"), facts })
 }
 
-/// A clip that is still to be heard.
-struct Unheard {
+/// A clip without audio features.
+struct RawClip {
     ground_truth: Array3<f32>,
     mask: Array2<bool>,
     predicted: Array3<f32>,
     sound: Sound,
 }
 
-/// Ground truth with its random variation; the predicted one is what the rule alone would have it do.
-fn speaker(n_clips: usize, n_frames: usize) -> Vec<Unheard> {
+/// Clips of the synthetic speaker: the ground truth has random variation, the prediction follows only the rule.
+fn speaker(n_clips: usize, n_frames: usize) -> Vec<RawClip> {
     let clip = |number: usize| {
         let rule = Rule { rule: RULE, seed: 1, split: Split::Validation, number, n_frames, habits: 0 };
         let ground_truth = rule.motion();
-        Unheard {
+        RawClip {
             mask: ground_truth.mask,
             ground_truth: ground_truth.joints,
             predicted: rule.predictable().joints,
@@ -124,10 +125,10 @@ fn speaker(n_clips: usize, n_frames: usize) -> Vec<Unheard> {
     (0..n_clips).into_par_iter().map(clip).collect()
 }
 
-fn evaluate(speaker: Vec<Unheard>, watch: &Stopwatch) -> Result<(table::Table, String)> {
+fn evaluate(speaker: Vec<RawClip>, watch: &Stopwatch) -> Result<(table::Table, String)> {
     watch.detail("listening");
-    let clip = |(number, unheard): (usize, Unheard)| {
-        let Unheard { ground_truth, mask, mut predicted, sound } = unheard;
+    let clip = |(number, raw): (usize, RawClip)| {
+        let RawClip { ground_truth, mask, mut predicted, sound } = raw;
         let features = Some(sound_features::from_samples(&sound.samples, FPS, ground_truth.shape()[0]));
         let (mask, _) = compared(&ground_truth, &mask, &mut predicted);
         let (ground_truth, predicted) = (StoredMotion::Held(ground_truth), StoredMotion::Held(predicted));
@@ -141,7 +142,7 @@ fn evaluate(speaker: Vec<Unheard>, watch: &Stopwatch) -> Result<(table::Table, S
     let table = table::measure(&clips, &MetricSettings::default(), &predictors, watch)?;
     watch.detail("the verdict and the JSON");
     let length = text::text(&table, true).len() + result::json(&table).to_string().len();
-    ensure!(length > 0, "there is nothing to say");
+    ensure!(length > 0, "the result is empty");
     watch.detail("the page");
     let html = page::html(&table, &clips, "bench")?;
     Ok((table, html))

@@ -20,9 +20,9 @@ use rand_chacha::ChaCha8Rng;
 use serde_json::json;
 use std::time::Instant;
 
-/// Speech to motion with both presets at their full size: how many times faster than the speech itself, and the most
-/// memory it took. The speech is synthetic, the weights are random. From samples to joints, with the spectrogram but
-/// without files.
+/// Generation of motion from speech with both presets at full size: speed relative to real time, and peak memory. The
+/// speech is synthetic, the weights are random. Measures from samples to joints, including the spectrogram but no file
+/// access.
 #[derive(clap::Args)]
 pub(crate) struct Args {
     /// Seconds of speech.
@@ -34,15 +34,15 @@ pub(crate) struct Args {
     /// Threads.
     #[arg(long, default_value_t = 1, value_name = "N")]
     threads: usize,
-    /// Frames generated at once, a multiple of 32; default: that of `orator generate`.
+    /// Frames per chunk, a multiple of 32; default: that of `orator generate`.
     #[arg(long, value_name = "N")]
     chunk: Option<usize>,
-    /// This preset only.
+    /// Measure only this preset.
     #[arg(long, value_name = "light|paper")]
     preset: Option<Preset>,
 }
 
-/// Motion is made at this rate.
+/// Frame rate of the generated motion.
 const FPS: FrameRate = FrameRate::new(15, 1);
 
 pub(crate) fn run(args: &Args, progress: &dyn Progress) -> Result<Report> {
@@ -53,19 +53,19 @@ pub(crate) fn run(args: &Args, progress: &dyn Progress) -> Result<Report> {
     let presets: Vec<_> = presets.into_iter().filter(|(_, p)| args.preset.is_none_or(|only| only == *p)).collect();
     let sound = speech(args.secs);
     let task = progress.begin("generate", (args.rounds * presets.len()) as u64);
-    // One after the other, the smaller first: the peak of memory is that of the whole program until then.
+    // The smaller preset first: the peak memory is that of the process so far.
     let measured = presets.iter().map(|(name, preset)| {
         task.detail(name);
         let speaker = untrained(*preset)?;
         let mut secs = Vec::new();
         for _ in 0..args.rounds {
             let start = Instant::now();
-            let whole = std::iter::once(Ok(sound.samples.clone()));
+            let stream = std::iter::once(Ok(sound.samples.clone()));
             let chunk = args.chunk.unwrap_or(CHUNK);
             let (motion, _) =
-                pool.install(|| speaker.motion_from_stream(whole, sound.samples.len(), chunk, &mut |_| ()))?;
+                pool.install(|| speaker.motion_from_stream(stream, sound.samples.len(), chunk, &mut |_| ()))?;
             secs.push(start.elapsed().as_secs_f64());
-            ensure!(motion.joints.iter().all(|v| v.is_finite()), "the motion made is not finite");
+            ensure!(motion.joints.iter().all(|v| v.is_finite()), "the generated motion is not finite");
             task.advance(1);
         }
         Ok((*name, median(secs), child::own_peak_mib()))
@@ -90,8 +90,8 @@ pub(crate) fn run(args: &Args, progress: &dyn Progress) -> Result<Report> {
 }
 
 fn speech(secs: f64) -> Sound {
-    let mut dice = ChaCha8Rng::seed_from_u64(1337);
-    Speech::new(secs, &mut dice).sound(secs, &mut dice)
+    let mut rng = ChaCha8Rng::seed_from_u64(1337);
+    Speech::new(secs, &mut rng).sound(secs, &mut rng)
 }
 
 /// A speaker with random weights.

@@ -21,26 +21,25 @@ use serde_json::json;
 use std::path::PathBuf;
 use std::time::Instant;
 
-/// Keypoints to joints, body and both hands: frames a second on one processor core, and how many times as long it takes
-/// as its networks alone take for as many frames. The keypoints are made by rule. Everything runs in a pool of one
-/// thread.
+/// Lifting of keypoints to joints, body and both hands: frames per second on one processor core, and the ratio to the
+/// time of the networks alone. The keypoints are those of a rule-based speaker. Uses a pool of one thread.
 #[derive(clap::Args)]
 pub(crate) struct Args {
-    /// Frames lifted in each round, at 15 a second.
+    /// Frames to lift per round, at 15 fps.
     #[arg(long, default_value_t = 1800, value_name = "N")]
     frames: usize,
     /// Rounds; each measures every variant once.
     #[arg(long, default_value_t = 7, value_name = "N")]
     rounds: usize,
-    /// Weights of `orator-lab train lifter --part body`; without: the built-in ones.
+    /// Weights of `orator-lab train lifter --part body`; default: built in.
     #[arg(long, value_name = "FILE")]
     body_weights: Option<PathBuf>,
-    /// Weights of `orator-lab train lifter --part hands`; without: the built-in ones.
+    /// Weights of `orator-lab train lifter --part hands`; default: built in.
     #[arg(long, value_name = "FILE")]
     hand_weights: Option<PathBuf>,
 }
 
-/// Windows and hands that go through the networks together, as the lifters do it.
+/// Windows and hands per batch, as in the lifters.
 const BATCH: (usize, usize) = (512, 1024);
 
 pub(crate) fn run(args: &Args, progress: &dyn Progress) -> Result<Report> {
@@ -52,20 +51,20 @@ pub(crate) fn run(args: &Args, progress: &dyn Progress) -> Result<Report> {
     };
     let one_thread = rayon::ThreadPoolBuilder::new().num_threads(1).build()?;
     let task = progress.begin("lift", args.rounds as u64);
-    let (mut whole, mut inside) = (Vec::new(), Vec::new());
+    let (mut lifting, mut inference) = (Vec::new(), Vec::new());
     one_thread.install(|| -> Result<()> {
         let lifter = Lifter::new(&settings)?;
         let (body, hands) = (weights::body(&settings.body_weights)?, weights::hands(&settings.hand_weights)?);
-        let keypoints = made_by_rule(args.frames);
+        let keypoints = rule_based_keypoints(args.frames);
         lifter.lift(&keypoints)?;
         networks(&body, &hands, args.frames)?;
         for _ in 0..args.rounds {
             let start = Instant::now();
             lifter.lift(&keypoints)?;
-            whole.push(start.elapsed().as_secs_f64());
+            lifting.push(start.elapsed().as_secs_f64());
             let start = Instant::now();
             networks(&body, &hands, args.frames)?;
-            inside.push(start.elapsed().as_secs_f64());
+            inference.push(start.elapsed().as_secs_f64());
             task.advance(1);
         }
         Ok(())
@@ -73,8 +72,8 @@ pub(crate) fn run(args: &Args, progress: &dyn Progress) -> Result<Report> {
     drop(task);
 
     let n_frames = args.frames as f64;
-    let ratio = median(whole.iter().zip(&inside).map(|(whole, inside)| whole / inside).collect());
-    let [frames_a_second, of_networks] = [&whole, &inside].map(|secs| n_frames / median(secs.clone()));
+    let ratio = median(lifting.iter().zip(&inference).map(|(lifting, inference)| lifting / inference).collect());
+    let [frames_a_second, of_networks] = [&lifting, &inference].map(|secs| n_frames / median(secs.clone()));
     let text = format!(
         "{n_frames} frames, body and both hands, median of {} rounds, one thread\n\
          lifting         {frames_a_second:8.0} frames a second\n\
@@ -88,7 +87,7 @@ pub(crate) fn run(args: &Args, progress: &dyn Progress) -> Result<Report> {
     Ok(Report { text, facts })
 }
 
-/// What the networks do for so many frames: a window and its mirror image, and two hands.
+/// Inference for `n_frames` frames: a window and its mirror image, and two hands each.
 fn networks(body: &BodyLifter, hands: &HandLifter, n_frames: usize) -> Result<()> {
     let config = body.net.config();
     let batches = |batch: usize| (0..2 * n_frames).step_by(batch).map(move |first| batch.min(2 * n_frames - first));
@@ -103,8 +102,8 @@ fn networks(body: &BodyLifter, hands: &HandLifter, n_frames: usize) -> Result<()
     Ok(())
 }
 
-/// A speaker made by rule, filmed with noise and gaps, a hand of one shape at each wrist.
-fn made_by_rule(n_frames: usize) -> Keypoints {
+/// Keypoints of a rule-based speaker with noise and gaps, and a hand of one shape at each wrist.
+fn rule_based_keypoints(n_frames: usize) -> Keypoints {
     let mut rng = ChaCha8Rng::seed_from_u64(1337);
     let scene = FilmedScene::from_rule(Filming::Training, n_frames, &mut rng);
     let shape = hand_shape::sample_shape(&mut rng);

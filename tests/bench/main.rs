@@ -1,6 +1,6 @@
-//! The benchmark, in a process like the program's.
+//! Entry point of the benchmark, with the process settings of the program.
 
-#![allow(dead_code)] // what the tests use of the benchmark and of its fixtures
+#![allow(dead_code)] // items of the benchmark and its fixtures that only tests use
 
 #[path = "mod.rs"]
 pub(crate) mod bench;

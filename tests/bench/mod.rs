@@ -1,5 +1,5 @@
-//! The benchmark: `cargo bench -- PART`, one file a part. The variants of a part take turns, round after round, and the
-//! median round counts, so that a noisy machine favours none of them. Without a part it lists them and ends.
+//! The benchmark: `cargo bench -- PART`, one file per part. Each round measures all variants of a part, and the median
+//! over the rounds is reported, so that noise affects all variants alike. Without a part it prints the help.
 
 pub(crate) mod bodies;
 pub(crate) mod child;

@@ -18,34 +18,34 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::Instant;
 
-/// Frames to keypoints: time a frame, the share of it inside ONNX Runtime, how often each model is asked, one worker
-/// against two, and (with `--python`) against the Python reference of the same chain. Every worker is one thread.
+/// Keypoint detection: time per frame, the part spent in ONNX Runtime, model runs per frame, one worker compared with
+/// two, and (with `--python`) with a Python reference of the same chain. Every worker is one thread.
 #[derive(clap::Args)]
 pub(crate) struct Args {
     /// A video of a speaker; with `--beside`, its `keypoints.npz`.
     video: PathBuf,
-    /// Keypoints of the same video that another version or other settings gave: says how far both are apart, instead
-    /// of how fast they are found.
+    /// Keypoints of the same video from another version or with other settings: reports the differences instead of the
+    /// speed.
     #[arg(long, value_name = "KEYPOINTS")]
     beside: Option<PathBuf>,
-    /// The folder of the models.
+    /// Folder with the models.
     #[arg(long, default_value = "models", value_name = "DIR")]
     models_dir: PathBuf,
-    /// Frames looked at, from the beginning, at the dataset rate.
+    /// Number of frames from the start of the video, at the dataset rate.
     #[arg(long, default_value_t = 90, value_name = "N")]
     frames: usize,
     /// Rounds; each measures every variant once.
     #[arg(long, default_value_t = 5, value_name = "N")]
     rounds: usize,
-    /// Id of the person detector, instead of the default one.
+    /// ID of the person detector, instead of the default.
     #[arg(long, value_name = "ID")]
     person: Option<String>,
-    /// The Python reference, run on the whole video in each round: `REFERENCE.py VIDEO OUT.npz`.
+    /// Python reference script, run on the complete video in each round: `REFERENCE.py VIDEO OUT.npz`.
     #[arg(long, value_name = "FILE")]
     python: Option<PathBuf>,
 }
 
-/// What every variant needs.
+/// Inputs of all variants.
 struct Bench<'a> {
     video: &'a Path,
     runtime: Runtime,
@@ -54,11 +54,12 @@ struct Bench<'a> {
     images: Vec<Image>,
 }
 
-/// One round of one variant, in seconds.
+/// Time of one round of one variant, seconds.
 #[derive(Clone, Copy)]
 struct Run {
-    whole: f64,
-    inside: f64,
+    total: f64,
+    /// Time in ONNX Runtime.
+    inference: f64,
 }
 
 impl Bench<'_> {
@@ -66,36 +67,36 @@ impl Bench<'_> {
         Chain::new(&self.runtime, &self.store, &self.settings.pose2d)
     }
 
-    /// Frames that are in memory already, through one chain.
+    /// One chain on frames in memory.
     fn decoded(&self, chain: &mut Chain) -> Result<Run> {
         chain.begin_shot(None);
         let (start, before) = (Instant::now(), chain.secs_inside());
         for image in &self.images {
             chain.frame(image)?;
         }
-        Ok(Run { whole: start.elapsed().as_secs_f64(), inside: chain.secs_inside() - before })
+        Ok(Run { total: start.elapsed().as_secs_f64(), inference: chain.secs_inside() - before })
     }
 
-    /// Frames decoded from the file.
+    /// One chain on frames decoded from the file.
     fn streamed(&self, chain: &mut Chain) -> Result<Run> {
         chain.begin_shot(None);
         let (start, before) = (Instant::now(), chain.secs_inside());
         for frame in FrameReader::open(self.video, rate(&self.settings))?.take(self.images.len()) {
             chain.frame(&frame?.image)?;
         }
-        Ok(Run { whole: start.elapsed().as_secs_f64(), inside: chain.secs_inside() - before })
+        Ok(Run { total: start.elapsed().as_secs_f64(), inference: chain.secs_inside() - before })
     }
 
-    /// Two workers, each doing all of `work`; seconds until both are done.
+    /// Two workers that each perform all of `work`; time until both have finished.
     fn side_by_side(chains: &mut [Chain; 2], work: impl Fn(&mut Chain) -> Result<Run> + Sync) -> Result<Run> {
         let start = Instant::now();
         let runs = std::thread::scope(|scope| {
             let workers = chains.each_mut().map(|chain| scope.spawn(|| work(chain)));
-            workers.map(|worker| worker.join().unwrap_or_else(|_| bail!("a worker stopped")))
+            workers.map(|worker| worker.join().unwrap_or_else(|_| bail!("a worker panicked")))
         });
-        let whole = start.elapsed().as_secs_f64();
+        let total = start.elapsed().as_secs_f64();
         let [a, b] = runs;
-        Ok(Run { whole, inside: a?.inside + b?.inside })
+        Ok(Run { total, inference: a?.inference + b?.inference })
     }
 }
 
@@ -103,23 +104,23 @@ fn rate(settings: &Settings) -> FrameRate {
     settings.extract.rate()
 }
 
-/// How far the keypoints of two files are apart, in % of the shoulder width: each seen point of the arms, and the mean of
-/// each hand that both have.
-fn beside(one: &Path, other: &Path) -> Result<Report> {
+/// Distances between the keypoints of two files, in % of the shoulder width: of each visible arm point, and the mean
+/// over each hand that both files have.
+fn compare(one: &Path, other: &Path) -> Result<Report> {
     let [one, other] = [keypoints_npz::read(one)?, keypoints_npz::read(other)?];
     let n_frames = one.n_frames();
     ensure!(other.n_frames() == n_frames, "the files have {n_frames} and {} frames", other.n_frames());
-    let away = |a: ArrayView1<f32>, b: ArrayView1<f32>| f64::from((a[0] - b[0]).hypot(a[1] - b[1]));
+    let distance = |a: ArrayView1<f32>, b: ArrayView1<f32>| f64::from((a[0] - b[0]).hypot(a[1] - b[1]));
     let (mut arms, mut hands) = (Vec::new(), Vec::new());
-    // Hands in the first file, in the second, in both.
+    // Numbers of hands in the first file, in the second, in both.
     let mut n_hands = [0_usize; 3];
     for t in 0..n_frames {
         let [body, other_body] = [&one.body, &other.body].map(|body| body.index_axis(Axis(0), t));
-        let width = away(body.row(coco::L_SHOULDER), body.row(coco::R_SHOULDER)).max(1.0);
+        let width = distance(body.row(coco::L_SHOULDER), body.row(coco::R_SHOULDER)).max(1.0);
         for joint in coco::L_SHOULDER..=coco::R_WRIST {
             let [a, b] = [body.row(joint), other_body.row(joint)];
             if a[2].min(b[2]) >= SEEN_SCORE {
-                arms.push(100.0 * away(a, b) / width);
+                arms.push(100.0 * distance(a, b) / width);
             }
         }
         for [a, b] in [[&one.left_hand, &other.left_hand], [&one.right_hand, &other.right_hand]] {
@@ -128,16 +129,16 @@ fn beside(one: &Path, other: &Path) -> Result<Report> {
             let both = found[0] && found[1];
             n_hands = [0, 1, 2].map(|at| n_hands[at] + usize::from(*found.get(at).unwrap_or(&both)));
             if both {
-                let sum: f64 = a.outer_iter().zip(b.outer_iter()).map(|(a, b)| away(a, b)).sum();
+                let sum: f64 = a.outer_iter().zip(b.outer_iter()).map(|(a, b)| distance(a, b)).sum();
                 hands.push(100.0 * sum / a.nrows() as f64 / width);
             }
         }
     }
-    let of = |distances: Vec<f64>| {
+    let quantiles = |distances: Vec<f64>| {
         let ordered = Ordered::new(distances);
         [ordered.median(), ordered.quantile(0.95)].map(|value| value.unwrap_or(f64::NAN))
     };
-    let ([arm, arm_95], [hand, hand_95], [first, second, both]) = (of(arms), of(hands), n_hands);
+    let ([arm, arm_95], [hand, hand_95], [first, second, both]) = (quantiles(arms), quantiles(hands), n_hands);
     let text = format!(
         "{n_frames} frames, distances in % of the shoulder width\n\
          arms   median {arm:.2}, 95 % below {arm_95:.2}\n\
@@ -153,7 +154,7 @@ fn beside(one: &Path, other: &Path) -> Result<Report> {
 
 pub(crate) fn run(args: &Args, progress: &dyn Progress) -> Result<Report> {
     if let Some(other) = &args.beside {
-        return beside(&args.video, other);
+        return compare(&args.video, other);
     }
     let mut settings = Settings::default();
     if let Some(person) = &args.person {
@@ -174,7 +175,7 @@ pub(crate) fn run(args: &Args, progress: &dyn Progress) -> Result<Report> {
     let n_frames = bench.images.len() as f64;
     let task = progress.begin("pose2d", args.rounds as u64);
     bench.decoded(&mut chains[0])?;
-    let asked = chains[0].n_runs().map(|n| n as f64 / n_frames);
+    let runs_per_frame = chains[0].n_runs().map(|n| n as f64 / n_frames);
     let (mut one, mut streamed, mut two, mut two_streamed, mut python) = (vec![], vec![], vec![], vec![], vec![]);
     for _ in 0..args.rounds {
         one.push(bench.decoded(&mut chains[0])?);
@@ -189,15 +190,15 @@ pub(crate) fn run(args: &Args, progress: &dyn Progress) -> Result<Report> {
     drop(task);
 
     let per_frame = |secs: f64| 1e3 * secs / n_frames;
-    let whole = |runs: &[Run]| median(runs.iter().map(|run| run.whole).collect());
-    let ratio = median(one.iter().map(|run| run.whole / run.inside).collect());
-    let inside = median(one.iter().map(|run| run.inside).collect());
-    let speed_up = median(one.iter().zip(&two).map(|(one, two)| 2.0 * one.whole / two.whole).collect());
+    let total = |runs: &[Run]| median(runs.iter().map(|run| run.total).collect());
+    let ratio = median(one.iter().map(|run| run.total / run.inference).collect());
+    let inference = median(one.iter().map(|run| run.inference).collect());
+    let speed_up = median(one.iter().zip(&two).map(|(one, two)| 2.0 * one.total / two.total).collect());
     let fps = rate(&bench.settings).per_sec();
     let real_time = |frames: f64, secs: f64| frames / fps / secs;
-    let one_real_time = real_time(n_frames, whole(&streamed));
-    let two_real_time = real_time(2.0 * n_frames, whole(&two_streamed));
-    let [person, body, hand, palm, face] = asked;
+    let one_real_time = real_time(n_frames, total(&streamed));
+    let two_real_time = real_time(2.0 * n_frames, total(&two_streamed));
+    let [person, body, hand, palm, face] = runs_per_frame;
     let mut text = format!(
         "{n_frames} frames, median of {} rounds, {}\n\
          models asked a frame           person {person:.2}, body {body:.2}, hand {hand:.2}, palm {palm:.2}, face {face:.2}\n\
@@ -207,19 +208,19 @@ pub(crate) fn run(args: &Args, progress: &dyn Progress) -> Result<Report> {
          two workers, decoding          {two_real_time:.1} x real time at {fps} fps",
         args.rounds,
         bench.runtime.version(),
-        per_frame(whole(&one)),
-        per_frame(inside),
-        per_frame(whole(&streamed)),
+        per_frame(total(&one)),
+        per_frame(inference),
+        per_frame(total(&streamed)),
     );
     let mut facts = json!({
-        "n_frames": n_frames, "ms_a_frame": per_frame(whole(&one)), "ms_inside": per_frame(inside), "ratio": ratio,
-        "ms_a_frame_decoding": per_frame(whole(&streamed)), "speed_up_of_two": speed_up,
+        "n_frames": n_frames, "ms_a_frame": per_frame(total(&one)), "ms_inside": per_frame(inference), "ratio": ratio,
+        "ms_a_frame_decoding": per_frame(total(&streamed)), "speed_up_of_two": speed_up,
         "real_time_one": one_real_time, "real_time_two": two_real_time,
         "asked": { "person": person, "body": body, "hand": hand, "palm": palm, "face": face },
     });
     if !python.is_empty() {
         let theirs = median(python.clone());
-        let against = median(python.iter().zip(&streamed).map(|(ms, run)| per_frame(run.whole) / ms).collect());
+        let against = median(python.iter().zip(&streamed).map(|(ms, run)| per_frame(run.total) / ms).collect());
         text += &format!(
             "\nPython reference, decoding      {theirs:6.1} ms a frame: this program takes {against:.2} of it"
         );
@@ -229,14 +230,14 @@ pub(crate) fn run(args: &Args, progress: &dyn Progress) -> Result<Report> {
     Ok(Report { text, facts })
 }
 
-/// Milliseconds a frame of the Python reference, as it prints them, held to one processor core: its decoder and OpenCV
-/// start threads of their own otherwise.
+/// Milliseconds per frame that the Python reference prints. It is pinned to one processor core, because its decoder and
+/// OpenCV start additional threads.
 fn reference(script: &Path, video: &Path, models_dir: &Path) -> Result<f64> {
     let python = std::env::var("ORATOR_REFERENCE_PYTHON").unwrap_or_else(|_| "python3".to_owned());
     let out = std::env::temp_dir().join(format!("orator-bench-{}.npz", std::process::id()));
-    let can_hold = Command::new("taskset").arg("--version").output().is_ok_and(|output| output.status.success());
-    let mut command = Command::new(if can_hold { "taskset" } else { &python });
-    if can_hold {
+    let has_taskset = Command::new("taskset").arg("--version").output().is_ok_and(|output| output.status.success());
+    let mut command = Command::new(if has_taskset { "taskset" } else { &python });
+    if has_taskset {
         command.args(["--cpu-list", "0", &python]);
     }
     command.arg(script).arg(video).arg(&out);
@@ -252,10 +253,10 @@ fn reference(script: &Path, video: &Path, models_dir: &Path) -> Result<f64> {
         format!("{python} cannot be run; ORATOR_REFERENCE_PYTHON names a Python with onnxruntime, cv2 and numpy")
     })?;
     let _ = std::fs::remove_file(&out);
-    let said = String::from_utf8_lossy(&output.stdout);
-    let milliseconds = said.split(" ms a frame").next().and_then(|text| text.split_whitespace().last());
+    let printed = String::from_utf8_lossy(&output.stdout);
+    let milliseconds = printed.split(" ms a frame").next().and_then(|text| text.split_whitespace().last());
     let error = String::from_utf8_lossy(&output.stderr);
     milliseconds.and_then(|text| text.parse().ok()).with_context(|| {
-        format!("{} gave no time: {}", script.display(), error.lines().last().unwrap_or("it said nothing"))
+        format!("{} printed no time: {}", script.display(), error.lines().last().unwrap_or("no error output"))
     })
 }

@@ -1,5 +1,5 @@
-//! A reference in Python at work beside us: a script started as `SCRIPT serve FILE` that answers a line of JSON a
-//! command.
+//! A reference implementation in Python: a script run as `SCRIPT serve FILE` that answers each command with one line of
+//! JSON.
 
 use anyhow::{Context, Result, bail};
 use orator_nn::weights::Contents;
@@ -12,13 +12,13 @@ pub(crate) struct Reference {
     child: Child,
     to: ChildStdin,
     from: BufReader<ChildStdout>,
-    /// What it said first.
+    /// First line of its output.
     pub(crate) hello: Value,
 }
 
 impl Reference {
-    /// Starts `script` with the Python that ORATOR_REFERENCE_PYTHON names, on so many threads, `given` written to
-    /// `file` for it.
+    /// Starts `script` with the Python in ORATOR_REFERENCE_PYTHON on `n_threads` threads, with the input `given`, which
+    /// is written to `file`.
     pub(crate) fn start(script: &Path, n_threads: usize, given: &Contents, file: &Path) -> Result<Self> {
         given.write(file)?;
         let python = std::env::var("ORATOR_REFERENCE_PYTHON").unwrap_or_else(|_| "python3".to_owned());
@@ -37,26 +37,26 @@ impl Reference {
         Ok(reference)
     }
 
-    /// PyTorch's version.
+    /// Version of PyTorch.
     pub(crate) fn version(&self) -> &str {
         self.hello["torch"].as_str().unwrap_or("?")
     }
 
-    /// The answer to a command.
+    /// Sends a command and returns the answer.
     pub(crate) fn ask(&mut self, command: &str) -> Result<Value> {
         writeln!(self.to, "{command}").context("the reference has stopped")?;
         self.answer().with_context(|| format!("no answer to `{command}`"))
     }
 
-    /// The seconds in the answer to a command.
+    /// Sends a command and returns the seconds in the answer.
     pub(crate) fn secs(&mut self, command: &str) -> Result<f64> {
-        self.ask(command)?["secs"].as_f64().context("the reference gave no time")
+        self.ask(command)?["secs"].as_f64().context("the reference returned no time")
     }
 
     fn answer(&mut self) -> Result<Value> {
         let mut line = String::new();
         self.from.read_line(&mut line)?;
-        serde_json::from_str(&line).with_context(|| format!("the reference said {line:?}"))
+        serde_json::from_str(&line).with_context(|| format!("invalid answer of the reference: {line:?}"))
     }
 }
 

@@ -1,21 +1,21 @@
-//! What a part gives back, and progress bars on standard error while it is measured.
+//! Result of a measured part, and progress bars on standard error.
 
 use indicatif::{MultiProgress, ProgressBar, ProgressStyle};
 use orator_base::math::order;
 use orator_base::stage::progress::{Progress, Task};
 
-/// A measurement: as text for people and as one JSON object.
+/// A result: as text and as one JSON object.
 pub(crate) struct Report {
     pub(crate) text: String,
     pub(crate) facts: serde_json::Value,
 }
 
-/// The median of the rounds: the larger one of the two in the middle; NaN of none.
+/// Median over the rounds, the larger of the two middle values for an even number; NaN without rounds.
 pub(crate) fn median(rounds: Vec<f64>) -> f64 {
     order::upper_median(rounds).unwrap_or(f64::NAN)
 }
 
-/// Progress bars on standard error, hidden where that is no terminal.
+/// Progress bars on standard error, hidden if that is not a terminal.
 #[derive(Default)]
 pub(crate) struct Bars(MultiProgress);
 

@@ -9,10 +9,10 @@ use serde_json::json;
 use std::fs;
 use std::path::PathBuf;
 
-/// How busy `orator run` keeps the processor: all stages for the videos of a project, into a work folder of its own.
+/// Processor use of `orator run`: all stages for the videos of a project, in a separate work folder.
 #[derive(clap::Args)]
 pub(crate) struct Args {
-    /// The project's configuration.
+    /// Configuration of the project.
     #[arg(short, long, default_value = "pipeline.toml", value_name = "FILE")]
     config: PathBuf,
     /// Rounds.
@@ -23,7 +23,7 @@ pub(crate) struct Args {
 pub(crate) fn run(args: &Args, progress: &dyn Progress) -> Result<Report> {
     ensure!(args.rounds > 0, "nothing to measure: there must be a round");
     let config = config::load(&args.config, &[])?;
-    let folder = config.file.parent().context("a configuration lies in a folder")?;
+    let folder = config.file.parent().context("the configuration file has no parent folder")?;
     let work = folder.join(format!("bench-{}", std::process::id()));
     let (file, set) = (config.file.display().to_string(), format!("work.dir={}", work.display()));
     let task = progress.begin("run", args.rounds as u64);
@@ -36,8 +36,9 @@ pub(crate) fn run(args: &Args, progress: &dyn Progress) -> Result<Report> {
     }
     drop(task);
     let n_cores = std::thread::available_parallelism().map_or(1, |n| n.get()) as f64;
-    let of = |value: fn(&Child) -> f64| median(rounds.iter().map(value).collect());
-    let (secs, used, busy) = (of(|c| c.secs), of(|c| c.cpu_secs / c.secs) / n_cores, of(|c| c.busy) / n_cores);
+    let median_of = |value: fn(&Child) -> f64| median(rounds.iter().map(value).collect());
+    let (secs, used, busy) =
+        (median_of(|c| c.secs), median_of(|c| c.cpu_secs / c.secs) / n_cores, median_of(|c| c.busy) / n_cores);
     let text = format!(
         "orator run: {secs:.1} s, median of {} rounds, {n_cores} cores\n\
          processor time      {:5.1} % of the cores\n\

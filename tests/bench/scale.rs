@@ -21,15 +21,15 @@ use serde_json::json;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// How time and memory of the verbs that look at all videos grow with the hours of video. A synthetic work folder stands
-/// for the hours, a video of every ten minutes, each with the records and files of `extract` and `pose2d`, whose arrays are
-/// those of a six-second clip with another sound. Each verb runs as a program of its own.
+/// Growth of time and memory of the commands that process all videos with the hours of video. A synthetic work folder
+/// has one video per ten minutes, with the records and files of `extract` and `pose2d`; their arrays are those of a
+/// six-second clip, with different audio. Each command runs as a separate process.
 #[derive(clap::Args)]
 pub(crate) struct Args {
     /// Hours of video, two numbers.
     #[arg(long, num_args = 2, default_values_t = [10, 100], value_name = "HOURS")]
     hours: Vec<usize>,
-    /// A folder with some gigabytes of room, which gets a temporary one.
+    /// A folder with some gigabytes of free space; a temporary folder is created in it.
     #[arg(long, default_value = ".", value_name = "DIR")]
     dir: PathBuf,
 }
@@ -37,8 +37,8 @@ pub(crate) struct Args {
 const CLIP_SECS: f64 = 6.0;
 const VIDEOS_AN_HOUR: usize = 6;
 
-/// What is measured, in the order in which it can be.
-const VERBS: [(&str, &[&str]); 10] = [
+/// Measured commands, in an order in which each has its inputs.
+const COMMANDS: [(&str, &[&str]); 10] = [
     ("segment", &["run", "--only", "segment"]),
     ("lift", &["run", "--only", "lift"]),
     ("dataset", &["run", "--only", "dataset"]),
@@ -55,15 +55,15 @@ pub(crate) fn run(args: &Args, progress: &dyn Progress) -> Result<Report> {
     let (few, many) = (args.hours[0], args.hours[1]);
     ensure!(few > 0 && many > few, "--hours takes two numbers, the second one larger, not {few} and {many}");
     let root = std::path::absolute(args.dir.join(format!("bench-{}", std::process::id())))?;
-    let measured = both(&root, few, many, progress);
+    let measured = measure_both(&root, few, many, progress);
     fs::remove_dir_all(&root).with_context(|| format!("removing {}", root.display()))?;
     let measured = measured?;
 
     let head = [format!("{few} h"), format!("{many} h")];
     let mut lines = vec![format!("{:15} {:>10} {:>10}   processor an hour   peak memory", "", head[0], head[1])];
     let mut facts = serde_json::Map::new();
-    for ((name, _), [of_few, of_many]) in VERBS.iter().zip(&measured) {
-        // Processor time, since the clock on the wall knows what else the machine does.
+    for ((name, _), [of_few, of_many]) in COMMANDS.iter().zip(&measured) {
+        // Processor time, because wall time depends on other load of the machine.
         let per_hour = (of_many.cpu_secs / many as f64) / (of_few.cpu_secs / few as f64);
         lines.push(format!(
             "{name:15} {:8.2} s {:8.2} s {per_hour:11.2} times   {:.0} MiB, then {:.0} MiB",
@@ -80,18 +80,18 @@ pub(crate) fn run(args: &Args, progress: &dyn Progress) -> Result<Report> {
     Ok(Report { text: lines.join("\n"), facts: json!({ "hours": [few, many], "verbs": facts }) })
 }
 
-/// Every verb of `VERBS`, for the few hours and for the many.
-fn both(root: &Path, few: usize, many: usize, progress: &dyn Progress) -> Result<Vec<[Child; 2]>> {
+/// Measures all `COMMANDS` for both numbers of hours.
+fn measure_both(root: &Path, few: usize, many: usize, progress: &dyn Progress) -> Result<Vec<[Child; 2]>> {
     let clip = root.join("clip");
     let plan = DemoPlan { n_videos: 1, secs: CLIP_SECS, ..DemoPlan::default() };
     folder::draw(&clip, &plan, &Silent)?;
     measure(&clip, &["run", "--to", "pose2d"])?;
-    let task = progress.begin("scale", 2 * VERBS.len() as u64);
+    let task = progress.begin("scale", 2 * COMMANDS.len() as u64);
     let of_hours = |hours: usize| -> Result<Vec<Child>> {
         let dir = root.join(format!("{hours}-hours"));
         task.detail(&format!("{hours} h"));
-        make(&clip, &dir, hours * VIDEOS_AN_HOUR)?;
-        let children = VERBS.iter().map(|(_, args)| {
+        create_project(&clip, &dir, hours * VIDEOS_AN_HOUR)?;
+        let children = COMMANDS.iter().map(|(_, args)| {
             task.advance(1);
             measure(&dir, args)
         });
@@ -101,12 +101,13 @@ fn both(root: &Path, few: usize, many: usize, progress: &dyn Progress) -> Result
     Ok(of_few.into_iter().zip(of_many).map(|(few, many)| [few, many]).collect())
 }
 
-/// A project folder of `n_videos` whose `extract` and `pose2d` are done, after the pattern of the one video of `clip`.
-fn make(clip: &Path, dir: &Path, n_videos: usize) -> Result<()> {
+/// Creates a project folder of `n_videos` with completed `extract` and `pose2d`, copied from the one video of
+/// `template`.
+fn create_project(template: &Path, dir: &Path, n_videos: usize) -> Result<()> {
     let videos = dir.join("videos/host");
     fs::create_dir_all(&videos)?;
-    copy_all(&clip.join("models"), &dir.join("models"))?;
-    fs::copy(clip.join("pipeline.toml"), dir.join("pipeline.toml"))?;
+    copy_all(&template.join("models"), &dir.join("models"))?;
+    fs::copy(template.join("pipeline.toml"), dir.join("pipeline.toml"))?;
     for n in 0..n_videos {
         fs::write(videos.join(format!("talk-{n:05}.mp4")), format!("stands for video {n}"))?;
     }
@@ -115,15 +116,15 @@ fn make(clip: &Path, dir: &Path, n_videos: usize) -> Result<()> {
         let units = config::videos::all(&config).into_iter().flat_map(|videos| videos.units).collect();
         Ok((config, units))
     };
-    let (pattern, (config, units)) = (units(clip)?.1, units(dir)?);
-    let [pattern] = &pattern[..] else { anyhow::bail!("the pattern has {} videos", pattern.len()) };
+    let (template_units, (config, units)) = (units(template)?.1, units(dir)?);
+    let [video] = &template_units[..] else { anyhow::bail!("the template has {} videos", template_units.len()) };
     let hashes = HashCache::open(&artifacts::hashes(&config.settings.work.dir));
     let extract = ExtractStage::new(&config.settings.extract);
     let pose2d = Pose2dStage::new(&config.settings)?;
     let stages: [(&dyn Stage, bool); 2] = [(&extract, true), (&pose2d, false)];
     for (stage, writes_sound) in stages {
-        let from = pattern.dir(&clip.join("work").join(stage.name()));
-        let record = Record::read(&from).with_context(|| format!("{} was not made", from.display()))?;
+        let from = video.dir(&template.join("work").join(stage.name()));
+        let record = Record::read(&from).with_context(|| format!("{} was not written", from.display()))?;
         for (n, unit) in units.iter().enumerate() {
             let to = unit.dir(&config.settings.work.dir.join(stage.name()));
             copy_all(&from, &to)?;
@@ -137,7 +138,7 @@ fn make(clip: &Path, dir: &Path, n_videos: usize) -> Result<()> {
     hashes.save()
 }
 
-/// A sound that no other video has.
+/// Noise that is unique to a video.
 fn noise(seed: u64) -> Sound {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let n = (CLIP_SECS * f64::from(SAMPLE_RATE)) as usize;

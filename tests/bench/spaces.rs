@@ -13,18 +13,18 @@ use serde_json::json;
 use std::path::PathBuf;
 use std::time::Instant;
 
-/// What the spaces of the Frechet gesture distance notice: ground truth made worse in known ways, and its distance from
-/// other ground truth in raw poses, in the fixed basis and in the trained embedding; and how long an hour takes. Without
-/// --dataset the motion is the synthetic speaker's.
+/// Sensitivity of the Frechet gesture distance to known disturbances of ground-truth motion: the distance from other
+/// ground truth in raw poses, in the fixed basis and in the trained embedding; and the time for one hour of motion.
+/// Without --dataset the motion is that of the synthetic speaker.
 #[derive(clap::Args)]
 pub(crate) struct Args {
-    /// Minutes of the synthetic speaker, half of them disturbed.
+    /// Minutes of motion of the synthetic speaker; half of them are disturbed.
     #[arg(long, default_value_t = 20, value_name = "N")]
     minutes: usize,
-    /// The training split of this dataset instead.
+    /// Use the training split of this dataset instead.
     #[arg(long, value_name = "DIR")]
     dataset: Option<PathBuf>,
-    /// Rounds of the timing.
+    /// Rounds of the time measurement.
     #[arg(long, default_value_t = 3, value_name = "N")]
     rounds: usize,
 }
@@ -41,10 +41,11 @@ pub(crate) fn run(args: &Args, progress: &dyn Progress) -> Result<Report> {
             samples.iter().map(|sample| Ok(dataset.read(sample)?.motion)).collect::<Result<_>>()?
         }
     };
-    ensure!(motions.len() >= 2, "the motion has no two parts to compare");
+    ensure!(motions.len() >= 2, "the motion has fewer than two parts to compare");
     task.detail("disturbing");
     let rows = disturbed::table(&motions);
-    let floor = rows.iter().find(|row| row.disturbance == Disturbance::None).context("no floor")?.distances;
+    let floor =
+        rows.iter().find(|row| row.disturbance == Disturbance::None).context("no row without disturbance")?.distances;
     let mut text = format!("{:28}{:>22}{:>22}{:>22}\n", "disturbance", "raw poses, cm²", "basis", "embedding");
     for row in &rows {
         text += &format!("{:28}", row.disturbance.to_string());
@@ -60,19 +61,19 @@ pub(crate) fn run(args: &Args, progress: &dyn Progress) -> Result<Report> {
     let hour = concatenate(Axis(0), &views)?;
     let hour = Motion::from_joints(motions[0].fps, hour);
     let secs = hour.fps.secs(hour.n_frames());
-    let timed = |of: &dyn Fn() -> usize| {
+    let timed = |work: &dyn Fn() -> usize| {
         let mut n = 0;
         let rounds = (0..args.rounds).map(|_| {
             let start = Instant::now();
-            n = of();
+            n = work();
             start.elapsed().as_secs_f64()
         });
         (median(rounds.collect()), n)
     };
     let (joints, mask) = (hour.joints.view(), hour.mask.view());
-    let of_basis = timed(&|| basis::windows(joints, mask, hour.fps).nrows());
-    let of_embedding = timed(&|| embedding::windows(joints, mask, hour.fps).nrows());
-    for (name, (took, n)) in [("basis", of_basis), ("embedding", of_embedding)] {
+    let basis_time = timed(&|| basis::windows(joints, mask, hour.fps).nrows());
+    let embedding_time = timed(&|| embedding::windows(joints, mask, hour.fps).nrows());
+    for (name, (took, n)) in [("basis", basis_time), ("embedding", embedding_time)] {
         text += &format!("{name:10} {n:6} windows of {secs:.0} s in {took:.2} s\n");
     }
     text += &format!("basis {}\nembedding {}", basis::hash(), embedding::hash());
@@ -81,14 +82,14 @@ pub(crate) fn run(args: &Args, progress: &dyn Progress) -> Result<Report> {
         .map(|row| json!({ "disturbance": row.disturbance.to_string(), "distances": row.distances }))
         .collect();
     let facts = json!({
-        "rows": table, "motion_secs": secs, "basis_secs": of_basis.0, "embedding_secs": of_embedding.0,
+        "rows": table, "motion_secs": secs, "basis_secs": basis_time.0, "embedding_secs": embedding_time.0,
         "basis": basis::hash(), "embedding": embedding::hash(),
     });
     drop(task);
     Ok(Report { text, facts })
 }
 
-/// Motion goes on until there is an hour of it.
+/// Step of a scan that ends after one hour of motion; `n` counts the frames.
 fn until_an_hour<'a>(n: &mut usize, joints: ArrayView3<'a, f32>) -> Option<ArrayView3<'a, f32>> {
     const HOUR: usize = 54_000;
     let before = *n;

@@ -1,5 +1,5 @@
-//! `cargo bench -- study`: answers of many participants at once, by a load generator made by others: the study's server
-//! in turns with a bare route that writes the same row (`synchronous=FULL`) without anything around it.
+//! `cargo bench -- study`: response times for concurrent answers of many participants, sent by the load generator
+//! autocannon, of the study server and of a minimal route that only writes the same row (`synchronous=FULL`).
 
 use super::report::{Report, median};
 use super::served_study::{Client, MadeStudy, answer, fitting};
@@ -17,28 +17,28 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::sync::{Arc, Mutex};
 
-/// Frames of the films: shorter than what an answer may come too early.
+/// Length of the films, short enough that no answer is rejected as too early.
 const FRAMES: usize = 5;
 
-/// Milliseconds of an answer while all participants answer at once, beside a bare route that writes the same row. Needs
-/// node and autocannon (`make loader`).
+/// Response time of the study server in milliseconds while all participants answer concurrently, compared with a
+/// minimal route that writes the same row. Needs node and autocannon (`make loader`).
 #[derive(clap::Args)]
 pub(crate) struct Args {
-    /// Participants at once, each with a connection.
+    /// Number of concurrent participants, each with a connection.
     #[arg(long, default_value_t = 200, value_name = "N")]
     participants: usize,
-    /// Answers of each, one after another.
+    /// Number of consecutive answers of each participant.
     #[arg(long, default_value_t = 20, value_name = "N")]
     answers: usize,
     /// Rounds; each measures both once.
     #[arg(long, default_value_t = 5, value_name = "N")]
     rounds: usize,
-    /// Folder whose node_modules hold autocannon; without: ORATOR_LOADER, or target/loader.
+    /// Folder whose node_modules contain autocannon; default: ORATOR_LOADER, or target/loader.
     #[arg(long, value_name = "FOLDER")]
     loader: Option<PathBuf>,
 }
 
-/// Median and 99 % quantile of the answers' times, milliseconds.
+/// Median and 99 % quantile of the response times, milliseconds.
 type Quantiles = [f64; 2];
 
 pub(crate) fn run(args: &Args, progress: &dyn Progress) -> Result<Report> {
@@ -50,8 +50,8 @@ pub(crate) fn run(args: &Args, progress: &dyn Progress) -> Result<Report> {
         served.push(study_server(args)?);
         task.advance(1);
     }
-    let of = |rounds: &[Quantiles]| [0, 1].map(|k| median(rounds.iter().map(|round| round[k]).collect()));
-    let ([bare_median, bare_p99], [median, p99]) = (of(&bare), of(&served));
+    let medians = |rounds: &[Quantiles]| [0, 1].map(|k| median(rounds.iter().map(|round| round[k]).collect()));
+    let ([bare_median, bare_p99], [median, p99]) = (medians(&bare), medians(&served));
     let text = format!(
         "{} participants at once, {} answers each, none lost or doubled; milliseconds\n{:24}{:>8}{:>8}\n\
          {:24}{median:8.1}{p99:8.1}\n{:24}{bare_median:8.1}{bare_p99:8.1}\nratio of the 99 % {:.2}",
@@ -74,19 +74,23 @@ pub(crate) fn run(args: &Args, progress: &dyn Progress) -> Result<Report> {
 fn study_server(args: &Args) -> Result<Quantiles> {
     let study = MadeStudy::new(args.participants, args.participants, args.answers, FRAMES);
     let served = study.serve(&[]);
-    let clients = (0..args.participants).map(|who| {
+    let clients = (0..args.participants).map(|participant| {
         let mut client = Client::new();
-        client.begin(&served.address, &format!("p{who}")).context("the server is gone")?;
+        client.begin(&served.address, &format!("p{participant}")).context("the server does not respond")?;
         Ok(client_of(args, "Authorization", &format!("Bearer {}", client.token)))
     });
     let quantiles = load(args, &served.address, clients.collect::<Result<_>>()?)?;
     let votes = study.exported("votes");
-    let mut places: Vec<String> =
+    let mut answered: Vec<String> =
         votes.iter().map(|vote| format!("{} {}", vote["participant"], vote["trial"])).collect();
-    places.sort();
-    places.dedup();
-    let wanted = args.participants * args.answers;
-    ensure!(votes.len() == wanted && places.len() == wanted, "{} of {wanted} answers are stored", places.len());
+    answered.sort();
+    answered.dedup();
+    let expected = args.participants * args.answers;
+    ensure!(
+        votes.len() == expected && answered.len() == expected,
+        "{} of {expected} answers are stored",
+        answered.len()
+    );
     Ok(quantiles)
 }
 
@@ -99,7 +103,7 @@ fn bare_route(args: &Args) -> Result<Quantiles> {
     let address = listener.local_addr()?.to_string();
     let router = Router::new().route("/api/answer", post(insert)).with_state(Arc::new(Mutex::new(db)));
     runtime.spawn(async move { axum::serve(listener, router).await });
-    let clients = (0..args.participants).map(|who| client_of(args, "participant", &format!("{who:024x}")));
+    let clients = (0..args.participants).map(|id| client_of(args, "participant", &format!("{id:024x}")));
     let quantiles = load(args, &address, clients.collect());
     runtime.shutdown_background();
     quantiles
@@ -112,7 +116,7 @@ async fn insert(State(db): State<Arc<Mutex<Connection>>>, headers: HeaderMap, bo
     if matches!(written, Ok(Ok(()))) { StatusCode::OK } else { StatusCode::INTERNAL_SERVER_ERROR }
 }
 
-/// A client of the load generator: its header and all its answers.
+/// Client of the load generator: its headers and the bodies of all its answers.
 fn client_of(args: &Args, header: &str, value: &str) -> Value {
     let bodies = (0..args.answers).map(|position| answer(position, &fitting(position, true)).to_string());
     json!({
@@ -121,7 +125,7 @@ fn client_of(args: &Args, header: &str, value: &str) -> Value {
     })
 }
 
-/// Sends all that the clients have to say to `address`, each answer of which must be well.
+/// Sends the requests of all clients to `address`; each must be answered with status 200.
 fn load(args: &Args, address: &str, clients: Vec<Value>) -> Result<Quantiles> {
     let dir = tempfile::tempdir()?;
     let plan = dir.path().join("plan.json");
@@ -131,11 +135,12 @@ fn load(args: &Args, address: &str, clients: Vec<Value>) -> Result<Quantiles> {
     let loader = std::path::absolute(loader.unwrap_or_else(|| "target/loader".into()))?;
     let mut node = Command::new("node");
     let node = node.arg(script).arg(plan).env("ORATOR_LOADER", loader).stdin(Stdio::null()).stderr(Stdio::inherit());
-    let said = node.output().context("node did not start")?;
-    let said: Value = serde_json::from_slice(&said.stdout).context("autocannon is not there (`make loader`)")?;
-    let wanted = args.participants * args.answers;
-    let is_well = said["statuses"] == json!({ "200": wanted }) && said["errors"] == 0;
-    ensure!(is_well, "of {wanted} answers these came: {}, errors {}", said["statuses"], said["errors"]);
-    let times: Vec<f64> = serde_json::from_value(said["times"].clone())?;
-    Ok([0.5, 0.99].map(|share| times[((share * times.len() as f64) as usize).min(times.len() - 1)]))
+    let output = node.output().context("node did not start")?;
+    let result: Value =
+        serde_json::from_slice(&output.stdout).context("autocannon is not installed (`make loader`)")?;
+    let expected = args.participants * args.answers;
+    let succeeded = result["statuses"] == json!({ "200": expected }) && result["errors"] == 0;
+    ensure!(succeeded, "expected {expected} x status 200: {}, errors {}", result["statuses"], result["errors"]);
+    let times: Vec<f64> = serde_json::from_value(result["times"].clone())?;
+    Ok([0.5, 0.99].map(|quantile| times[((quantile * times.len() as f64) as usize).min(times.len() - 1)]))
 }

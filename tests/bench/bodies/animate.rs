@@ -15,8 +15,8 @@ use rand_chacha::ChaCha8Rng;
 use serde_json::json;
 use std::time::Instant;
 
-/// Joints to animation, on one core: smoothing, rotations and constraints, then the bytes of each kind of file, none of
-/// which is written. The motion is the synthetic speaker's, with missing hands.
+/// Conversion of joints to animation on one core: smoothing, rotations and constraints, then the bytes of each file
+/// format, which are not written to disk. The motion is that of the synthetic speaker, with missing hands.
 #[derive(clap::Args)]
 pub(crate) struct Args {
     /// Seconds of motion.
@@ -25,7 +25,7 @@ pub(crate) struct Args {
     /// Rounds; each measures every step once.
     #[arg(long, default_value_t = 5, value_name = "N")]
     rounds: usize,
-    /// Frames a second that are written; the motion has 15.
+    /// Frame rate of the output; the motion has 15 fps.
     #[arg(long, default_value_t = 15, value_name = "N")]
     fps: u32,
 }
@@ -35,10 +35,10 @@ const FPS: FrameRate = FrameRate::new(15, 1);
 pub(crate) fn run(args: &Args, progress: &dyn Progress) -> Result<Report> {
     ensure!(args.secs >= 1.0 && args.secs < 1e5, "--secs is {}, expected 1 to a hundred thousand", args.secs);
     ensure!(args.rounds > 0 && args.fps > 0, "nothing to measure: there must be rounds and frames a second");
-    let mut dice = ChaCha8Rng::seed_from_u64(1337);
-    let speech = Speech::new(args.secs, &mut dice);
+    let mut rng = ChaCha8Rng::seed_from_u64(1337);
+    let speech = Speech::new(args.secs, &mut rng);
     let mut motion =
-        RuleGestures::with_variation(&speech, &[], args.secs, &mut dice).motion(FPS.frames_in(args.secs), FPS);
+        RuleGestures::with_variation(&speech, &[], args.secs, &mut rng).motion(FPS.frames_in(args.secs), FPS);
     for (t, mut frame) in motion.joints.outer_iter_mut().enumerate() {
         if t % 100 < 10 {
             frame.slice_mut(ndarray::s![8..28, ..]).fill(f32::NAN);
@@ -67,12 +67,12 @@ pub(crate) fn run(args: &Args, progress: &dyn Progress) -> Result<Report> {
     drop(task);
     let [perform_secs, bvh_secs, avatar_secs, glb_secs] = secs.map(median);
     let speed = |secs: f64| args.secs / secs;
-    let whole = speed(perform_secs + bvh_secs);
+    let total = speed(perform_secs + bvh_secs);
     let text = format!(
         "{:.0} s of motion at {FPS}, written at {} fps, one core, median of {} round(s)\n\
          joints to performance {:6.0} x real time\n\
          performance to BVH    {:6.0} x real time ({:.1} KiB a second)\n\
-         joints to BVH         {whole:6.0} x real time\n\
+         joints to BVH         {total:6.0} x real time\n\
          the avatar, once      {avatar_secs:6.2} s\n\
          performance to GLB    {:6.0} x real time ({:.1} KiB a second)\n\
          avatar and GLB        {:6.0} x real time",
@@ -91,7 +91,7 @@ pub(crate) fn run(args: &Args, progress: &dyn Progress) -> Result<Report> {
         "fps": args.fps,
         "perform_times_real_time": speed(perform_secs),
         "bvh_times_real_time": speed(bvh_secs),
-        "times_real_time": whole,
+        "times_real_time": total,
         "avatar_secs": avatar_secs,
         "glb_times_real_time": speed(glb_secs),
         "glb_with_avatar_times_real_time": speed(avatar_secs + glb_secs),

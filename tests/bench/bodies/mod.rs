@@ -1,4 +1,4 @@
-//! Bodies: joints as animation files, and the avatar as pictures.
+//! Benchmarks of animation: export of joints to animation files, and rendering of the avatar.
 
 pub(crate) mod animate;
 pub(crate) mod render;

@@ -18,11 +18,11 @@ use rand_chacha::ChaCha8Rng;
 use serde_json::json;
 use std::time::Instant;
 
-/// Avatar to pictures of 1280 x 720 px, on one core: posing and drawing, with shadows; beside it the background of a desk
-/// and a wall, once. Then a whole film, as `orator animate` makes it, and the encoder alone on the same pictures.
+/// Rendering of the avatar at 1280 x 720 px on one core: posing and drawing, with shadows; and once the background of a
+/// desk and a wall. Then a complete film, as `orator animate` writes it, and only the encoder on the same frames.
 #[derive(clap::Args)]
 pub(crate) struct Args {
-    /// Frames of a round.
+    /// Frames per round.
     #[arg(long, default_value_t = 150, value_name = "N")]
     frames: usize,
     /// Rounds; each measures every step once.
@@ -31,25 +31,26 @@ pub(crate) struct Args {
 }
 
 const SIZE: [usize; 2] = [1280, 720];
-/// Pictures of the film that the encoder alone takes in turn.
-const N_KEPT: usize = 30;
-/// Real time: frames a second.
+/// Number of film frames that the encoder benchmark cycles through.
+const N_FRAMES_ENCODED: usize = 30;
+/// Frame rate of the film and of real time.
 const FPS: FrameRate = FrameRate::new(30, 1);
 
 pub(crate) fn run(args: &Args, progress: &dyn Progress) -> Result<Report> {
     ensure!(args.rounds > 0 && args.frames > 0, "nothing to measure: there must be rounds and frames");
-    let mut dice = ChaCha8Rng::seed_from_u64(1337);
+    let mut rng = ChaCha8Rng::seed_from_u64(1337);
     let secs = FPS.secs(args.frames);
-    let speech = Speech::new(secs, &mut dice);
-    let motion = RuleGestures::with_variation(&speech, &[], secs, &mut dice).motion(args.frames, FPS);
+    let speech = Speech::new(secs, &mut rng);
+    let motion = RuleGestures::with_variation(&speech, &[], secs, &mut rng).motion(args.frames, FPS);
     let performance = perform(&motion, None, &AnimationOptions::default());
     let mut view = AvatarView::new(&performance, &[&performance], SIZE, FilmCamera::Front);
     let folder = tempfile::tempdir()?;
     let task = progress.begin("render", args.rounds as u64);
-    let (camera, beside) = (FilmCamera::Front, SecondPanel::Itself);
-    let content = FilmSource { performance: &performance, camera, sound: None, second_panel: beside };
+    let (camera, second_panel) = (FilmCamera::Front, SecondPanel::Itself);
+    let content = FilmSource { performance: &performance, camera, sound: None, second_panel };
     let mut film = Film::new(content);
-    let films: Vec<Image> = (0..args.frames.min(N_KEPT)).map(|frame| film.frame(frame)).collect::<Result<_>>()?;
+    let films: Vec<Image> =
+        (0..args.frames.min(N_FRAMES_ENCODED)).map(|frame| film.frame(frame)).collect::<Result<_>>()?;
     let mut secs: [Vec<f64>; 4] = Default::default();
     for _ in 0..args.rounds {
         let start = Instant::now();
@@ -74,7 +75,7 @@ pub(crate) fn run(args: &Args, progress: &dyn Progress) -> Result<Report> {
         task.advance(1);
     }
     drop(task);
-    let [drawing, scene, encoding, whole] = secs.map(median);
+    let [drawing, scene, encoding, film_secs] = secs.map(median);
     let per_frame = |secs: f64| 1e3 * secs / args.frames as f64;
     let speed = FPS.secs(args.frames) / drawing;
     let text = format!(
@@ -91,8 +92,8 @@ pub(crate) fn run(args: &Args, progress: &dyn Progress) -> Result<Report> {
         per_frame(drawing),
         1e3 * scene,
         per_frame(encoding),
-        per_frame(whole),
-        whole / encoding,
+        per_frame(film_secs),
+        film_secs / encoding,
     );
     let facts = json!({
         "frames": args.frames,
@@ -101,13 +102,13 @@ pub(crate) fn run(args: &Args, progress: &dyn Progress) -> Result<Report> {
         "times_real_time": speed,
         "scene_ms": 1e3 * scene,
         "encode_ms": per_frame(encoding),
-        "film_ms": per_frame(whole),
-        "film_per_encoder": whole / encoding,
+        "film_ms": per_frame(film_secs),
+        "film_per_encoder": film_secs / encoding,
     });
     Ok(Report { text, facts })
 }
 
-/// A desk before a wall.
+/// Background: a desk in front of a wall.
 fn desk() -> Background {
     let square = |corners: [[f32; 3]; 4], normal: [f32; 3]| Mesh {
         points: corners.to_vec(),

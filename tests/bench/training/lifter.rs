@@ -1,5 +1,5 @@
-//! `cargo bench -- lifter`: a training step of the temporal lifter, one thread, in turns with PyTorch's for the same
-//! network, the same batch and the same optimiser; and how far apart the two networks' outputs are.
+//! `cargo bench -- lifter`: a training step of the temporal lifter on one thread, compared with PyTorch for the same
+//! network, batch and optimiser; and the difference of the outputs.
 
 use super::super::reference::Reference;
 use super::super::report::{Report, median};
@@ -20,43 +20,43 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-/// Training of the temporal lifter on one thread: seconds a step and, with `--python`, against PyTorch. Both train the
-/// same network on the same batch: forward, backward, clipping, Adam with AMSGrad.
+/// Training of the temporal lifter on one thread: time per step, compared with PyTorch if `--python` is given. Both
+/// train the same network on the same batch: forward, backward, gradient clipping, Adam with AMSGrad.
 #[derive(clap::Args)]
 pub(crate) struct Args {
-    /// Channels of the network.
+    /// Number of channels of the network.
     #[arg(long, default_value_t = 256, value_name = "N")]
     channels: usize,
     /// Kernel widths, odd; their product is the window in frames.
     #[arg(long, default_values_t = [3, 3, 3], value_delimiter = ',', value_name = "N,N,...")]
     widths: Vec<usize>,
-    /// Windows of a step.
+    /// Windows per step.
     #[arg(long, default_value_t = 512, value_name = "N")]
     batch: usize,
-    /// Steps of a turn.
+    /// Steps per round.
     #[arg(long, default_value_t = 5, value_name = "N")]
     steps: usize,
     /// Rounds; each measures every variant once.
     #[arg(long, default_value_t = 5, value_name = "N")]
     rounds: usize,
-    /// Windows of an epoch, to say its time.
+    /// Windows per epoch, for the time per epoch.
     #[arg(long, default_value_t = 100_000, value_name = "N")]
     epoch: usize,
-    /// The PyTorch reference, started as `REFERENCE.py serve FILE`; ORATOR_REFERENCE_PYTHON names its Python.
+    /// PyTorch reference script, run as `REFERENCE.py serve FILE` with the Python in ORATOR_REFERENCE_PYTHON.
     #[arg(long, value_name = "FILE")]
     python: Option<PathBuf>,
 }
 
-/// A lesson that always draws the same batch: only the training step costs time.
-struct Fixed {
+/// A training task with a constant batch, so that only the training step is measured.
+struct FixedBatch {
     params: Params,
     net: TemporalLifter,
-    /// Sample after sample.
+    /// Samples in order.
     x: Vec<f32>,
     y: Vec<f32>,
 }
 
-impl Fixed {
+impl FixedBatch {
     fn new(config: &Config, batch: usize) -> Result<Self> {
         let mut params = Params::new(1);
         let net = TemporalLifter::new(&mut params, "body", config)?;
@@ -78,7 +78,7 @@ impl Fixed {
         Ok((x, y))
     }
 
-    /// Weights and batch for the reference.
+    /// Weights and batch as input of the reference.
     fn contents(&self) -> Result<Contents> {
         let mut contents = Contents { facts: json!({ "kind": "benchmark" }), tensors: BTreeMap::new() };
         contents.add("", self.params.tensors()?);
@@ -88,23 +88,28 @@ impl Fixed {
         Ok(contents)
     }
 
-    /// Largest difference of the outputs to the reference's in either of its forms, over the largest output.
-    fn apart(&self, reference: &mut Reference) -> Result<f64> {
+    /// Largest difference from the outputs of both forms of the reference, relative to the largest output.
+    fn output_difference(&self, reference: &mut Reference) -> Result<f64> {
         let answer = reference.ask("forward")?;
-        let mut apart = 0.0f64;
+        let mut largest = 0.0f64;
         let (x, _) = self.tensors()?;
         let own: Vec<f32> = self.net.forward(&x, &mut Mode::Eval)?.flatten_all()?.to_vec1()?;
         for form in ["strided", "dilated"] {
             let their: Vec<f64> = serde_json::from_value(answer[form].clone())?;
-            ensure!(their.len() == own.len(), "the reference gave {} {form} outputs, we {}", their.len(), own.len());
-            let most = their.iter().fold(1e-9f64, |most, v| most.max(v.abs()));
-            let far = own.iter().zip(&their).map(|(a, b)| (f64::from(*a) - b).abs() / most);
-            apart = far.fold(apart, f64::max);
+            ensure!(
+                their.len() == own.len(),
+                "the reference returned {} {form} outputs, expected {}",
+                their.len(),
+                own.len()
+            );
+            let scale = their.iter().fold(1e-9f64, |largest, v| largest.max(v.abs()));
+            let differences = own.iter().zip(&their).map(|(a, b)| (f64::from(*a) - b).abs() / scale);
+            largest = differences.fold(largest, f64::max);
         }
-        Ok(apart)
+        Ok(largest)
     }
 
-    /// Seconds of `steps` training steps; `scratch` is where the training leaves its weights.
+    /// Seconds for `steps` training steps; the weights are saved to `scratch`.
     fn train(&mut self, steps: usize, scratch: &Path) -> Result<f64> {
         let batch = self.batch();
         let schedule =
@@ -115,7 +120,7 @@ impl Fixed {
     }
 }
 
-impl TrainingTask for Fixed {
+impl TrainingTask for FixedBatch {
     fn kind(&self) -> &'static str {
         "benchmark"
     }
@@ -132,7 +137,7 @@ impl TrainingTask for Fixed {
         vec![1.0; N_OUT / 3]
     }
     fn sample(&self, rng: &mut ChaCha8Rng, x: &mut [f32], y: &mut [f32]) {
-        // a sample of the trainer has its number in its stream of random numbers
+        // The trainer sets the random stream of a sample to its index.
         let sample = rng.get_stream() as usize % (self.batch() + 1);
         let part = |all: &[f32], to: &mut [f32]| {
             let start = sample * to.len();
@@ -161,7 +166,7 @@ pub(crate) fn run(args: &Args, progress: &dyn Progress) -> Result<Report> {
     let config =
         Config { n_in: N_IN, n_out: N_OUT, channels: args.channels, widths: args.widths.clone(), dropout: 0.0 };
     let folder = std::env::temp_dir().join(format!("orator-bench-{}", std::process::id()));
-    std::fs::create_dir_all(&folder).with_context(|| format!("cannot make the folder {}", folder.display()))?;
+    std::fs::create_dir_all(&folder).with_context(|| format!("cannot create the folder {}", folder.display()))?;
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build()?;
     let measured = pool.install(|| measure(args, &config, &folder, progress));
     let _ = std::fs::remove_dir_all(&folder);
@@ -169,15 +174,15 @@ pub(crate) fn run(args: &Args, progress: &dyn Progress) -> Result<Report> {
 }
 
 fn measure(args: &Args, config: &Config, folder: &Path, progress: &dyn Progress) -> Result<Report> {
-    let mut ours = Fixed::new(config, args.batch)?;
+    let mut ours = FixedBatch::new(config, args.batch)?;
     let scratch = folder.join("trained.safetensors");
-    // running statistics that are not the first ones
+    // Two steps, so that the running statistics differ from their initial values.
     ours.train(2, &scratch)?;
     let mut theirs = match &args.python {
         Some(script) => Some(Reference::start(script, 1, &ours.contents()?, &folder.join("given.safetensors"))?),
         None => None,
     };
-    let apart = theirs.as_mut().map(|theirs| ours.apart(theirs)).transpose()?;
+    let difference = theirs.as_mut().map(|theirs| ours.output_difference(theirs)).transpose()?;
     let task = progress.begin("lifter", args.rounds as u64);
     let (mut own, mut conv, mut linear) = (vec![], vec![], vec![]);
     for _ in 0..args.rounds {
@@ -207,7 +212,7 @@ fn measure(args: &Args, config: &Config, folder: &Path, progress: &dyn Progress)
     );
     let mut facts = json!({ "parameters": ours.params.n_parameters(), "window": config.receptive_field(),
         "batch": args.batch, "secs_a_step": secs, "epoch_windows": args.epoch, "secs_an_epoch": epoch(secs) });
-    if let (Some(theirs), Some(apart)) = (theirs, apart) {
+    if let (Some(theirs), Some(difference)) = (theirs, difference) {
         for (form, name, times) in [("conv", "strided conv1d", conv), ("linear", "reshape and linear", linear)] {
             let ratio = median(own.iter().zip(&times).map(|(own, their)| own / their).collect());
             let secs = median(times);
@@ -219,8 +224,9 @@ fn measure(args: &Args, config: &Config, folder: &Path, progress: &dyn Progress)
             facts[format!("pytorch_{form}_secs_a_step")] = json!(secs);
             facts[format!("ratio_to_pytorch_{form}")] = json!(ratio);
         }
-        text += &format!("\nPyTorch {}: outputs at most {apart:.1e} apart, over the largest output", theirs.version());
-        facts["outputs_apart"] = json!(apart);
+        text +=
+            &format!("\nPyTorch {}: outputs at most {difference:.1e} apart, over the largest output", theirs.version());
+        facts["outputs_apart"] = json!(difference);
         facts["pytorch"] = json!(theirs.version());
     }
     Ok(Report { text, facts })

@@ -1,4 +1,4 @@
-//! Speed of training steps.
+//! Benchmarks of training steps.
 
 pub(crate) mod lifter;
 pub(crate) mod seq2seq;

@@ -1,5 +1,5 @@
-//! `cargo bench -- seq2seq`: a training step of FineMotion's networks in turns with PyTorch's, for the same weights,
-//! batch, losses and optimiser; peak memory of both, how far apart their poses are, and how fast poses are generated.
+//! `cargo bench -- seq2seq`: a training step of the FineMotion networks, compared with PyTorch for the same weights,
+//! batch, losses and optimiser: time, peak memory and difference of the poses; and the speed of generation.
 
 use super::super::child::own_peak_mib;
 use super::super::reference::Reference;
@@ -25,36 +25,36 @@ use std::path::PathBuf;
 use std::time::Instant;
 
 const VOCABULARY: usize = 5000;
-/// Words of a segment, and words around a pose.
+/// Number of words per segment, and around a pose.
 const WORDS: [usize; 2] = [15, 10];
 const LEARNING_RATE: f64 = 1e-3;
-/// Frames of a second.
+/// Frames per second.
 const FPS: f64 = 20.0;
-/// Segments of the generated sound.
+/// Number of segments to generate.
 const SEGMENTS: usize = 20;
 
 /// A training step of a sequence-to-sequence network, and generation with it.
 #[derive(clap::Args)]
 pub(crate) struct Args {
-    /// The contextual network instead of that of words.
+    /// The contextual network instead of the words network.
     #[arg(long)]
     contextual: bool,
-    /// Segments of a step.
+    /// Segments per step.
     #[arg(long, default_value_t = 50, value_name = "N")]
     batch: usize,
-    /// Steps of a turn.
+    /// Steps per round.
     #[arg(long, default_value_t = 3, value_name = "N")]
     steps: usize,
     /// Rounds; each measures every variant once.
     #[arg(long, default_value_t = 5, value_name = "N")]
     rounds: usize,
-    /// The PyTorch reference, started as `REFERENCE.py serve FILE`; ORATOR_REFERENCE_PYTHON names its Python.
+    /// PyTorch reference script, run as `REFERENCE.py serve FILE` with the Python in ORATOR_REFERENCE_PYTHON.
     #[arg(long, value_name = "FILE")]
     python: Option<PathBuf>,
 }
 
-/// A network with its optimiser and a batch that stays.
-struct Fixed {
+/// A network with its optimiser and a constant batch.
+struct FixedBatch {
     network: Box<dyn GesturePredictor>,
     params: Params,
     adam: Adam,
@@ -71,7 +71,7 @@ fn network(contextual: bool, params: &mut Params) -> candle_core::Result<Box<dyn
     })
 }
 
-/// Inputs of so many segments.
+/// Inputs of `batch` segments.
 fn segment(contextual: bool, batch: usize, config: &Config) -> candle_core::Result<Segment> {
     let numbers = |shape: &[usize], phase| pattern(shape, phase)?.to_dtype(DType::F32);
     let shape = match contextual {
@@ -87,7 +87,7 @@ fn segment(contextual: bool, batch: usize, config: &Config) -> candle_core::Resu
     })
 }
 
-impl Fixed {
+impl FixedBatch {
     fn new(args: &Args) -> Result<Self> {
         let mut params = Params::new(1);
         let network = network(args.contextual, &mut params)?;
@@ -98,7 +98,7 @@ impl Fixed {
         Ok(Self { network, params, adam, segment, target, rng: ChaCha8Rng::seed_from_u64(0) })
     }
 
-    /// Weights and batch for the reference.
+    /// Weights and batch as input of the reference.
     fn contents(&self, args: &Args, n_threads: usize) -> Result<Contents> {
         let config = self.network.config();
         let settings = [usize::from(args.contextual), config.context, config.predicted, n_threads].map(|v| v as f32);
@@ -114,27 +114,27 @@ impl Fixed {
         Ok(Contents { facts: json!({}), tensors })
     }
 
-    /// Seconds of `steps` steps.
+    /// Seconds for `steps` steps.
     fn train(&mut self, steps: usize) -> Result<f64> {
         let start = Instant::now();
         for _ in 0..steps {
-            let made = self.network.forward(&self.segment, &mut Mode::Train(&mut self.rng))?;
-            let loss = losses::total(&Seq2seqConfig::default(), &made, &self.target, None)?;
+            let poses = self.network.forward(&self.segment, &mut Mode::Train(&mut self.rng))?;
+            let loss = losses::total(&Seq2seqConfig::default(), &poses, &self.target, None)?;
             self.adam.step(&loss.backward()?, LEARNING_RATE)?;
         }
         Ok(start.elapsed().as_secs_f64())
     }
 
-    /// Largest difference of the poses, over the largest of them.
-    fn apart(&self, theirs: &mut Reference) -> Result<f64> {
+    /// Largest difference of the poses, relative to the largest pose value.
+    fn pose_difference(&self, theirs: &mut Reference) -> Result<f64> {
         let their: Vec<f64> = serde_json::from_value(theirs.ask("forward")?["poses"].clone())?;
         let own = self.network.forward(&self.segment, &mut Mode::Eval)?.flatten_all()?.to_vec1::<f32>()?;
-        ensure!(own.len() == their.len(), "the reference gave {} numbers, expected {}", their.len(), own.len());
-        let most = their.iter().fold(1e-9f64, |most, v| most.max(v.abs()));
-        Ok(own.iter().zip(&their).map(|(own, their)| (f64::from(*own) - their).abs() / most).fold(0.0, f64::max))
+        ensure!(own.len() == their.len(), "the reference returned {} numbers, expected {}", their.len(), own.len());
+        let scale = their.iter().fold(1e-9f64, |largest, v| largest.max(v.abs()));
+        Ok(own.iter().zip(&their).map(|(own, their)| (f64::from(*own) - their).abs() / scale).fold(0.0, f64::max))
     }
 
-    /// Seconds of motion a second, by one thread, with these weights.
+    /// Seconds of motion generated per second on one thread with these weights.
     fn times_real_time(&self, contextual: bool) -> Result<f64> {
         let mut params = Params::frozen();
         let network = network(contextual, &mut params)?;
@@ -158,13 +158,13 @@ impl Fixed {
 pub(crate) fn run(args: &Args, progress: &dyn Progress) -> Result<Report> {
     ensure!(args.rounds > 0 && args.steps > 0 && args.batch > 1, "rounds, steps and two segments a batch at least");
     let n_threads = rayon::current_num_threads();
-    let mut ours = Fixed::new(args)?;
+    let mut ours = FixedBatch::new(args)?;
     let file = std::env::temp_dir().join(format!("orator-bench-{}.safetensors", std::process::id()));
     let start = |script| Reference::start(script, n_threads, &ours.contents(args, n_threads)?, &file);
     let theirs = args.python.as_deref().map(start).transpose();
     let _ = std::fs::remove_file(&file);
     let mut theirs = theirs?;
-    let apart = theirs.as_mut().map(|theirs| ours.apart(theirs)).transpose()?;
+    let difference = theirs.as_mut().map(|theirs| ours.pose_difference(theirs)).transpose()?;
     let task = progress.begin("seq2seq", args.rounds as u64);
     let (mut own, mut their) = (vec![], vec![]);
     for _ in 0..args.rounds {
@@ -187,18 +187,18 @@ pub(crate) fn run(args: &Args, progress: &dyn Progress) -> Result<Report> {
     );
     let mut facts = json!({ "contextual": args.contextual, "batch": args.batch, "threads": n_threads,
         "secs_a_step": median(own.clone()), "peak_mib": peak, "times_real_time": speed });
-    if let (Some(theirs), Some(apart)) = (&mut theirs, apart) {
+    if let (Some(theirs), Some(difference)) = (&mut theirs, difference) {
         let memory = theirs.ask("memory")?["peak_mib"].as_f64().unwrap_or(f64::NAN);
         let ratio = median(own.iter().zip(&their).map(|(own, their)| own / their).collect());
         text += &format!(
             "\nPyTorch {:9}{:9.1} ms a step, peak memory {memory:6.0} MiB\n\
-             this program takes {ratio:.2} of PyTorch's time and {:.2} of its memory; poses {apart:.1e} apart",
+             this program takes {ratio:.2} of PyTorch's time and {:.2} of its memory; poses {difference:.1e} apart",
             theirs.version(),
             1e3 * median(their.clone()),
             peak / memory
         );
         facts["pytorch"] = json!({ "version": theirs.version(), "secs_a_step": median(their), "peak_mib": memory,
-            "ratio": ratio, "memory_ratio": peak / memory, "outputs_apart": apart });
+            "ratio": ratio, "memory_ratio": peak / memory, "outputs_apart": difference });
     }
     Ok(Report { text, facts })
 }

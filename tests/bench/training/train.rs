@@ -1,5 +1,5 @@
-//! `cargo bench -- train`: a step of the GAN trainer in turns with PyTorch's, for the same networks, batch, losses and
-//! optimiser; peak memory of both; how far apart they are; and where the time of a step goes.
+//! `cargo bench -- train`: a step of the GAN trainer, compared with PyTorch for the same networks, batch, losses and
+//! optimiser: time, peak memory and difference of the results; and the time of each phase of a step.
 
 use super::super::child::own_peak_mib;
 use super::super::reference::Reference;
@@ -29,45 +29,45 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 const FPS: FrameRate = FrameRate::new(15, 1);
-/// Share of the joints that are missing in the batch.
+/// Fraction of joints that are missing in the batch.
 const MISSING: f64 = 0.1;
-/// Every how many outputs are compared.
-const EVERY: usize = 97;
+/// Stride of the compared outputs.
+const OUTPUT_STRIDE: usize = 97;
 
-/// A step of the GAN trainer on all cores: seconds, peak memory, where the time goes and, with `--python`, the step of
-/// PyTorch. Both train the same networks on the same batch: forward kinematics of the bones, L1 over the joints that
-/// are not missing, the least-squares adversarial loss, clipping of the gradient, Adam.
+/// A step of the GAN trainer on all cores: time, peak memory, time per phase and, with `--python`, comparison with
+/// PyTorch. Both train the same networks on the same batch: forward kinematics, L1 over the joints that are not
+/// missing, least-squares adversarial loss, gradient clipping, Adam.
 #[derive(clap::Args)]
 pub(crate) struct Args {
-    /// The network: `light` or `paper`.
+    /// Network preset: `light` or `paper`.
     #[arg(long, default_value = "light", value_name = "NAME")]
     preset: String,
-    /// Windows of a step.
+    /// Windows per step.
     #[arg(long, default_value_t = 32, value_name = "N")]
     batch: usize,
-    /// Steps of a turn.
+    /// Steps per round.
     #[arg(long, default_value_t = 3, value_name = "N")]
     steps: usize,
     /// Rounds; each measures every variant once.
     #[arg(long, default_value_t = 5, value_name = "N")]
     rounds: usize,
-    /// The PyTorch reference, started as `REFERENCE.py serve FILE`; ORATOR_REFERENCE_PYTHON names its Python.
+    /// PyTorch reference script, run as `REFERENCE.py serve FILE` with the Python in ORATOR_REFERENCE_PYTHON.
     #[arg(long, value_name = "FILE")]
     python: Option<PathBuf>,
 }
 
-/// The trainer with a batch that stays.
-struct Fixed {
+/// The trainer with a constant batch.
+struct FixedBatch {
     trainer: GanTrainer,
     batch: WindowBatch,
 }
 
-impl Fixed {
+impl FixedBatch {
     fn new(args: &Args) -> Result<Self> {
         let preset = serde_json::from_value(json!(args.preset))?;
-        let asked = GanConfig { recipe: GanRecipe::Paper, preset, batch: args.batch.into(), ..GanConfig::default() };
+        let config = GanConfig { recipe: GanRecipe::Paper, preset, batch: args.batch.into(), ..GanConfig::default() };
         let settings = recipe::settings(
-            &asked,
+            &config,
             &TrainingMaterial { train_secs: 0.0, validation_secs: 0.0, n_speakers: 1 },
             InitialWeights::Random,
         )?;
@@ -78,7 +78,7 @@ impl Fixed {
         let mut numbers = |low: f32, high: f32, n: usize| (0..n).map(|_| rng.random_range(low..high)).collect();
         let representation =
             Representation::Bones { mean: numbers(-0.5, 0.5, N_FEATURES), std: numbers(0.1, 0.4, N_FEATURES) };
-        // Running statistics are no part of what is compared: one momentum for both networks.
+        // The same momentum as in the reference, although running statistics are not compared.
         let network = Config { norm_momentum: 0.1, ..Config::from_preset(args.preset.parse()?, N_FEATURES) };
         let (n_mels, n_frames) = (mel_frames(FPS, settings.window_frames), settings.window_frames);
         let tensor = |values: Vec<f32>, rows: usize, columns: usize| {
@@ -86,10 +86,10 @@ impl Fixed {
         };
         let mels = tensor(numbers(-1.0, 1.0, args.batch * N_MELS * n_mels), N_MELS, n_mels)?;
         let poses: Vec<f32> = numbers(-1.0, 1.0, args.batch * N_FEATURES * n_frames);
-        let mut is_learnt = |i: usize| !is_duplicate(i / n_frames % N_BONES + 1) && rng.random_bool(1.0 - MISSING);
-        let joints: Vec<bool> = (0..args.batch * N_BONES * n_frames).map(&mut is_learnt).collect();
+        let mut is_visible = |i: usize| !is_duplicate(i / n_frames % N_BONES + 1) && rng.random_bool(1.0 - MISSING);
+        let joints: Vec<bool> = (0..args.batch * N_BONES * n_frames).map(&mut is_visible).collect();
         let rows = joints.chunks_exact(n_frames).flat_map(|row| [row; 3]).flatten();
-        let mask: Vec<f32> = rows.map(|learnt| f32::from(*learnt)).collect();
+        let mask: Vec<f32> = rows.map(|visible| f32::from(*visible)).collect();
         let poses = poses.iter().zip(&mask).map(|(number, mask)| number * mask).collect();
         let batch = WindowBatch {
             mels,
@@ -101,7 +101,7 @@ impl Fixed {
         Ok(Self { trainer: GanTrainer::new(vec![facts], settings)?, batch })
     }
 
-    /// Weights, batch and settings for the reference.
+    /// Weights, batch and settings as input of the reference.
     fn contents(&self, folder: &Path) -> Result<Contents> {
         self.trainer.save(folder)?;
         let mut contents = Contents::read(&checkpoint::path(folder, 0))?;
@@ -128,7 +128,7 @@ impl Fixed {
         Ok(contents)
     }
 
-    /// Seconds of `steps` steps, and the last one's losses.
+    /// Seconds for `steps` steps, and the losses of the last one.
     fn train(&mut self, steps: usize) -> Result<(f64, Losses)> {
         with_spinning_workers(|| {
             let start = Instant::now();
@@ -140,7 +140,7 @@ impl Fixed {
         })
     }
 
-    /// Seconds of the phases of a step.
+    /// Time of each phase of a step, seconds.
     fn phases(&mut self) -> Result<Vec<(&'static str, f64)>> {
         let (mut phases, mut last) = (Vec::new(), Instant::now());
         let mut phase = |name| {
@@ -151,16 +151,17 @@ impl Fixed {
         Ok(phases)
     }
 
-    /// Largest difference of the generator's poses, over the largest of them, and of losses and gradient norm of the
-    /// first step, each over its own size.
-    fn apart(&mut self, theirs: &mut Reference) -> Result<(f64, f64)> {
+    /// Largest difference of the generated poses, relative to the largest pose value, and largest relative difference
+    /// of the losses and the gradient norm of the first step.
+    fn differences(&mut self, theirs: &mut Reference) -> Result<(f64, f64)> {
         let their: Vec<f64> = serde_json::from_value(theirs.ask("forward")?["poses"].clone())?;
         let raw = self.trainer.generator.forward(&self.batch.mels, &[], self.trainer.settings.window_frames, true)?;
         let own = self.trainer.speakers.poses(&raw, &self.batch.speakers)?.flatten_all()?.to_vec1::<f32>()?;
-        let n = own.len().div_ceil(EVERY);
-        ensure!(their.len() == n, "the reference gave {} outputs, expected {n}", their.len());
-        let most = their.iter().fold(1e-9f64, |most, v| most.max(v.abs()));
-        let outputs = own.iter().step_by(EVERY).zip(&their).map(|(own, their)| (f64::from(*own) - their).abs() / most);
+        let n = own.len().div_ceil(OUTPUT_STRIDE);
+        ensure!(their.len() == n, "the reference returned {} outputs, expected {n}", their.len());
+        let scale = their.iter().fold(1e-9f64, |largest, v| largest.max(v.abs()));
+        let outputs =
+            own.iter().step_by(OUTPUT_STRIDE).zip(&their).map(|(own, their)| (f64::from(*own) - their).abs() / scale);
         let their: Vec<f64> = serde_json::from_value(theirs.ask("step 1")?["losses"].clone())?;
         let Losses { l1, adversarial, discriminator, gradient_norm, .. } = self.train(1)?.1;
         let own = [l1, adversarial, discriminator, gradient_norm];
@@ -175,7 +176,7 @@ pub(crate) fn run(args: &Args, progress: &dyn Progress) -> Result<Report> {
         "nothing to measure: there must be rounds, steps and two windows a batch at least"
     );
     let folder = std::env::temp_dir().join(format!("orator-bench-{}", std::process::id()));
-    std::fs::create_dir_all(&folder).with_context(|| format!("cannot make the folder {}", folder.display()))?;
+    std::fs::create_dir_all(&folder).with_context(|| format!("cannot create the folder {}", folder.display()))?;
     let measured = measure(args, &folder, progress);
     let _ = std::fs::remove_dir_all(&folder);
     measured
@@ -183,14 +184,14 @@ pub(crate) fn run(args: &Args, progress: &dyn Progress) -> Result<Report> {
 
 fn measure(args: &Args, folder: &Path, progress: &dyn Progress) -> Result<Report> {
     let n_threads = rayon::current_num_threads();
-    // Of a training alone, without what is handed to the reference.
-    Fixed::new(args)?.train(args.steps)?;
+    // Peak memory of training only, before the input of the reference is created.
+    FixedBatch::new(args)?.train(args.steps)?;
     let peak = own_peak_mib();
-    let mut ours = Fixed::new(args)?;
+    let mut ours = FixedBatch::new(args)?;
     let start =
         |script| Reference::start(script, n_threads, &ours.contents(folder)?, &folder.join("given.safetensors"));
     let mut theirs = args.python.as_deref().map(start).transpose()?;
-    let apart = theirs.as_mut().map(|theirs| ours.apart(theirs)).transpose()?;
+    let differences = theirs.as_mut().map(|theirs| ours.differences(theirs)).transpose()?;
 
     let task = progress.begin("train", args.rounds as u64);
     let (mut own, mut their) = (vec![], vec![]);
@@ -217,7 +218,7 @@ fn measure(args: &Args, folder: &Path, progress: &dyn Progress) -> Result<Report
     );
     let mut facts = json!({ "preset": args.preset, "batch": args.batch, "threads": n_threads, "secs_a_step": secs,
         "peak_mib": peak });
-    if let (Some(theirs), Some((outputs, losses))) = (&mut theirs, apart) {
+    if let (Some(theirs), Some((outputs, losses))) = (&mut theirs, differences) {
         let memory = theirs.ask("memory")?["peak_mib"].as_f64().unwrap_or(f64::NAN);
         let ratio = median(own.iter().zip(&their).map(|(own, their)| own / their).collect());
         text += &format!(
@@ -232,9 +233,9 @@ fn measure(args: &Args, folder: &Path, progress: &dyn Progress) -> Result<Report
             "peak_mib": memory, "ratio": ratio, "memory_ratio": peak / memory, "outputs_apart": outputs,
             "losses_apart": losses, "parts": theirs.ask("parts")? });
     }
-    let whole: f64 = phases.iter().map(|(_, secs)| secs).sum();
+    let total: f64 = phases.iter().map(|(_, secs)| secs).sum();
     for (name, secs) in &phases {
-        text += &format!("\n  {name:22}{:9.1} ms {:5.1} %", 1e3 * secs, 100.0 * secs / whole);
+        text += &format!("\n  {name:22}{:9.1} ms {:5.1} %", 1e3 * secs, 100.0 * secs / total);
     }
     facts["parts"] = phases.into_iter().map(|(name, secs)| (name.to_owned(), json!(secs))).collect();
     Ok(Report { text, facts })
