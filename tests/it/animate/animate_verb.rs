@@ -1,5 +1,5 @@
-//! `orator animate` from the command line: a file, a folder, a dataset; invalid input gives a clear error, exit code 1 and
-//! no output.
+//! `orator animate` from the command line: a file, a folder, a dataset; invalid input gives a clear error, exit code 1
+//! and no output.
 
 use crate::fixtures::animation::bvh::{Bvh, worst_mm};
 use crate::fixtures::figures::{FPS, swinging};

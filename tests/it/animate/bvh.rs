@@ -1,5 +1,5 @@
-//! Motion to BVH: the file, read by an independent parser and evaluated with plain matrices, reproduces the motion; left
-//! stays left; gaps cause no jumps.
+//! Motion to BVH: the file, read by an independent parser and evaluated with plain matrices, reproduces the motion;
+//! left stays left; gaps cause no jumps.
 
 use crate::fixtures::animation::bvh::{Bvh, worst_mm};
 use crate::fixtures::figures::{FPS, swinging};

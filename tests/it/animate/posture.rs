@@ -144,7 +144,7 @@ fn breathing_moves_the_chest_but_no_joint_relative_to_the_neck() {
     assert!(hips(&breathing) && breathing.clip.travel.is_empty(), "hips and legs rest");
 }
 
-/// Keypoints [T, 17, 3], joints and extra points (nose, right hip, left hip) of a performance in front of a level camera.
+/// Keypoints [T, 17, 3], joints and extra points (nose, right hip, left hip) of a performance, with a level camera.
 fn observed(performance: &Performance) -> (Array3<f32>, Array3<f32>, Array3<f32>) {
     // Face points in the axes of the head, cm, and the joints of the other keypoints in the order of COCO.
     let face = [[0.0, 1.1, 10.8], [4.1, 2.1, 6.8], [-4.1, 2.1, 6.8], [9.2, 0.0, 0.0], [-9.2, 0.0, 0.0]];

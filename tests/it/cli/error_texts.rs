@@ -1,5 +1,5 @@
-//! Error texts of the program, stored in `tests/it/snapshots`: each states the position, the expected value and what to do.
-//! Paths of the test are redacted.
+//! Error texts of the program, stored in `tests/it/snapshots`: each states the position, the expected value and what to
+//! do. Paths of the test are redacted.
 
 use crate::fixtures::untrained::write_untrained_speaker;
 use ndarray::Array3;

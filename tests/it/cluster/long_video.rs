@@ -1,5 +1,5 @@
-//! A long video is processed in spans by one worker, by several of a run, and by several of a plan, some of them killed:
-//! the bytes are identical. With `ORATOR_LONG=1` (`make prove`) it has 17 minutes and eight workers.
+//! A long video is processed in spans by one worker, by several of a run, and by several of a plan, some of them
+//! killed: the bytes are identical. With `ORATOR_LONG=1` (`make prove`) it has 17 minutes and eight workers.
 
 use crate::fixtures::clips;
 use crate::fixtures::faults::plan_workers::{WorkerClocks, epochs, written};

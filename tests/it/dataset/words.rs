@@ -1,5 +1,5 @@
-//! Words of transcripts in datasets: assigned to a sample or counted, verified, imported, forgotten; transcript errors are
-//! reported and exclude no video.
+//! Words of transcripts in datasets: assigned to a sample or counted, verified, imported, forgotten; transcript errors
+//! are reported and exclude no video.
 
 use crate::fixtures::media::lifted_videos::{settings, shard_with_words, video};
 use orator_base::stage::Unit;

@@ -1,5 +1,5 @@
-//! Kinds of audio for `orator generate`: streamed audio gives the motion of loaded audio, telephone quality is reported, and
-//! files without a sample are errors.
+//! Kinds of audio for `orator generate`: streamed audio gives the motion of loaded audio, telephone quality is reported,
+//! and files without a sample are errors.
 
 use crate::fixtures::clips;
 use crate::fixtures::figures::FPS;

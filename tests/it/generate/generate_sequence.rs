@@ -1,5 +1,5 @@
-//! Sequence-to-sequence networks in `orator generate`: one audio file or many, with and without transcripts, and the state
-//! at seams; dubious input is reported, invalid input named.
+//! Sequence-to-sequence networks in `orator generate`: one audio file or many, with and without transcripts, and the
+//! state at seams; dubious input is reported, invalid input named.
 
 use crate::fixtures::animation::captures::{tone, write_stereo};
 use crate::fixtures::untrained::{generate, write_untrained_sequence, write_untrained_speaker};

@@ -1,5 +1,5 @@
-//! Variants of the motion for one speech: a seed always gives the same bytes, another seed another motion; a speaker trained
-//! without dropout has one variant and an error says so.
+//! Variants of the motion for one speech: a seed always gives the same bytes, another seed another motion; a speaker
+//! trained without dropout has one variant.
 
 use crate::fixtures::clips;
 use crate::fixtures::untrained::{generate, write_untrained_speaker};
