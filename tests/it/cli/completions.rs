@@ -19,8 +19,8 @@ fn scripts_contain_the_subcommands_and_bash_runs_its_script() {
         }
     }
     std::fs::write(dir.path().join("orator.bash"), orator(&["completions", "bash"], dir.path())).unwrap();
-    let request = "source ./orator.bash; COMP_WORDS=(orator stat); COMP_CWORD=1; _orator orator stat orator; echo ${COMPREPLY[@]}";
-    let output = Command::new("bash").args(["-c", request]).current_dir(dir.path()).output().unwrap();
+    let call = "source ./orator.bash; COMP_WORDS=(orator stat); COMP_CWORD=1; _orator orator stat orator; echo ${COMPREPLY[@]}";
+    let output = Command::new("bash").args(["-c", call]).current_dir(dir.path()).output().unwrap();
     assert_eq!(String::from_utf8_lossy(&output.stdout).trim(), "status", "{output:?}");
 }
 

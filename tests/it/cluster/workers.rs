@@ -94,8 +94,8 @@ fn killed_and_stopped_workers_give_the_bytes_of_one_run() {
     }
     assert!(n_reclaimed <= n_killed + n_stopped, "{n_reclaimed} reclaimed: {n_killed} killed, {n_stopped} stopped");
     eprintln!(
-        "{n_plans} plans of {n_clips} units, {n_workers} workers at a time, clocks {}: {n_killed} workers killed, {n_stopped} stopped, \
-         {n_reclaimed} units reclaimed; the bytes are those of one run",
+        "{n_plans} plans of {n_clips} units, {n_workers} workers at a time, clocks {}: {n_killed} workers killed, \
+         {n_stopped} stopped, {n_reclaimed} units reclaimed; the bytes are those of one run",
         clocks.describe()
     );
 }

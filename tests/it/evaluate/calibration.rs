@@ -47,7 +47,7 @@ impl Setting {
         self.clips.iter().map(&mut clip).collect()
     }
 
-    /// Whether a difference is found for metrics whose differences have mean `shift` and standard deviation `deviation`;
+    /// Whether a difference is found in metrics whose differences have mean `shift` and standard deviation `deviation`;
     /// `None` where there are too few blocks.
     fn conclusion(&self, seed: u64, shift: f64, deviation: f64) -> Option<bool> {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);

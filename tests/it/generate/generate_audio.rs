@@ -1,4 +1,4 @@
-//! Kinds of audio for `orator generate`: streamed audio gives the motion of loaded audio, telephone quality is reported,
+//! Kinds of audio for `orator generate`: streamed audio gives the motion of loaded audio, telephone quality is noted,
 //! and files without a sample are errors.
 
 use crate::fixtures::clips;
