@@ -92,7 +92,7 @@ const KEYS: [(&str, &[(&str, &str)]); 18] = [
 ];
 
 /// A note for each renamed flag in the arguments of a verb.
-pub fn flag_notes(verb: &str, arguments: impl Iterator<Item = String>) -> Vec<String> {
+pub(super) fn flag_notes(verb: &str, arguments: impl Iterator<Item = String>) -> Vec<String> {
     let note = |argument: String| {
         let given = argument.split('=').next().unwrap_or_default();
         let (_, old, new) = FLAGS.iter().find(|(of, old, _)| *of == verb && *old == given)?;
@@ -103,7 +103,7 @@ pub fn flag_notes(verb: &str, arguments: impl Iterator<Item = String>) -> Vec<St
 
 /// Adds the old names of renamed keys to the JSON output of a verb. A key `renamed_keys` of the outermost object maps
 /// each old name to the new one.
-pub fn with_old_keys(verb: &str, mut output: Value) -> Value {
+pub(super) fn with_old_keys(verb: &str, mut output: Value) -> Value {
     let Some((_, keys)) = KEYS.iter().find(|(of, _)| *of == verb) else { return output };
     let mut added = Map::new();
     add_old_keys(keys, &mut output, &mut added);

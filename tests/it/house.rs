@@ -16,35 +16,35 @@ const SIBLINGS: [(&str, &[&str]); 2] = [
 /// Crates whose code is not part of the product.
 const NOT_PRODUCT: [&str; 2] = ["src/lab/", "src/test-support/"];
 
-/// Names that several types may carry.
+/// Names that several types may have.
 const COMMON_NAMES: [&str; 3] = ["Args", "Config", "Cli"];
 
 fn root() -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR"))
 }
 
-/// Rust files of `src` and `tests` with their path below the repository and their text.
+/// Rust files of `src` and `tests`: path relative to the repository, and text.
 fn rust_texts() -> Vec<(String, String)> {
     let files = ["src", "tests"].into_iter().flat_map(|folder| rust_files(&root().join(folder)));
-    files.map(|file| (below_root(&file), fs::read_to_string(&file).unwrap())).collect()
+    files.map(|file| (relative(&file), fs::read_to_string(&file).unwrap())).collect()
 }
 
-fn below_root(file: &Path) -> String {
+fn relative(file: &Path) -> String {
     file.strip_prefix(root()).unwrap().to_str().unwrap().to_owned()
 }
 
-fn none(wrong: &[String]) {
-    assert!(wrong.is_empty(), "{} places:\n{}", wrong.len(), wrong.join("\n"));
+fn assert_none(violations: &[String]) {
+    assert!(violations.is_empty(), "{} places:\n{}", violations.len(), violations.join("\n"));
 }
 
-/// Manifests of the root package and of all members: path below the repository, and the names of its dependencies.
+/// Manifests of the root package and of all members: path relative to the repository, and names of dependencies.
 fn manifests() -> Vec<(String, BTreeSet<String>)> {
     let members = fs::read_dir(root().join("src")).unwrap().map(|entry| entry.unwrap().path().join("Cargo.toml"));
     let files = std::iter::once(root().join("Cargo.toml")).chain(members).filter(|file| file.is_file());
     let read = |file: PathBuf| {
         let manifest: toml::Table = fs::read_to_string(&file).unwrap().parse().unwrap();
         let dependencies = manifest.get("dependencies").and_then(toml::Value::as_table);
-        (below_root(&file), dependencies.into_iter().flat_map(toml::Table::keys).cloned().collect())
+        (relative(&file), dependencies.into_iter().flat_map(toml::Table::keys).cloned().collect())
     };
     files.map(read).collect()
 }
@@ -61,39 +61,40 @@ fn foreign_libraries_have_one_owner_each() {
     ];
     let manifests = manifests();
     assert!(manifests.len() >= 11, "{manifests:?}");
-    let mut wrong = Vec::new();
+    let mut violations = Vec::new();
     for (manifest, dependencies) in &manifests {
         let foreign = owners.iter().filter(|(library, owner)| dependencies.contains(*library) && owner != manifest);
-        wrong.extend(foreign.map(|(library, owner)| format!("{manifest} names {library}, which belongs to {owner}")));
+        violations
+            .extend(foreign.map(|(library, owner)| format!("{manifest} names {library}, which belongs to {owner}")));
     }
-    none(&wrong);
+    assert_none(&violations);
 }
 
 #[test]
-fn no_product_crate_depends_on_the_lab_or_on_test_support() {
-    let apart = ["orator-lab", "orator-test-support"];
+fn no_product_crate_depends_on_the_lab_or_test_support() {
+    let not_product = ["orator-lab", "orator-test-support"];
     let product =
         manifests().into_iter().filter(|(name, _)| !NOT_PRODUCT.iter().any(|folder| name.starts_with(folder)));
-    let wrong = product.filter(|(_, dependencies)| apart.iter().any(|name| dependencies.contains(*name)));
-    none(&wrong.map(|(name, _)| name).collect::<Vec<_>>());
+    let violations = product.filter(|(_, dependencies)| not_product.iter().any(|name| dependencies.contains(*name)));
+    assert_none(&violations.map(|(name, _)| name).collect::<Vec<_>>());
 }
 
 #[test]
 fn only_the_command_line_prints() {
-    let mut wrong = Vec::new();
+    let mut violations = Vec::new();
     for (name, text) in rust_texts().into_iter().filter(|(name, _)| name.starts_with("src/") && !name.contains("/cli/"))
     {
         let tokens = tokens(without_tests(&without_comments(&text)));
         if tokens.windows(2).any(|pair| ["print", "println"].contains(&pair[0].as_str()) && pair[1] == "!") {
-            wrong.push(name);
+            violations.push(name);
         }
     }
-    none(&wrong);
+    assert_none(&violations);
 }
 
 #[test]
 fn siblings_do_not_import_each_other() {
-    let mut wrong = Vec::new();
+    let mut violations = Vec::new();
     for (name, text) in rust_texts() {
         let code = without_comments(&text);
         let code = without_tests(&code);
@@ -102,23 +103,23 @@ fn siblings_do_not_import_each_other() {
             let Some(here) = sibling.filter(|here| siblings.contains(here)) else { continue };
             let others = siblings.iter().filter(|other| **other != here);
             let imported = others.filter(|other| code.contains(&format!("crate::{other}::")));
-            wrong.extend(imported.map(|other| format!("{name} imports {other}")));
+            violations.extend(imported.map(|other| format!("{name} imports {other}")));
         }
         if name.starts_with("src/report/html/") && code.replace("crate::html::", "").contains("crate::") {
-            wrong.push(format!("{name} imports from outside of html"));
+            violations.push(format!("{name} imports from outside of html"));
         }
     }
-    none(&wrong);
+    assert_none(&violations);
 }
 
 #[test]
-fn a_folder_holds_at_most_16_files_and_its_map_no_code() {
-    let mut wrong = Vec::new();
+fn folders_have_at_most_16_files_and_mod_files_no_code() {
+    let mut violations = Vec::new();
     let mut n_files: BTreeMap<String, usize> = BTreeMap::new();
     for (name, text) in rust_texts() {
         let Some((folder, file)) = name.rsplit_once('/') else { continue };
         if root().join(name.trim_end_matches(".rs")).is_dir() {
-            wrong.push(format!("{name} stands beside a folder of that name"));
+            violations.push(format!("{name} stands beside a folder of that name"));
         }
         if name == "src/lib.rs" {
             continue;
@@ -134,7 +135,7 @@ fn a_folder_holds_at_most_16_files_and_its_map_no_code() {
             while let Some(rest) = words.strip_prefix("#[").and_then(|rest| rest.split_once(']')) {
                 words = rest.1.trim_start();
             }
-            let is_map = [
+            let declarations = [
                 "mod ",
                 "pub mod ",
                 "pub(crate) mod ",
@@ -143,14 +144,14 @@ fn a_folder_holds_at_most_16_files_and_its_map_no_code() {
                 "pub(crate) use ",
                 "pub(super) use ",
             ];
-            if !words.is_empty() && !is_map.iter().any(|word| words.starts_with(word)) {
-                wrong.push(format!("{name} holds code: {words}"));
+            if !words.is_empty() && !declarations.iter().any(|word| words.starts_with(word)) {
+                violations.push(format!("{name} holds code: {words}"));
             }
         }
     }
     let crowded = n_files.into_iter().filter(|(_, n)| *n > 16);
-    wrong.extend(crowded.map(|(folder, n)| format!("{folder} holds {n} files")));
-    none(&wrong);
+    violations.extend(crowded.map(|(folder, n)| format!("{folder} holds {n} files")));
+    assert_none(&violations);
 }
 
 /// Names of the structs, enums and traits that `text` defines outside of its tests.
@@ -172,45 +173,45 @@ fn a_type_name_is_defined_once() {
 }
 
 #[test]
-fn stages_and_their_files_are_spelt_in_one_file() {
+fn names_of_stages_and_their_files_are_defined_in_one_file() {
     let names = ["extract", "pose2d", "segment", "lift"];
     let files = ["audio.wav", "timeline.npz", "media.json", "keypoints.npz", "measures.npz", "joints.npz"];
     let files = [&files[..], &["bones.json", "camera.json", "bone_change.npz", "hashes.json"]].concat();
-    // The settings of a stage are a section of the fingerprint: a key of JSON.
-    none(&spelt_outside("base/stage/artifacts.rs", |string, is_key| {
+    // The settings of a stage are a section of the fingerprint, a JSON key.
+    assert_none(&strings_outside("base/stage/artifacts.rs", |string, is_key| {
         files.contains(&string) || names.contains(&string) && !is_key
     }));
 }
 
 #[test]
-fn reasons_of_refusals_are_worded_in_one_file() {
-    // Reasons that are a single word of everyday use ("arms", "face") are also names of body parts and of measures.
+fn rejection_reasons_are_defined_in_one_file() {
+    // Single words of everyday use ("arms", "face") are also names of body parts and of measures.
     let common = ["quiet", "still", "face", "arms", "bones", "hands", "cut", "open", "jump", "no sound"];
     let reasons = Refusal::JUDGED.map(Refusal::reason);
     let is_reason = |string: &str| reasons.contains(&string) && !common.contains(&string);
-    none(&spelt_outside("base/stage/refusal.rs", |string, _| is_reason(string)));
+    assert_none(&strings_outside("base/stage/refusal.rs", |string, _| is_reason(string)));
 }
 
-/// Strings in code of the library and the program, outside `home` and outside tests, for which `is_wrong` holds; its
-/// second argument says whether a colon follows, as behind a key of JSON.
-fn spelt_outside(home: &str, is_wrong: impl Fn(&str, bool) -> bool) -> Vec<String> {
-    let mut wrong = Vec::new();
+/// Strings in code of the library and the program, outside `home` and outside tests, for which `is_misplaced` holds;
+/// its second argument is whether a colon follows, as after a JSON key.
+fn strings_outside(home: &str, is_misplaced: impl Fn(&str, bool) -> bool) -> Vec<String> {
+    let mut violations = Vec::new();
     let is_test = |path: &Path| path.components().any(|part| part.as_os_str() == "tests");
     for path in rust_files(&root().join("src")).into_iter().filter(|path| !path.ends_with(home) && !is_test(path)) {
         let (code, strings) = scan(&fs::read_to_string(&path).unwrap());
         let n_code = without_tests(&code).len();
         for (string, end) in strings.into_iter().filter(|(_, end)| *end <= n_code) {
-            if is_wrong(&string, code[end..].trim_start().starts_with(':')) {
-                wrong.push(format!("{}: \"{string}\"", below_root(&path)));
+            if is_misplaced(&string, code[end..].trim_start().starts_with(':')) {
+                violations.push(format!("{}: \"{string}\"", relative(&path)));
             }
         }
     }
-    wrong
+    violations
 }
 
 #[test]
-fn unsafe_code_stays_in_six_places() {
-    let homes = [
+fn unsafe_code_is_confined_to_six_modules() {
+    let modules = [
         "src/nn/cpu/",
         "src/media/ffmpeg/",
         "src/media/file_memory.rs",
@@ -218,12 +219,12 @@ fn unsafe_code_stays_in_six_places() {
         "src/process.rs",
         "tests/it/robustness/sandbox.rs",
     ];
-    let texts = rust_texts().into_iter().filter(|(name, _)| !homes.iter().any(|home| name.starts_with(home)));
+    let texts = rust_texts().into_iter().filter(|(name, _)| !modules.iter().any(|home| name.starts_with(home)));
     let names = texts.filter(|(_, text)| tokens(&without_comments(text)).iter().any(|token| token == "unsafe"));
-    none(&names.map(|(name, _)| name).collect::<Vec<_>>());
+    assert_none(&names.map(|(name, _)| name).collect::<Vec<_>>());
 }
 
-/// Which files ffmpeg may follow is decided where it opens one.
+/// The files that ffmpeg may follow are restricted where it opens one.
 #[test]
 fn media_are_opened_in_one_file() {
     let opens =

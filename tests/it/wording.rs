@@ -9,7 +9,7 @@ fn root() -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR"))
 }
 
-/// Path below the repository, and text.
+/// Path relative to the repository, and text.
 fn read(path: &Path) -> Option<(String, String)> {
     let name = path.strip_prefix(root()).unwrap().to_str().unwrap().to_owned();
     Some((name, fs::read_to_string(path).ok()?))
@@ -20,7 +20,7 @@ fn rust_texts() -> Vec<(String, String)> {
     files.filter_map(|file| read(&file)).collect()
 }
 
-/// Texts of every kind that belong to the repository, this file left out.
+/// All text files of the repository except this one.
 fn all_texts() -> Vec<(String, String)> {
     let folders = ["src", "tests", "models", "fixtures"];
     let mut paths: Vec<PathBuf> = ["README.md", "CHANGELOG.md", "Makefile", "pipeline.toml", "Cargo.toml"]
@@ -38,16 +38,16 @@ fn all_texts() -> Vec<(String, String)> {
     paths.iter().filter_map(|path| read(path)).filter(|(name, _)| !this.ends_with(name.as_str())).collect()
 }
 
-fn none(wrong: &[String]) {
-    assert!(wrong.is_empty(), "{} places:\n{}", wrong.len(), wrong.join("\n"));
+fn assert_none(violations: &[String]) {
+    assert!(violations.is_empty(), "{} places:\n{}", violations.len(), violations.join("\n"));
 }
 
-/// Lines of all `texts` that `is_wrong`, with their place.
-fn lines(texts: Vec<(String, String)>, is_wrong: impl Fn(&str) -> bool) -> Vec<String> {
-    let place = |name: &str, (k, line): (usize, &str)| format!("{name}:{}: {}", k + 1, line.trim());
+/// Lines of `texts` for which `is_violation` holds, with file and line number.
+fn lines(texts: Vec<(String, String)>, is_violation: impl Fn(&str) -> bool) -> Vec<String> {
+    let located = |name: &str, (k, line): (usize, &str)| format!("{name}:{}: {}", k + 1, line.trim());
     let of_text = |(name, text): (String, String)| {
-        let wrong = text.lines().enumerate().filter(|(_, line)| is_wrong(line));
-        wrong.map(|line| place(&name, line)).collect::<Vec<_>>()
+        let violations = text.lines().enumerate().filter(|(_, line)| is_violation(line));
+        violations.map(|line| located(&name, line)).collect::<Vec<_>>()
     };
     texts.into_iter().flat_map(of_text).collect()
 }
@@ -55,47 +55,47 @@ fn lines(texts: Vec<(String, String)>, is_wrong: impl Fn(&str) -> bool) -> Vec<S
 #[test]
 fn no_file_is_longer_than_400_lines() {
     let long = rust_texts().into_iter().filter(|(_, text)| text.lines().count() > 400);
-    none(&long.map(|(name, _)| name).collect::<Vec<_>>());
+    assert_none(&long.map(|(name, _)| name).collect::<Vec<_>>());
 }
 
 #[test]
-fn every_file_begins_with_what_lives_in_it_in_six_lines() {
+fn every_file_begins_with_a_description_of_at_most_six_lines() {
     let texts = rust_texts();
-    let silent = texts.iter().filter(|(_, text)| !text.starts_with("//!")).map(|(name, _)| name.clone());
-    none(&silent.collect::<Vec<_>>());
+    let without_head = texts.iter().filter(|(_, text)| !text.starts_with("//!")).map(|(name, _)| name.clone());
+    assert_none(&without_head.collect::<Vec<_>>());
     let head = |text: &str| text.lines().take_while(|line| line.starts_with("//!")).count();
     // The map of the workspace and the table of threads are longer.
     let longer = ["src/lib.rs", "src/nn/cpu/mod.rs"];
     let long = texts.iter().filter(|(name, text)| head(text) > 6 && !longer.contains(&name.as_str()));
-    none(&long.map(|(name, _)| name.clone()).collect::<Vec<_>>());
+    assert_none(&long.map(|(name, _)| name.clone()).collect::<Vec<_>>());
 }
 
 #[test]
-fn a_doc_comment_stands_by_itself() {
-    let mut wrong = Vec::new();
+fn a_doc_comment_is_self_contained() {
+    let mut violations = Vec::new();
     for (name, text) in rust_texts() {
         let mut inside = false;
         for (k, line) in text.lines().enumerate() {
             let doc = line.trim_start().strip_prefix("///").or_else(|| line.strip_prefix("//!"));
             let words = doc.unwrap_or_default().trim_start();
             if !inside && ["The same", "As above", "It "].iter().any(|start| words.starts_with(start)) {
-                wrong.push(format!("{name}:{}: {words}", k + 1));
+                violations.push(format!("{name}:{}: {words}", k + 1));
             }
             inside = doc.is_some();
         }
     }
-    none(&wrong);
+    assert_none(&violations);
 }
 
 #[test]
-fn words_are_those_of_the_field() {
+fn invented_words_are_not_used() {
     let invented = ["whither", "thither", "strewn", "liker"];
     let is_word = |word: &str| invented.contains(&word.to_lowercase().as_str());
-    none(&lines(all_texts(), |line| line.split(|c: char| !c.is_alphabetic()).any(is_word)));
+    assert_none(&lines(all_texts(), |line| line.split(|c: char| !c.is_alphabetic()).any(is_word)));
 }
 
 #[test]
-fn nothing_refers_outside_the_repository() {
+fn no_text_refers_outside_the_repository() {
     let names = ["../shared", "rebol.md", "finemotion.md", "field.md", "house.md", "house-2.md", "lifter-targets.md"];
     let hash_after_commit = |line: &str| {
         let mut words = line.split(|c: char| !c.is_alphanumeric()).filter(|word| !word.is_empty());
@@ -104,7 +104,7 @@ fn nothing_refers_outside_the_repository() {
         after.skip(1).take(1).any(is_hash)
     };
     let refers = |line: &str| names.iter().any(|name| line.contains(name)) || hash_after_commit(line);
-    // `commit` is a key of the manifest: where a model of others comes from.
+    // `commit` is a key of the manifest: the source of a third-party model.
     let texts = all_texts().into_iter().filter(|(name, _)| name != "models/manifest.toml").collect();
-    none(&lines(texts, refers));
+    assert_none(&lines(texts, refers));
 }

@@ -1,5 +1,5 @@
-//! Joints to animation: what a body cannot do is not done, both sides are alike, gaps and rates do no harm, and what is
-//! asked for nothing is changed.
+//! Joints to animation: joint limits hold, left and right are symmetric, gaps and other frame rates cause no jumps, and
+//! joints are unchanged where no option asks for a change.
 
 use crate::fixtures::figures::swinging;
 use ndarray::{Array3, s};
@@ -28,12 +28,12 @@ const UNTOUCHED: AnimationOptions = AnimationOptions {
 };
 
 fn random_rotation(random: &mut ChaCha8Rng) -> Rotation {
-    let [z, x, y] = [180.0, 90.0, 180.0].map(|reach: f64| random.random_range(-reach..reach));
+    let [z, x, y] = [180.0, 90.0, 180.0].map(|limit: f64| random.random_range(-limit..limit));
     let about = |axis: [f64; 3], degrees: f64| Rotation::about(axis, degrees.to_radians());
     about([0.0, 0.0, 1.0], z) * about([1.0, 0.0, 0.0], x) * about([0.0, 1.0, 0.0], y)
 }
 
-fn is_within(pose: &ArmPose) -> bool {
+fn is_within_limits(pose: &ArmPose) -> bool {
     let inside = |[low, high]: [f64; 2], angle: f64| (low - 1e-6..=high + 1e-6).contains(&angle);
     let bend = |limit: Limit, bend: orator_avatar::animate::rig::hinge::Bend| {
         inside(limit.flexion, bend.flexion) && inside(limit.side, bend.side)
@@ -48,7 +48,7 @@ fn is_within(pose: &ArmPose) -> bool {
 }
 
 #[test]
-fn random_rotations_come_out_within_the_limits_and_what_is_within_stays() {
+fn constraints_keep_random_rotations_within_limits_and_are_idempotent() {
     let rig = perform(&swinging(0, 4), None, &UNTOUCHED).rig;
     let mut random = ChaCha8Rng::seed_from_u64(3);
     let mut counter = ClampCounter::default();
@@ -58,12 +58,12 @@ fn random_rotations_come_out_within_the_limits_and_what_is_within_stays() {
         constraints.apply(&rig, &mut frame, &mut counter);
         for arm in &rig.arms {
             let pose = ArmPose::from_rotations(arm, &frame);
-            assert!(is_within(&pose), "{n}: {pose:?}");
+            assert!(is_within_limits(&pose), "{n}: {pose:?}");
         }
         let mut again = frame.clone();
         constraints.apply(&rig, &mut again, &mut ClampCounter::default());
         for (joint, (a, b)) in frame.iter().zip(&again).enumerate() {
-            assert!((a.inverse() * *b).angle() < 1e-6, "{n}: {} moves again", rig.skeleton.joints[joint].name);
+            assert!((a.inverse() * *b).angle() < 1e-6, "{n}: {} is not stable", rig.skeleton.joints[joint].name);
         }
     }
     let clamps = counter.clamps();
@@ -72,11 +72,11 @@ fn random_rotations_come_out_within_the_limits_and_what_is_within_stays() {
 }
 
 #[test]
-fn constraints_do_not_make_an_even_motion_jump() {
+fn constraints_cause_no_jumps_in_a_smooth_motion() {
     let rig = perform(&swinging(0, 4), None, &UNTOUCHED).rig;
     let mut random = ChaCha8Rng::seed_from_u64(4);
     for _ in 0..20 {
-        // Fingers pass through every impossible place; elbows and hands through what they could nearly do.
+        // Fingers pass through all impossible rotations; elbows and hands stay near their limits.
         let limbs: Vec<usize> = rig.arms.iter().flat_map(|arm| [arm.forearm, arm.hand]).collect();
         let ends: [Vec<Rotation>; 2] = [0, 1].map(|_| {
             let end = |joint| {
@@ -112,7 +112,7 @@ fn mirrored(motion: &Motion) -> Motion {
     Motion::from_joints(motion.fps, other.joints)
 }
 
-/// The greatest difference between a clip and the mirror image of another.
+/// Largest difference of quaternion components between a clip and the mirror image of the other.
 fn asymmetry(clip: &BvhClip, other: &BvhClip) -> f64 {
     let mut worst = 0.0f64;
     for (joint, bone) in clip.skeleton.joints.iter().enumerate() {
@@ -135,7 +135,7 @@ fn asymmetry(clip: &BvhClip, other: &BvhClip) -> f64 {
     worst
 }
 
-/// Motion whose joints are missing here and there, for a frame or for long.
+/// Noisy motion with random gaps of 1 to 19 frames.
 fn with_gaps(seed: u64, n_frames: usize) -> Motion {
     let mut motion = swinging(seed, n_frames);
     let mut random = ChaCha8Rng::seed_from_u64(seed);
@@ -151,7 +151,7 @@ fn with_gaps(seed: u64, n_frames: usize) -> Motion {
 }
 
 #[test]
-fn a_mirrored_motion_gives_the_mirrored_performance() {
+fn a_mirrored_motion_gives_a_mirrored_animation() {
     let fixed = AnimationOptions { smoothing: Smoothing::SavitzkyGolay, ..AnimationOptions::default() };
     let faster =
         AnimationOptions { fps: Some(FrameRate::new(60, 1)), yaw: Yaw::Removed, ..AnimationOptions::default() };
@@ -159,54 +159,54 @@ fn a_mirrored_motion_gives_the_mirrored_performance() {
         let motion = with_gaps(seed, 80);
         for options in [AnimationOptions::default(), UNTOUCHED, fixed, faster] {
             let clips = [&motion, &mirrored(&motion)].map(|motion| perform(motion, None, &options).clip);
-            let apart = asymmetry(&clips[0], &clips[1]);
-            assert!(apart < 1e-9, "seed {seed}, {options:?}: {apart}");
+            let difference = asymmetry(&clips[0], &clips[1]);
+            assert!(difference < 1e-9, "seed {seed}, {options:?}: {difference}");
         }
     }
 }
 
-fn apart_mm(a: &Motion, b: &Motion) -> f64 {
+fn max_distance_mm(a: &Motion, b: &Motion) -> f64 {
     let squares = (&a.joints - &b.joints).mapv(|v| f64::from(v).powi(2)).sum_axis(ndarray::Axis(2));
     1000.0 * squares.into_iter().fold(0.0, f64::max).sqrt()
 }
 
 #[test]
-fn untouched_joints_with_rigid_palms_come_back_and_performing_twice_is_performing_once() {
+fn joints_with_rigid_palms_are_preserved_and_animation_is_idempotent() {
     for seed in 0..3 {
         let rigid = perform(&swinging(seed, 40), None, &UNTOUCHED).motion();
-        let apart = apart_mm(&perform(&rigid, None, &UNTOUCHED).motion(), &rigid);
-        assert!(apart < 0.1, "seed {seed}: {apart} mm");
+        let difference = max_distance_mm(&perform(&rigid, None, &UNTOUCHED).motion(), &rigid);
+        assert!(difference < 0.1, "seed {seed}: {difference} mm");
         let limited = AnimationOptions { smoothing: Smoothing::None, ..AnimationOptions::default() };
         let once = perform(&rigid, None, &limited);
         assert!(once.report.clamps.iter().any(|kind| kind.joint_frames > 0));
         let twice = perform(&once.motion(), None, &limited);
-        let apart = apart_mm(&twice.motion(), &once.motion());
-        assert!(apart < 0.1, "seed {seed}: {apart} mm");
+        let difference = max_distance_mm(&twice.motion(), &once.motion());
+        assert!(difference < 0.1, "seed {seed}: {difference} mm");
     }
 }
 
 #[test]
-fn smoothing_calms_and_bones_keep_their_length() {
+fn smoothing_reduces_jerk_and_preserves_bone_lengths() {
     let motion = with_gaps(1, 150);
     let Performance { report, clip, rig } = perform(&motion, None, &AnimationOptions::default());
-    let fall = |jerk: orator_avatar::animate::performance::Jerk| jerk.after.unwrap() / jerk.before.unwrap();
-    assert!(fall(report.arms) < 0.4 && fall(report.hands) < 0.5, "{report:?}");
+    let ratio = |jerk: orator_avatar::animate::performance::Jerk| jerk.after.unwrap() / jerk.before.unwrap();
+    assert!(ratio(report.arms) < 0.4 && ratio(report.hands) < 0.5, "{report:?}");
     for frame in 0..clip.n_frames() {
-        let places = clip.positions(frame);
+        let positions = clip.positions(frame);
         for (joint, bone) in rig.skeleton.joints.iter().enumerate() {
             let Some(parent) = bone.parent else { continue };
-            let square = |k: usize| (places[joint][k] - places[parent][k]).powi(2);
+            let square = |k: usize| (positions[joint][k] - positions[parent][k]).powi(2);
             let length = (0..3).map(|k| bone.offset[k].powi(2)).sum::<f64>().sqrt();
             assert!(((0..3).map(square).sum::<f64>().sqrt() - length).abs() < 1e-9);
         }
     }
-    let as_it_is =
+    let unsmoothed =
         perform(&motion, None, &AnimationOptions { smoothing: Smoothing::None, ..AnimationOptions::default() }).report;
-    assert!(as_it_is.arms.after.unwrap() > 2.0 * report.arms.after.unwrap());
+    assert!(unsmoothed.arms.after.unwrap() > 2.0 * report.arms.after.unwrap());
 }
 
 #[test]
-fn another_rate_passes_through_the_frames_without_corners() {
+fn resampling_passes_through_the_frames_without_velocity_jumps() {
     let motion = swinging(2, 40);
     let limited = AnimationOptions { smoothing: Smoothing::None, ..AnimationOptions::default() };
     let at = |rate: u32| perform(&motion, None, &AnimationOptions { fps: Some(FrameRate::new(rate, 1)), ..limited });
@@ -228,50 +228,50 @@ fn another_rate_passes_through_the_frames_without_corners() {
 }
 
 #[test]
-fn removed_yaw_faces_ahead_and_keeps_the_shape() {
+fn removing_yaw_faces_forward_and_preserves_joint_distances() {
     let mut motion = swinging(4, 60);
-    // The whole body swings about the vertical.
+    // The body turns about the vertical.
     for (t, mut frame) in motion.joints.outer_iter_mut().enumerate() {
         let (sin, cos) = (0.8 * (t as f32 * 0.1).sin()).sin_cos();
-        for mut place in frame.outer_iter_mut() {
-            let (x, z) = (place[0], place[2]);
-            (place[0], place[2]) = (cos * x + sin * z, cos * z - sin * x);
+        for mut point in frame.outer_iter_mut() {
+            let (x, z) = (point[0], point[2]);
+            (point[0], point[2]) = (cos * x + sin * z, cos * z - sin * x);
         }
     }
     let yaw = |motion: &Motion| {
         let line = |t: usize, k: usize| motion.joints[[t, L_SHOULDER, k]] - motion.joints[[t, R_SHOULDER, k]];
         (0..60).map(|t| line(t, 2).atan2(line(t, 0)).abs().to_degrees()).fold(0.0, f32::max)
     };
-    let [kept, removed] =
+    let [with_yaw, without_yaw] =
         [Yaw::Spine, Yaw::Removed].map(|yaw| perform(&motion, None, &AnimationOptions { yaw, ..UNTOUCHED }).motion());
-    assert!(yaw(&kept) > 30.0 && yaw(&removed) < 1e-2, "{} {}", yaw(&kept), yaw(&removed));
+    assert!(yaw(&with_yaw) > 30.0 && yaw(&without_yaw) < 1e-2, "{} {}", yaw(&with_yaw), yaw(&without_yaw));
     for t in 0..60 {
         let length = |motion: &Motion| (0..3).map(|k| motion.joints[[t, L_HAND, k]].powi(2)).sum::<f32>().sqrt();
-        assert!((length(&kept) - length(&removed)).abs() < 1e-4);
+        assert!((length(&with_yaw) - length(&without_yaw)).abs() < 1e-4);
     }
 }
 
 #[test]
-fn the_head_turns_with_the_face_and_rests_without() {
+fn the_head_follows_the_face_and_is_neutral_without_one() {
     let motion = swinging(3, 90);
-    // For 45 frames a face that looks to the person's left, 500 px a metre; then none.
+    // A face turned to the person's left for 45 frames, 500 px per metre; then no face.
     let points = [[0.0, 0.02, 0.1], [0.03, -0.03, 0.08], [-0.03, -0.03, 0.08], [0.075, 0.0, 0.0], [-0.075, 0.0, 0.0]];
     let mut body = Array3::zeros((90, 17, 3));
     for t in 0..45 {
         let yaw = 0.6f32;
         for (k, [x, y, z]) in points.into_iter().enumerate() {
-            let place = [640.0 + 500.0 * (yaw.cos() * x + yaw.sin() * z), 300.0 + 500.0 * y, 0.95];
-            body.slice_mut(s![t, k, ..]).assign(&ndarray::arr1(&place));
+            let point = [640.0 + 500.0 * (yaw.cos() * x + yaw.sin() * z), 300.0 + 500.0 * y, 0.95];
+            body.slice_mut(s![t, k, ..]).assign(&ndarray::arr1(&point));
         }
     }
     let performance =
         perform(&motion, Some(&posture::estimate(body.view(), LiftedBody::default())), &AnimationOptions::default());
     assert_eq!(performance.report.face_frames, Some(45));
     let (rig, clip) = (&performance.rig, &performance.clip);
-    let ahead = |t: usize| rig.skeleton.world(&clip.local[t])[rig.head].turn([0.0, 0.0, 1.0]);
+    let forward = |t: usize| rig.skeleton.world(&clip.local[t])[rig.head].turn([0.0, 0.0, 1.0]);
     for t in [5, 20, 40] {
-        let [x, y, _] = ahead(t);
-        assert!((x - 0.6f64.sin()).abs() < 0.12 && y.abs() < 0.15, "frame {t}: {:?}", ahead(t));
+        let [x, y, _] = forward(t);
+        assert!((x - 0.6f64.sin()).abs() < 0.12 && y.abs() < 0.15, "frame {t}: {:?}", forward(t));
     }
     for joint in [rig.neck, rig.head] {
         assert!(clip.local[70][joint].angle() < 1e-6 && clip.local[20][joint].angle() > 0.1);

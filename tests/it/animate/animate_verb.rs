@@ -1,5 +1,5 @@
-//! `orator animate` from the command line: a file, a folder, a dataset; and what it is given wrong it says clearly, with
-//! exit code 1, and writes nothing.
+//! `orator animate` from the command line: a file, a folder, a dataset; invalid input gives a clear error, exit code 1
+//! and no output.
 
 use crate::fixtures::animation::bvh::{Bvh, worst_mm};
 use crate::fixtures::figures::{FPS, swinging};
@@ -32,21 +32,21 @@ fn done(dir: &Path, args: &str) -> Value {
 }
 
 #[test]
-fn a_motion_becomes_files_and_what_was_done_is_told() {
+fn a_motion_is_exported_to_files_with_a_report() {
     let folder = tempfile::tempdir().unwrap();
     let dir = folder.path();
     let motion = swinging(1, 45);
     npy::write(&dir.join("a.npy"), &motion).unwrap();
     let facts = done(dir, "a.npy --out made/a.bvh made/b.npy --out made/b.txt --fps 30");
     assert_eq!((facts["n_frames"].as_u64(), facts["written_frames"].as_u64()), (Some(45), Some(90)));
-    let told = &facts["report"];
-    let jerk = |told: &Value| ["before", "after"].map(|when| told["arms"][when].as_f64().unwrap());
-    let [before, after] = jerk(told);
+    let report = &facts["report"];
+    let jerk = |report: &Value| ["before", "after"].map(|when| report["arms"][when].as_f64().unwrap());
+    let [before, after] = jerk(report);
     assert!((after / before - 1.0).abs() < 0.2, "a motion without noise: {before} -> {after}");
     let fixed = done(dir, "a.npy --out fixed.bvh --smoothing savitzky-golay");
     assert!(jerk(&fixed["report"])[1] < before);
-    let elbow = &told["clamps"][0];
-    assert_eq!((elbow["kind"].as_str(), told["face_frames"].is_null()), (Some("elbow flexion"), true));
+    let elbow = &report["clamps"][0];
+    assert_eq!((elbow["kind"].as_str(), report["face_frames"].is_null()), (Some("elbow flexion"), true));
     assert!(elbow["share"].is_number() && elbow["largest_excess_degrees"].is_number());
     assert_eq!(facts["next"], "orator animate a.npy --out made/a.mp4");
 
@@ -57,10 +57,10 @@ fn a_motion_becomes_files_and_what_was_done_is_told() {
     assert!(worst < 0.1, "{worst} mm");
     let text = authors_txt::read(&dir.join("made/b.txt"), fps).unwrap();
     assert!((&text.joints - &joints.joints).iter().all(|v| v.abs() < 1e-6));
-    // Again, from another kind of file, untouched: the motion's own arms.
+    // Another format, read without processing, has the same joints.
     done(dir, "made/b.txt --input-fps 30 --out c.npy --smoothing none --no-constraints");
-    let same = npy::read(&dir.join("c.npy"), fps).unwrap();
-    assert!((&same.joints - &joints.joints).iter().all(|v| v.abs() < 1e-4));
+    let read_back = npy::read(&dir.join("c.npy"), fps).unwrap();
+    assert!((&read_back.joints - &joints.joints).iter().all(|v| v.abs() < 1e-4));
     for more in [
         "--smoothing adaptive --smoothing-strength 2",
         "--shoulder-yaw removed --curl-coherence off",
@@ -69,7 +69,7 @@ fn a_motion_becomes_files_and_what_was_done_is_told() {
         done(dir, &format!("a.npy --out d.bvh {more}"));
     }
     done(dir, "a.npy --out e.fbx e.vrm e.vrma");
-    // Onto the skeleton of another file, by the bones that were found, and by those that a user wrote.
+    // Retargeting to the skeleton of another file, with detected bones and with a bone map.
     done(dir, "a.npy --retarget made/a.bvh --write-bone-map bones.toml --out f.bvh");
     let found = std::fs::read_to_string(dir.join("bones.toml")).unwrap();
     assert!(found.contains("LeftArm = \"LeftArm\"") && found.contains("Chest = \"Chest\""), "{found}");
@@ -79,34 +79,34 @@ fn a_motion_becomes_files_and_what_was_done_is_told() {
 }
 
 #[test]
-fn how_much_of_the_body_was_seen_is_told_where_it_is_not_all() {
+fn incomplete_detection_of_the_body_is_reported() {
     let folder = tempfile::tempdir().unwrap();
     let dir = folder.path();
-    let words = |motion: &Motion| {
+    let printed = |motion: &Motion| {
         joints_npz::write(&dir.join("a.npz"), motion).unwrap();
         let mut command = Command::new(env!("CARGO_BIN_EXE_orator"));
         let output = command.args(["animate", "a.npz", "--out", "a.bvh"]).current_dir(dir).output().unwrap();
         assert!(output.status.success());
         String::from_utf8_lossy(&output.stdout).into_owned() + &String::from_utf8_lossy(&output.stderr)
     };
-    let whole = swinging(1, 40);
-    assert!(!words(&whole).contains("detected"));
-    // Filled, but seen in no more than the mask says; no number at all.
-    let mut motion = whole;
+    let complete = swinging(1, 40);
+    assert!(!printed(&complete).contains("detected"));
+    // Interpolated frames outside the mask, and frames without a number.
+    let mut motion = complete;
     motion.mask.slice_mut(s![..10, ..]).fill(false);
     motion.joints.slice_mut(s![35.., R_HAND.., ..]).fill(f32::NAN);
     motion.mask.slice_mut(s![12..14, L_HAND + 1..L_HAND + 10]).fill(false);
     motion.mask.slice_mut(s![14..17, L_HAND + 1..L_HAND + 12]).fill(false);
-    let told = words(&motion);
+    let text = printed(&motion);
     let expected =
         "detected, of 40 frames: arms in 30, left hand in 27, right hand in 25; other frames are interpolated or held";
-    assert!(told.contains(expected), "{told}");
-    let seen = &done(dir, "a.npz --out a.bvh")["report"]["detected"];
-    assert_eq!(*seen, serde_json::json!({ "left_arm": 30, "right_arm": 30, "left_hand": 27, "right_hand": 25 }));
+    assert!(text.contains(expected), "{text}");
+    let detected = &done(dir, "a.npz --out a.bvh")["report"]["detected"];
+    assert_eq!(*detected, serde_json::json!({ "left_arm": 30, "right_arm": 30, "left_hand": 27, "right_hand": 25 }));
 }
 
 #[test]
-fn a_film_has_the_sound_of_its_run_and_a_silent_one_is_told_of() {
+fn a_film_has_the_audio_of_its_run_and_missing_audio_is_reported() {
     let folder = tempfile::tempdir().unwrap();
     let dir = folder.path();
     let (lifted, extracted) = (dir.join("work/lift/host/talk"), dir.join("work/extract/host/talk"));
@@ -119,13 +119,13 @@ fn a_film_has_the_sound_of_its_run_and_a_silent_one_is_told_of() {
     let sound = crate::fixtures::clips::tone(SAMPLE_RATE, 2.0, 440.0);
     orator_formats::wav::write(&extracted.join("audio.wav"), &sound).unwrap();
     assert_eq!(done(dir, "work/lift/host/talk --out heard.mp4")["film_has_sound"], true);
-    let heard = audio::read_mono(&dir.join("heard.mp4"), SAMPLE_RATE).unwrap().unwrap();
-    assert!((15_000..18_000).contains(&heard.samples.len()), "{} samples", heard.samples.len());
+    let audio_track = audio::read_mono(&dir.join("heard.mp4"), SAMPLE_RATE).unwrap().unwrap();
+    assert!((15_000..18_000).contains(&audio_track.samples.len()), "{} samples", audio_track.samples.len());
     assert!(done(dir, "work/lift/host/talk --out a.bvh")["film_has_sound"].is_null());
 }
 
 #[test]
-fn a_folder_of_motions_becomes_a_folder_of_files() {
+fn a_folder_of_motions_is_exported_to_a_folder() {
     let folder = tempfile::tempdir().unwrap();
     let dir = folder.path();
     std::fs::create_dir_all(dir.join("in")).unwrap();
@@ -136,7 +136,7 @@ fn a_folder_of_motions_becomes_a_folder_of_files() {
     let mut names: Vec<_> = std::fs::read_dir(dir.join("made")).unwrap().map(|f| f.unwrap().file_name()).collect();
     names.sort();
     assert_eq!(names, ["a.bvh", "a.npy", "a.npy.json", "b.bvh", "b.npy", "b.npy.json"]);
-    // A broken one does not stop the others.
+    // An invalid file does not stop the others.
     std::fs::write(dir.join("in/c.txt"), "1 2 3\n").unwrap();
     let (code, json, errors) = animate(dir, "in --out again --format bvh");
     assert_eq!((code, json["failed"].as_u64()), (2, Some(1)));
@@ -144,11 +144,11 @@ fn a_folder_of_motions_becomes_a_folder_of_files() {
 }
 
 #[test]
-fn a_dataset_has_the_face_and_the_sound_of_its_samples() {
+fn samples_of_a_dataset_are_animated_with_their_faces() {
     let folder = tempfile::tempdir().unwrap();
     let dir = folder.path();
     let n_frames = 30;
-    // The face of a person who looks to the left and back, 400 px a metre.
+    // The face of a person who turns to the left and back, 400 px per metre.
     let mut pose2d = Array3::zeros((n_frames, N_KEYPOINTS, 3));
     let points =
         [[0.0, 0.015, 0.12], [0.032, -0.03, 0.085], [-0.032, -0.03, 0.085], [0.075, 0.0, 0.0], [-0.075, 0.0, 0.0]];
@@ -156,8 +156,8 @@ fn a_dataset_has_the_face_and_the_sound_of_its_samples() {
         let yaw = 0.5 * (std::f64::consts::PI * t as f64 / 29.0).sin();
         for (k, [x, y, z]) in points.into_iter().chain([[0.18, 0.25, -0.1], [-0.18, 0.25, -0.1]]).enumerate() {
             let turned = if k < 5 { yaw.cos() * x + yaw.sin() * z } else { x };
-            let place = [320.0 + 400.0 * turned, 200.0 + 400.0 * y, 0.9].map(|v| v as f32);
-            pose2d.slice_mut(s![t, k, ..]).assign(&ndarray::arr1(&place));
+            let point = [320.0 + 400.0 * turned, 200.0 + 400.0 * y, 0.9].map(|v| v as f32);
+            pose2d.slice_mut(s![t, k, ..]).assign(&ndarray::arr1(&point));
         }
     }
     let sound = Sound { rate: SAMPLE_RATE, samples: vec![0.1; 32_000] };
@@ -181,18 +181,18 @@ fn a_dataset_has_the_face_and_the_sound_of_its_samples() {
     assert!(head < nose);
     assert_eq!(done(dir, "host --split test --out b --format bvh")["motions"].as_array().unwrap().len(), 1);
     assert_eq!(done(dir, "host --out c --format bvh")["motions"].as_array().unwrap().len(), 2);
-    for (args, words) in [
+    for (args, expected) in [
         ("host --sample nobody --out x.bvh", "talk-0a1b2c3d-000000, walk-99999999-000007"),
-        ("host --out x.bvh", "holds 2 motions"),
+        ("host --out x.bvh", "contains 2 motions"),
         ("host --split validation --out x --format bvh", "no sample in this split"),
     ] {
         let (code, _, errors) = animate(dir, args);
-        assert!(code == 1 && errors.contains(words), "{args}: {code} {errors}");
+        assert!(code == 1 && errors.contains(expected), "{args}: {code} {errors}");
     }
 }
 
 #[test]
-fn what_is_wrong_is_said_and_nothing_is_written() {
+fn errors_name_the_cause_and_leave_no_output() {
     let folder = tempfile::tempdir().unwrap();
     let dir = folder.path();
     let write = |name: &str, joints: Array3<f32>| {
@@ -207,8 +207,8 @@ fn what_is_wrong_is_said_and_nothing_is_written() {
     std::fs::write(dir.join("words.txt"), "a motion\n").unwrap();
     std::fs::write(dir.join("picture.png"), "no motion").unwrap();
     std::fs::create_dir(dir.join("nothing")).unwrap();
-    for (args, words) in [
-        ("gone.npy --out x.bvh", "gone.npy is not there"),
+    for (args, expected) in [
+        ("gone.npy --out x.bvh", "gone.npy does not exist"),
         ("nan.npy --out x.bvh", "all joints of all 10 frames are missing"),
         ("empty.npy --out x.bvh", "has no frames"),
         ("few.npy --out x.bvh", "[10, 43, 3], expected [frames, 49, 3]"),
@@ -236,7 +236,7 @@ fn what_is_wrong_is_said_and_nothing_is_written() {
         ("good.npy --out x.bvh --keypoints good.npy", "good.npy"),
     ] {
         let (code, _, errors) = animate(dir, args);
-        assert!(code != 0 && errors.contains(words), "{args}: {code} {errors}");
+        assert!(code != 0 && errors.contains(expected), "{args}: {code} {errors}");
     }
     assert!(!dir.join("x.bvh").exists() && !dir.join("x.mp4").exists() && !dir.join("x").exists());
 }

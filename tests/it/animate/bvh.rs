@@ -1,5 +1,5 @@
-//! Motion to BVH: what is written, read back by a reader of this file's own and put through plain matrices, is the
-//! motion again; left is left; gaps do no harm.
+//! Motion to BVH: the file, read by an independent parser and evaluated with plain matrices, reproduces the motion;
+//! left stays left; gaps cause no jumps.
 
 use crate::fixtures::animation::bvh::{Bvh, worst_mm};
 use crate::fixtures::figures::{FPS, swinging};
@@ -27,7 +27,7 @@ fn clip(motion: &Motion) -> BvhClip {
 }
 
 #[test]
-fn the_bvh_gives_back_the_joints_within_a_tenth_of_a_millimetre() {
+fn the_bvh_reproduces_the_joints_within_a_tenth_of_a_millimetre() {
     for seed in 0..4 {
         let performance = performed(&swinging(seed, 60));
         let bvh = Bvh::parse(&performance.clip.to_bvh());
@@ -41,27 +41,27 @@ fn the_bvh_gives_back_the_joints_within_a_tenth_of_a_millimetre() {
 fn a_t_pose_is_the_rest_pose_facing_plus_z() {
     let rig = Rig::from_motion(&swinging(0, 8));
     let local = vec![Rotation::IDENTITY; rig.skeleton.joints.len()];
-    let places = rig.skeleton.positions(rig.root, &local);
-    let neck = places[rig.positions[skeleton::NECK]];
+    let positions = rig.skeleton.positions(rig.root, &local);
+    let neck = positions[rig.positions[skeleton::NECK]];
     let joints = Array3::from_shape_fn((2, N_JOINTS, 3), |(_, joint, k)| {
         let sign = if k == 0 { 1.0 } else { -1.0 };
-        (sign * (places[rig.positions[joint]][k] - neck[k]) / 100.0) as f32
+        (sign * (positions[rig.positions[joint]][k] - neck[k]) / 100.0) as f32
     });
-    assert!(joints[[0, skeleton::L_WRIST, 0]] > 0.5, "the left wrist is at the right of the picture");
+    assert!(joints[[0, skeleton::L_WRIST, 0]] > 0.5, "the left wrist is at the right of the image");
     let clip = clip(&Motion::from_joints(FPS, joints));
-    // The hand's axis runs to the middle of the knuckles, a degree beside the rest axis; all else is at rest.
+    // The hand axis runs to the centre of the knuckles, a degree from the rest axis; other joints are at rest.
     for (joint, rotation) in clip.skeleton.joints.iter().zip(&clip.local[0]) {
         let degrees = rotation.angle().to_degrees();
         assert!(degrees < 3.0, "{} is turned by {degrees} degrees", joint.name);
     }
-    let soles = places.iter().map(|place| place[1]).fold(f64::MAX, f64::min);
+    let soles = positions.iter().map(|position| position[1]).fold(f64::MAX, f64::min);
     assert!(soles.abs() < 1e-9, "the figure stands on the floor");
 }
 
 #[test]
-fn gaps_are_bridged_and_a_hand_never_seen_is_relaxed() {
-    let whole = swinging(2, 60);
-    let mut motion = whole.clone();
+fn gaps_are_interpolated_and_an_undetected_hand_is_relaxed() {
+    let complete = swinging(2, 60);
+    let mut motion = complete.clone();
     motion.joints.slice_mut(s![.., L_HAND..R_HAND, ..]).fill(f32::NAN);
     motion.joints.slice_mut(s![20..24, .., ..]).fill(f32::NAN);
     motion.joints.slice_mut(s![..3, 1.., ..]).fill(f32::NAN);
@@ -80,14 +80,14 @@ fn gaps_are_bridged_and_a_hand_never_seen_is_relaxed() {
     assert!((19..24).map(step).fold(0.0, f64::max) < 30.0);
 
     for n_frames in [0, 1] {
-        let nothing = Motion::from_joints(FPS, Array3::from_elem((n_frames, N_JOINTS, 3), f32::NAN));
-        assert_eq!(Bvh::parse(&text(&nothing)).frames.len(), n_frames);
+        let empty = Motion::from_joints(FPS, Array3::from_elem((n_frames, N_JOINTS, 3), f32::NAN));
+        assert_eq!(Bvh::parse(&text(&empty)).frames.len(), n_frames);
     }
 }
 
 #[test]
-fn a_straightening_arm_does_not_spin() {
-    // The left arm held to the side; the elbow passes through straight and bends back a degree the wrong way.
+fn a_straightening_arm_does_not_twist() {
+    // The left arm is held to the side; the elbow straightens, overextends by a degree and bends again.
     let bend = |t: usize| 2.0 * (t as f64 - 30.0).abs() - 1.0;
     let mut motion = swinging(3, 60);
     for frame in 0..60 {
@@ -95,8 +95,8 @@ fn a_straightening_arm_does_not_spin() {
         let shoulder = [0.17, 0.05, 0.0];
         let elbow = [shoulder[0] + 0.28, 0.15, 0.0];
         let wrist = [elbow[0] + 0.25 * angle.cos(), 0.15, -0.25 * angle.sin()];
-        for (joint, place) in [(4, shoulder), (5, elbow), (6, wrist)] {
-            (0..3).for_each(|k| motion.joints[[frame, joint, k]] = place[k] as f32);
+        for (joint, position) in [(4, shoulder), (5, elbow), (6, wrist)] {
+            (0..3).for_each(|k| motion.joints[[frame, joint, k]] = position[k] as f32);
         }
     }
     let clip = clip(&motion);
@@ -108,26 +108,27 @@ fn a_straightening_arm_does_not_spin() {
 }
 
 #[test]
-fn the_released_clips_keep_their_gesture() {
+fn released_clips_preserve_their_gestures() {
     let Some(folder) = real_data("data/released_clips") else { return };
     let motion = authors_txt::read(&folder.join("gt_interval_102571.txt"), FPS).unwrap();
     let untouched =
         AnimationOptions { smoothing: Smoothing::None, constraints: Constraints::NONE, ..AnimationOptions::default() };
     let clip = perform(&motion, None, &untouched).clip;
-    // The clip's bones vary by some percent of their length: the file keeps directions and gives each one length.
+    // Bone lengths of the clip vary by a few percent: the file has their directions and a constant length for each.
     let rig = Rig::from_motion(&motion);
-    let mut apart = Vec::new();
+    let mut distances = Vec::new();
     for frame in 0..motion.n_frames() {
-        let places = clip.positions(frame);
-        let neck = places[rig.positions[0]];
+        let positions = clip.positions(frame);
+        let neck = positions[rig.positions[0]];
         for joint in 1..N_JOINTS {
-            let place = places[rig.positions[joint]];
-            let along =
-                |k: usize, sign: f64| (place[k] - neck[k]) / 100.0 - sign * f64::from(motion.joints[[frame, joint, k]]);
-            apart.push(along(0, 1.0).hypot(along(1, -1.0)).hypot(along(2, -1.0)));
+            let position = positions[rig.positions[joint]];
+            let difference = |k: usize, sign: f64| {
+                (position[k] - neck[k]) / 100.0 - sign * f64::from(motion.joints[[frame, joint, k]])
+            };
+            distances.push(difference(0, 1.0).hypot(difference(1, -1.0)).hypot(difference(2, -1.0)));
         }
     }
-    let mean = apart.iter().sum::<f64>() / apart.len() as f64;
+    let mean = distances.iter().sum::<f64>() / distances.len() as f64;
     assert!(mean < 0.03, "{mean} m");
     let jumps = (1..motion.n_frames())
         .flat_map(|t| rig.arms.iter().flat_map(move |arm| [arm.upper, arm.forearm].map(|joint| (t, joint))))

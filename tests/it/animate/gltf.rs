@@ -1,5 +1,5 @@
-//! The GLB read back without any library: its nodes and animation give the joints of the performance, its skin at rest
-//! gives the mesh back, and the mesh is a whole skin. The Khronos validator finds nothing (`make validator`).
+//! The GLB parsed without a library: nodes and animation reproduce the joints of the performance, and the skin at rest
+//! reproduces the mesh with complete weights. The Khronos validator reports no issues (`make validator`).
 
 use crate::fixtures::animation::gltf::{Glb, vec3, written};
 use crate::fixtures::figures::swinging;
@@ -15,7 +15,7 @@ use std::path::PathBuf;
 use std::process::Command;
 
 #[test]
-fn nodes_and_animation_give_the_joints_of_the_performance() {
+fn nodes_and_animation_reproduce_the_joints_of_the_performance() {
     let folder = tempfile::tempdir().unwrap();
     let (performance, path) = written(folder.path(), 40, Names::Own);
     let glb = Glb::read(&path);
@@ -27,9 +27,10 @@ fn nodes_and_animation_give_the_joints_of_the_performance() {
         let neck = world[performance.rig.positions[0]].1;
         for (joint, &node) in performance.rig.positions.iter().enumerate() {
             let [x, y, z] = sub(world[node].1, neck);
-            let place = [x, -y, -z];
-            let apart = (0..3).map(|k| (place[k] - f64::from(expected.joints[[frame, joint, k]])).powi(2)).sum::<f64>();
-            worst = worst.max(1e3 * apart.sqrt());
+            let position = [x, -y, -z];
+            let square =
+                (0..3).map(|k| (position[k] - f64::from(expected.joints[[frame, joint, k]])).powi(2)).sum::<f64>();
+            worst = worst.max(1e3 * square.sqrt());
         }
     }
     eprintln!("forward kinematics of the GLB: {worst:.5} mm");
@@ -40,7 +41,7 @@ fn nodes_and_animation_give_the_joints_of_the_performance() {
 }
 
 #[test]
-fn the_skin_at_rest_is_the_mesh_and_every_vertex_hangs_on_its_joints() {
+fn the_skin_at_rest_equals_the_mesh_and_weights_sum_to_one() {
     let folder = tempfile::tempdir().unwrap();
     let (performance, path) = written(folder.path(), 3, Names::Own);
     let glb = Glb::read(&path);
@@ -50,7 +51,7 @@ fn the_skin_at_rest_is_the_mesh_and_every_vertex_hangs_on_its_joints() {
     let root = vec3(&glb.node(0)["translation"]);
     let rest = glb.world(&vec![Rotation::IDENTITY; n_joints + 2], root);
     let (mut n_triangles, mut low, mut high) = (0, [f64::MAX; 3], [f64::MIN; 3]);
-    let mut carried = vec![0.0; n_joints];
+    let mut joint_weights = vec![0.0; n_joints];
     for part in glb.parts() {
         let of = |name: &str| glb.numbers(&part["attributes"][name]);
         let (points, normals, joints, weights) = (of("POSITION"), of("NORMAL"), of("JOINTS_0"), of("WEIGHTS_0"));
@@ -64,7 +65,7 @@ fn the_skin_at_rest_is_the_mesh_and_every_vertex_hangs_on_its_joints() {
                 let joint = joint as usize;
                 let bind: Vec3 = std::array::from_fn(|k| inverse_binds[joint][12 + k]);
                 skinned = add(skinned, scale(add(add(point, bind), rest[joint].1), weight / 65_535.0));
-                carried[joint] += weight / 65_535.0;
+                joint_weights[joint] += weight / 65_535.0;
             }
             assert!(norm(sub(skinned, point)) < 1e-5);
             (0..3).for_each(|k| (low[k], high[k]) = (low[k].min(point[k]), high[k].max(point[k])));
@@ -75,16 +76,16 @@ fn the_skin_at_rest_is_the_mesh_and_every_vertex_hangs_on_its_joints() {
     }
     eprintln!("{n_triangles} triangles, {} bytes", std::fs::metadata(&path).unwrap().len());
     assert!((10_000..60_000).contains(&n_triangles) && std::fs::metadata(&path).unwrap().len() < 2_000_000);
-    // The soles on the floor, the head above, as wide as the arms are long, facing +z with its feet.
+    // Soles on the floor, a plausible height, symmetric in x, and feet that point to +z.
     assert!(low[1].abs() < 0.02 && (1.2..2.4).contains(&high[1]) && (low[0] + high[0]).abs() < 0.05);
     assert!(high[2] > -low[2]);
     for (joint, bone) in performance.rig.skeleton.joints.iter().enumerate() {
-        assert!(bone.end || carried[joint] > 5.0, "{} carries {} vertices", bone.name, carried[joint]);
+        assert!(bone.end || joint_weights[joint] > 5.0, "{} has weight {}", bone.name, joint_weights[joint]);
     }
 }
 
 #[test]
-fn the_face_has_colours_and_a_mouth_that_opens() {
+fn the_face_has_vertex_colours_and_a_mouth_open_target() {
     let folder = tempfile::tempdir().unwrap();
     let (performance, path) = written(folder.path(), 3, Names::Vrm);
     let glb = Glb::read(&path);
@@ -95,22 +96,22 @@ fn the_face_has_colours_and_a_mouth_that_opens() {
     let points = glb.numbers(&part["attributes"]["POSITION"]);
     let colours = glb.numbers(&part["attributes"]["COLOR_0"]);
     assert!(open.len() == points.len() && colours.len() == points.len());
-    // The chin drops by centimetres; eyes, nose and everything below the collar stay.
-    let lowest = open.iter().map(|way| way[1]).fold(f64::INFINITY, f64::min);
+    // The chin drops by centimetres; eyes, nose and all vertices below the collar do not move.
+    let lowest = open.iter().map(|offset| offset[1]).fold(f64::INFINITY, f64::min);
     assert!((-0.04..-0.015).contains(&lowest), "{lowest} m");
     let head = glb
         .world(&vec![Rotation::IDENTITY; performance.rig.skeleton.joints.len() + 2], vec3(&glb.node(0)["translation"]))
         [performance.rig.head]
         .1;
-    let still = points.iter().zip(&open).filter(|(point, _)| point[1] > head[1] + 0.10 || point[1] < head[1] - 0.05);
-    assert!(still.clone().count() > 500);
-    assert!(still.map(|(_, way)| way[1].abs()).fold(0.0, f64::max) < 1e-3);
+    let fixed = points.iter().zip(&open).filter(|(point, _)| point[1] > head[1] + 0.10 || point[1] < head[1] - 0.05);
+    assert!(fixed.clone().count() > 500);
+    assert!(fixed.map(|(_, offset)| offset[1].abs()).fold(0.0, f64::max) < 1e-3);
     let vrm = &glb.scene["extensions"]["VRMC_vrm"]["expressions"]["preset"]["aa"]["morphTargetBinds"][0];
     assert_eq!(glb.node(vrm["node"].as_u64().unwrap() as usize)["mesh"], 1);
 }
 
 #[test]
-fn a_joint_at_rest_has_one_key_and_no_frame_no_animation() {
+fn a_static_joint_has_one_key_and_zero_frames_no_animation() {
     let folder = tempfile::tempdir().unwrap();
     let (performance, path) = written(folder.path(), 20, Names::Own);
     let glb = Glb::read(&path);
@@ -136,16 +137,16 @@ Promise.all(all).then(reports => console.log(JSON.stringify(reports.map(report =
 ";
 
 #[test]
-fn the_khronos_validator_finds_nothing() {
+fn the_khronos_validator_reports_no_issues() {
     let Some(module) = gltf_validator() else { return };
     let folder = tempfile::tempdir().unwrap();
     let mut files: Vec<PathBuf> = Names::ALL.map(|names| written(folder.path(), 12, names).1).to_vec();
-    // One frame; a speaker of whom nothing is seen.
+    // A single frame, and a motion without any detected joint.
     let one = perform(&swinging(5, 1), None, &AnimationOptions::default());
-    let mut unseen = swinging(5, 4);
-    unseen.joints.fill(f32::NAN);
-    let unseen = perform(&unseen, None, &AnimationOptions::default());
-    for (name, performance) in [("one.glb", &one), ("unseen.glb", &unseen)] {
+    let mut undetected = swinging(5, 4);
+    undetected.joints.fill(f32::NAN);
+    let undetected = perform(&undetected, None, &AnimationOptions::default());
+    for (name, performance) in [("one.glb", &one), ("unseen.glb", &undetected)] {
         files.push(folder.path().join(name));
         ExportFormat::Glb.write(&files[files.len() - 1], performance, &ExportContent::default(), &Silent).unwrap();
     }

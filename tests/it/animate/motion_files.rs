@@ -1,4 +1,4 @@
-//! Every kind of motion file holds the same joints: those of the performance; names change, nothing else.
+//! All motion formats contain the joints of the performance; a preset changes only the names of bones.
 
 use crate::fixtures::animation::bvh::Bvh;
 use crate::fixtures::figures::{FPS, swinging};
@@ -25,7 +25,7 @@ fn vec3(value: &Value) -> Vec3 {
 }
 
 #[test]
-fn json_tells_joints_and_rotations_that_belong_together() {
+fn json_positions_and_rotations_are_consistent() {
     let folder = tempfile::tempdir().unwrap();
     let performance = perform(&swinging(2, 15), None, &AnimationOptions::default());
     let expected = performance.motion();
@@ -41,26 +41,26 @@ fn json_tells_joints_and_rotations_that_belong_together() {
     assert_eq!(file["names"].as_array().unwrap().len(), parents.len());
     let (mut worst_fk, mut worst): (f64, f64) = (0.0, 0.0);
     for frame in 0..15 {
-        let (places, turns) = (&file["positions"][frame], &file["rotations"][frame]);
+        let (positions, rotations) = (&file["positions"][frame], &file["rotations"][frame]);
         let mut world: Vec<(Rotation, Vec3)> = Vec::new();
         for (joint, parent) in parents.iter().enumerate() {
-            let q = &turns[joint];
+            let q = &rotations[joint];
             let local = Rotation { w: q[3].as_f64().unwrap(), v: vec3(q) };
             world.push(match parent {
-                None => (local, vec3(&places[joint])),
+                None => (local, vec3(&positions[joint])),
                 Some(parent) => {
-                    let (turn, place) = world[*parent];
-                    (turn * local, add(place, turn.turn(vec3(&file["offsets"][joint]))))
+                    let (turn, position) = world[*parent];
+                    (turn * local, add(position, turn.turn(vec3(&file["offsets"][joint]))))
                 }
             });
-            worst_fk = worst_fk.max(1e3 * norm(sub(world[joint].1, vec3(&places[joint]))));
+            worst_fk = worst_fk.max(1e3 * norm(sub(world[joint].1, vec3(&positions[joint]))));
         }
-        let of = |joint: usize| vec3(&places[file["joints49"][joint].as_u64().unwrap() as usize]);
+        let of = |joint: usize| vec3(&positions[file["joints49"][joint].as_u64().unwrap() as usize]);
         for joint in 0..49 {
             let [x, y, z] = sub(of(joint), of(0));
-            let apart: Vec3 =
+            let difference: Vec3 =
                 [(0, x), (1, -y), (2, -z)].map(|(k, v)| v - f64::from(expected.joints[[frame, joint, k]]));
-            worst = worst.max(1e3 * norm(apart));
+            worst = worst.max(1e3 * norm(difference));
         }
     }
     eprintln!("JSON: rotations give the positions within {worst_fk:.4} mm, these the joints within {worst:.4} mm");
@@ -68,7 +68,7 @@ fn json_tells_joints_and_rotations_that_belong_together() {
 }
 
 #[test]
-fn files_of_joints_hold_the_joints_of_the_performance() {
+fn joint_files_contain_the_joints_of_the_performance() {
     let folder = tempfile::tempdir().unwrap();
     let performance = perform(&swinging(2, 12), None, &AnimationOptions::default());
     let expected = performance.motion();
@@ -83,7 +83,7 @@ fn files_of_joints_hold_the_joints_of_the_performance() {
 }
 
 #[test]
-fn a_preset_changes_the_names_of_a_bvh_and_nothing_else() {
+fn a_preset_changes_only_the_names_of_a_bvh() {
     let folder = tempfile::tempdir().unwrap();
     let performance = perform(&swinging(2, 5), None, &AnimationOptions::default());
     let text = |names: Names| {
@@ -91,11 +91,11 @@ fn a_preset_changes_the_names_of_a_bvh_and_nothing_else() {
         std::fs::read_to_string(path).unwrap()
     };
     let own = text(Names::Own);
-    let places = |text: &str| {
+    let read = |text: &str| {
         let bvh = orator_formats::bvh::read::Bvh::parse(text).unwrap();
         (bvh.positions(Positions::Auto), bvh)
     };
-    let (own_places, own_bvh) = places(&own);
+    let (own_positions, own_bvh) = read(&own);
     for (names, hips) in Names::ALL.into_iter().zip(["Hips", "mixamorig:Hips", "Hips", "hips", "pelvis"]) {
         let text = text(names);
         let bvh = Bvh::parse(&text);
@@ -104,17 +104,17 @@ fn a_preset_changes_the_names_of_a_bvh_and_nothing_else() {
             assert_eq!(text.split_once("MOTION").unwrap().1, own.split_once("MOTION").unwrap().1);
             continue;
         }
-        // Mixamo has bones of its own: the others stay where they are.
-        let (places, bvh) = places(&text);
+        // Mixamo has extra bones; the common bones keep their positions.
+        let (positions, bvh) = read(&text);
         assert_eq!(bvh.joints.len(), own_bvh.joints.len() + 3);
-        for (joint, place) in own_bvh.joints.iter().enumerate() {
-            let name = match place.name.as_str() {
+        for (joint, bone) in own_bvh.joints.iter().enumerate() {
+            let name = match bone.name.as_str() {
                 "Chest" => "Spine1".to_owned(),
                 name => name.replace("Foot_end", "ToeBase"),
             };
             let found = bvh.find(&format!("mixamorig:{name}")).unwrap_or_else(|| panic!("no {name}"));
             for frame in 0..5 {
-                assert!(norm(sub(places[frame][found], own_places[frame][joint])) < 1e-3, "{name}");
+                assert!(norm(sub(positions[frame][found], own_positions[frame][joint])) < 1e-3, "{name}");
             }
         }
     }

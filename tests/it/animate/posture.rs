@@ -1,5 +1,5 @@
-//! Trunk, head and legs: a known posture is on the rig and is found again from what a camera sees of it, the joints stay
-//! where they were against the neck, feet stay on the floor.
+//! Trunk, head and legs: a known posture is applied to the rig and estimated again from keypoints, joints keep their
+//! positions relative to the neck, and feet stay on the floor.
 
 use crate::fixtures::animation::bvh::Bvh;
 use crate::fixtures::figures::swinging;
@@ -24,7 +24,7 @@ const UNTOUCHED: AnimationOptions = AnimationOptions {
     fps: None,
 };
 
-/// Lean of 14 degrees, roll of 8 and a head that turns by 50, about zero.
+/// Oscillation about zero: trunk lean of 14 degrees, trunk roll of 8, head yaw of 50.
 fn swaying() -> Posture {
     let wave = |t: usize, rate: f64, degrees: f64| (degrees.to_radians() * (rate * t as f64).sin()) as f32;
     let columns = |rates: [f64; 3], degrees: [f64; 3]| {
@@ -44,31 +44,31 @@ fn find(performance: &Performance, name: &str) -> usize {
     performance.rig.skeleton.find(name).expect("a joint of the rig")
 }
 
-fn apart_mm(a: &Motion, b: &Motion) -> f64 {
+fn max_difference_mm(a: &Motion, b: &Motion) -> f64 {
     let difference = (&a.joints - &b.joints).mapv(|v| f64::from(v.abs()));
     1_000.0 * difference.iter().copied().fold(0.0, f64::max)
 }
 
 #[test]
-fn the_trunk_turns_as_it_was_seen_and_no_joint_moves_against_the_neck() {
+fn the_trunk_follows_the_posture_and_joints_stay_relative_to_the_neck() {
     let posture = swaying();
     for legs in [Legs::Standing, Legs::Seated, Legs::None] {
         let (plain, turned) = (performed(legs, None), performed(legs, Some(&posture)));
-        let apart = apart_mm(&plain.motion(), &turned.motion());
-        assert!(apart < 0.1, "{legs:?}: {apart} mm");
+        let distance = max_difference_mm(&plain.motion(), &turned.motion());
+        assert!(distance < 0.1, "{legs:?}: {distance} mm");
         let [after, before] = [&turned, &plain].map(|performance| {
             let world = |t: usize| performance.rig.skeleton.world(&performance.clip.local[t]);
             (0..N_FRAMES).map(world).collect::<Vec<_>>()
         });
         for t in 0..N_FRAMES {
-            let places = turned.clip.positions(t);
-            let line = sub(places[turned.rig.neck], places[0]);
-            // In the axes of the chest's own yaw, which the joints have.
+            let positions = turned.clip.positions(t);
+            let line = sub(positions[turned.rig.neck], positions[0]);
+            // In the axes of the chest, whose yaw comes from the joints.
             let [x, y, z] = before[t][turned.rig.chest].inverse().turn(line);
             let found = [z.atan2(y), -(x / norm(line)).asin()];
             for (k, found) in found.into_iter().enumerate() {
-                let off = (found - f64::from(posture.trunk[[t, k + 1]])).to_degrees().abs();
-                assert!(off < 0.6, "{legs:?}, frame {t}, angle {k}: {off} degrees");
+                let error = (found - f64::from(posture.trunk[[t, k + 1]])).to_degrees().abs();
+                assert!(error < 0.6, "{legs:?}, frame {t}, angle {k}: {error} degrees");
             }
             let [yaw, pitch, roll] = after[t][turned.rig.head].euler([1, 0, 2]);
             let head = [yaw, pitch, roll];
@@ -80,7 +80,7 @@ fn the_trunk_turns_as_it_was_seen_and_no_joint_moves_against_the_neck() {
 }
 
 #[test]
-fn planted_feet_do_not_slide_at_any_rate_and_the_hips_stay_above_them() {
+fn feet_do_not_slide_at_any_rate_and_hips_stay_above_them() {
     let posture = swaying();
     for legs in [Legs::Standing, Legs::Seated] {
         for fps in [None, Some(FrameRate::new(60, 1))] {
@@ -90,61 +90,63 @@ fn planted_feet_do_not_slide_at_any_rate_and_the_hips_stay_above_them() {
             let frames: Vec<Vec<Vec3>> = (0..bvh.frames.len()).map(|frame| bvh.places(frame)).collect();
             let joint = |name: &str| bvh.names.iter().position(|known| known == name).expect("a joint of the file");
             for foot in ["LeftFoot", "LeftFootEnd", "RightFoot", "RightFootEnd"].map(joint) {
-                let slid = frames.iter().map(|places| norm(sub(places[foot], frames[0][foot]))).fold(0.0, f64::max);
-                assert!(slid < 0.05, "{legs:?} {fps:?}: {foot} slid by {slid} cm");
+                let shift =
+                    frames.iter().map(|positions| norm(sub(positions[foot], frames[0][foot]))).fold(0.0, f64::max);
+                assert!(shift < 0.05, "{legs:?} {fps:?}: {foot} slid by {shift} cm");
             }
             let [left, right] = ["LeftFoot", "RightFoot"].map(joint);
-            let wander = frames.iter().map(|places| {
-                let between = scale(add(places[left], places[right]), 0.5);
-                (places[0][0] - between[0]).abs()
+            let hip_offsets = frames.iter().map(|positions| {
+                let centre = scale(add(positions[left], positions[right]), 0.5);
+                (positions[0][0] - centre[0]).abs()
             });
-            assert!(wander.fold(0.0, f64::max) < 5.0, "the hips are above the feet");
-            let moved = frames.iter().map(|places| norm(sub(places[0], frames[0][0]))).fold(0.0, f64::max);
+            assert!(hip_offsets.fold(0.0, f64::max) < 5.0, "the hips are above the feet");
+            let moved = frames.iter().map(|positions| norm(sub(positions[0], frames[0][0]))).fold(0.0, f64::max);
             assert!(if legs == Legs::Standing { moved > 0.5 } else { moved < 1e-6 }, "{legs:?}: {moved} cm");
         }
     }
 }
 
 #[test]
-fn who_sits_has_right_angles_at_hips_and_knees() {
+fn a_seated_rig_has_right_angles_at_hips_and_knees() {
     let performance = performed(Legs::Seated, None);
-    let places = performance.clip.positions(10);
-    let place = |name: &str| places[find(&performance, name)];
+    let positions = performance.clip.positions(10);
+    let position = |name: &str| positions[find(&performance, name)];
     for side in ["Left", "Right"] {
-        let [hip, knee, ankle] = ["UpLeg", "Leg", "Foot"].map(|part| place(&format!("{side}{part}")));
+        let [hip, knee, ankle] = ["UpLeg", "Leg", "Foot"].map(|part| position(&format!("{side}{part}")));
         let [thigh, shin] = [sub(knee, hip), sub(ankle, knee)].map(|bone| unit(bone, 1e-6).unwrap());
         let angle = dot(thigh, shin).acos().to_degrees();
         assert!((angle - 90.0).abs() < 3.0 && thigh[1].abs() < 0.05, "{side}: {angle} degrees, thigh {thigh:?}");
     }
-    let soles = places.iter().map(|place| place[1]).fold(f64::MAX, f64::min);
+    let soles = positions.iter().map(|position| position[1]).fold(f64::MAX, f64::min);
     assert!(soles.abs() < 0.1, "the feet are on the floor: {soles} cm");
 }
 
 #[test]
-fn without_a_posture_who_stands_has_the_same_bytes_as_one_whose_legs_rest() {
+fn without_posture_standing_legs_give_the_same_bytes_as_no_legs() {
     let [standing, none] = [Legs::Standing, Legs::None].map(|legs| performed(legs, None).clip.to_bvh());
     assert_eq!(standing, none);
 }
 
 #[test]
-fn a_breath_moves_the_chest_a_little_and_no_joint_against_the_neck() {
+fn breathing_moves_the_chest_but_no_joint_relative_to_the_neck() {
     let motion = swinging(1, 150);
-    let [still, alive] = [false, true].map(|breath| perform(&motion, None, &AnimationOptions { breath, ..UNTOUCHED }));
-    assert!(apart_mm(&still.motion(), &alive.motion()) < 0.01);
-    let way = |t: usize| {
-        let [a, b] = [&still, &alive].map(|one| one.clip.positions(t)[one.rig.neck]);
+    let [plain, breathing] =
+        [false, true].map(|breath| perform(&motion, None, &AnimationOptions { breath, ..UNTOUCHED }));
+    assert!(max_difference_mm(&plain.motion(), &breathing.motion()) < 0.01);
+    let displacement = |t: usize| {
+        let [a, b] = [&plain, &breathing].map(|one| one.clip.positions(t)[one.rig.neck]);
         10.0 * norm(sub(a, b))
     };
-    let most = (0..150).map(way).fold(0.0, f64::max);
-    assert!((2.0..4.0).contains(&most), "{most} mm");
-    assert!((1..150).all(|t| (way(t) - way(t - 1)).abs() < 0.5), "slowly");
+    let largest = (0..150).map(displacement).fold(0.0, f64::max);
+    assert!((2.0..4.0).contains(&largest), "{largest} mm");
+    assert!((1..150).all(|t| (displacement(t) - displacement(t - 1)).abs() < 0.5), "the chest moves slowly");
     let hips = |performance: &Performance| performance.clip.local.iter().all(|local| local[0] == Rotation::IDENTITY);
-    assert!(hips(&alive) && alive.clip.travel.is_empty(), "hips and legs rest");
+    assert!(hips(&breathing) && breathing.clip.travel.is_empty(), "hips and legs rest");
 }
 
-/// Keypoints [T, 17, 3], joints and extra points (nose, right hip, left hip) of a performance before a level camera.
-fn seen(performance: &Performance) -> (Array3<f32>, Array3<f32>, Array3<f32>) {
-    // The rigid face by which pose models see one, metres, and who is where in COCO.
+/// Keypoints [T, 17, 3], joints and extra points (nose, right hip, left hip) of a performance, with a level camera.
+fn observed(performance: &Performance) -> (Array3<f32>, Array3<f32>, Array3<f32>) {
+    // Face points in the axes of the head, cm, and the joints of the other keypoints in the order of COCO.
     let face = [[0.0, 1.1, 10.8], [4.1, 2.1, 6.8], [-4.1, 2.1, 6.8], [9.2, 0.0, 0.0], [-9.2, 0.0, 0.0]];
     let body =
         ["LeftArm", "RightArm", "LeftForeArm", "RightForeArm", "LeftHand", "RightHand", "LeftUpLeg", "RightUpLeg"];
@@ -153,17 +155,17 @@ fn seen(performance: &Performance) -> (Array3<f32>, Array3<f32>, Array3<f32>) {
     let n_frames = performance.clip.n_frames();
     let (mut keypoints, mut extra) = (Array3::zeros((n_frames, 17, 3)), Array3::zeros((n_frames, 3, 3)));
     for t in 0..n_frames {
-        let places = performance.clip.positions(t);
+        let positions = performance.clip.positions(t);
         let head: Rotation = performance.rig.skeleton.world(&performance.clip.local[t])[performance.rig.head];
-        let points = face.map(|point| add(places[performance.rig.head], head.turn(point)));
-        let points = points.into_iter().chain(body.iter().map(|&joint| places[joint]));
+        let points = face.map(|point| add(positions[performance.rig.head], head.turn(point)));
+        let points = points.into_iter().chain(body.iter().map(|&joint| positions[joint]));
         for (point, [x, y, _]) in points.enumerate() {
             let row = [(640.0 + 4.0 * x) as f32, (900.0 - 4.0 * y) as f32, 0.95];
             (0..3).for_each(|k| keypoints[[t, point, k]] = row[k]);
         }
-        let neck = places[performance.rig.neck];
+        let neck = positions[performance.rig.neck];
         for (row, name) in [(1, "RightUpLeg"), (2, "LeftUpLeg")] {
-            let [x, y, z] = scale(sub(places[find(performance, name)], neck), 0.01);
+            let [x, y, z] = scale(sub(positions[find(performance, name)], neck), 0.01);
             [x, -y, -z].into_iter().enumerate().for_each(|(k, v)| extra[[t, row, k]] = v as f32);
         }
     }
@@ -171,40 +173,40 @@ fn seen(performance: &Performance) -> (Array3<f32>, Array3<f32>, Array3<f32>) {
 }
 
 #[test]
-fn a_known_posture_is_found_again_from_keypoints_joints_and_hips() {
+fn a_known_posture_is_estimated_from_keypoints_joints_and_hips() {
     let truth = swaying();
     for legs in [Legs::Standing, Legs::Seated] {
         let performance = performed(legs, Some(&truth));
-        let (body, joints, extra) = seen(&performance);
+        let (body, joints, extra) = observed(&performance);
         assert_eq!(joints.shape(), [N_FRAMES, N_JOINTS, 3]);
         assert_eq!(posture::is_seated(body.view()), Some(legs == Legs::Seated));
         let lifted = LiftedBody { joints: Some(joints.view()), extra: Some(extra.view()) };
         let found = posture::estimate(body.view(), lifted);
-        let of_picture = posture::estimate(body.view(), LiftedBody::default());
+        let from_2d = posture::estimate(body.view(), LiftedBody::default());
         let median = |angles: &Array2<f32>, k: usize| {
             let mut column: Vec<f32> = angles.column(k).to_vec();
             column.sort_by(f32::total_cmp);
             column[column.len() / 2]
         };
-        // Lean and roll of the trunk and pitch of the head are told against the clip's own median.
-        let off = |found: &Array2<f32>, truth: &Array2<f32>, k: usize| {
+        // Angles are compared relative to the median of the clip, as estimates have no absolute level.
+        let error = |found: &Array2<f32>, truth: &Array2<f32>, k: usize| {
             let level = median(found, k) - median(truth, k);
             let errors = (0..N_FRAMES).map(|t| (found[[t, k]] - truth[[t, k]] - level).abs().to_degrees());
             errors.fold(0.0, f32::max)
         };
-        assert!(off(&found.trunk, &truth.trunk, 1) < 2.0 && off(&found.trunk, &truth.trunk, 2) < 2.0);
-        assert!(off(&of_picture.trunk, &truth.trunk, 2) < 4.0, "{}", off(&of_picture.trunk, &truth.trunk, 2));
-        assert!(of_picture.trunk.column(1).iter().all(|lean| lean.is_nan()), "a picture does not tell the lean");
+        assert!(error(&found.trunk, &truth.trunk, 1) < 2.0 && error(&found.trunk, &truth.trunk, 2) < 2.0);
+        assert!(error(&from_2d.trunk, &truth.trunk, 2) < 4.0, "{}", error(&from_2d.trunk, &truth.trunk, 2));
+        assert!(from_2d.trunk.column(1).iter().all(|lean| lean.is_nan()), "2D points give no lean");
         for k in 0..3 {
-            assert!(off(&found.head, &truth.head, k) < 8.0, "{k}: {}", off(&found.head, &truth.head, k));
+            assert!(error(&found.head, &truth.head, k) < 8.0, "{k}: {}", error(&found.head, &truth.head, k));
         }
         let again = perform(&swinging(3, N_FRAMES), Some(&found), &AnimationOptions { legs, ..UNTOUCHED });
-        assert!(apart_mm(&again.motion(), &performance.motion()) < 0.1);
+        assert!(max_difference_mm(&again.motion(), &performance.motion()) < 0.1);
     }
 }
 
 #[test]
-fn who_is_hardly_seen_is_neither_seated_nor_turned() {
+fn no_posture_is_estimated_without_visible_keypoints() {
     let body = Array3::zeros((20, 17, 3));
     assert_eq!(posture::is_seated(body.view()), None);
     let found = posture::estimate(body.view(), LiftedBody::default());

@@ -1,4 +1,4 @@
-//! The frame rate on its way from keypoints to an animation file, in every kind of file between.
+//! The frame rate is preserved from keypoints to an animation file, through every format in between.
 
 use crate::fixtures::figures::swinging;
 use crate::fixtures::keypoints::keypoints;
@@ -20,17 +20,17 @@ use std::process::Command;
 
 const THIRTY: FrameRate = FrameRate::new(30, 1);
 
-/// Exit code, JSON (of `--json`) and what was said.
+/// Exit code, JSON (with `--json`) and printed text.
 fn orator(dir: &Path, args: &str) -> (i32, Value, String) {
     let mut command = Command::new(env!("CARGO_BIN_EXE_orator"));
     let output = command.args(args.split_whitespace()).current_dir(dir).output().unwrap();
-    let said = String::from_utf8_lossy(&output.stdout).into_owned() + &String::from_utf8_lossy(&output.stderr);
-    (output.status.code().unwrap_or(-1), serde_json::from_slice(&output.stdout).unwrap_or_default(), said)
+    let printed = String::from_utf8_lossy(&output.stdout).into_owned() + &String::from_utf8_lossy(&output.stderr);
+    (output.status.code().unwrap_or(-1), serde_json::from_slice(&output.stdout).unwrap_or_default(), printed)
 }
 
 fn done(dir: &Path, args: &str) -> Value {
-    let (code, json, said) = orator(dir, &format!("--json {args}"));
-    assert_eq!(code, 0, "{args}: {said}");
+    let (code, json, printed) = orator(dir, &format!("--json {args}"));
+    assert_eq!(code, 0, "{args}: {printed}");
     json
 }
 
@@ -40,8 +40,8 @@ fn frame_secs(bvh: &Path) -> f64 {
     line.rsplit(' ').next().unwrap().trim().parse().unwrap()
 }
 
-/// Keypoints of a talker at 30 frames a second.
-fn talk(path: &Path) {
+/// Writes keypoints of a synthetic speaker at 30 fps.
+fn write_keypoints(path: &Path) {
     let mut rng = ChaCha8Rng::seed_from_u64(9);
     let k = keypoints(&FilmedScene::from_rule(Filming::Clean, 45, &mut rng), &mut rng);
     let mut npz = NpzWriter::new(File::create(path).unwrap());
@@ -54,21 +54,21 @@ fn talk(path: &Path) {
 }
 
 #[test]
-fn a_lift_at_30_frames_a_second_is_animated_at_30() {
+fn keypoints_at_30_fps_give_an_animation_at_30_fps() {
     let folder = tempfile::tempdir().unwrap();
     let dir = folder.path();
-    talk(&dir.join("k.npz"));
+    write_keypoints(&dir.join("k.npz"));
     for joints in ["j.npy", "j.npz", "j.txt"] {
         assert_eq!(done(dir, &format!("lift k.npz --out {joints}"))["fps"], json!({ "num": 30, "den": 1 }));
         let facts = done(dir, &format!("animate {joints} --out {joints}.bvh again-{joints}"));
         assert_eq!((&facts["fps_assumed"], &facts["fps"]["num"]), (&json!(false), &json!(30)), "{joints}");
         assert!((frame_secs(&dir.join(format!("{joints}.bvh"))) - 1.0 / 30.0).abs() < 1e-6, "{joints}");
-        // The figure's joints say their rate as well.
+        // The exported joints state their rate, too.
         let again = motion_file::read(&dir.join(format!("again-{joints}")), None).unwrap();
         assert!(again.motion.fps == THIRTY && again.has_rate && again.notes.is_empty(), "{joints}: {:?}", again.notes);
-        let (code, _, said) = orator(dir, &format!("animate {joints} --out x.bvh --input-fps 15"));
-        assert!(code == 1 && said.contains("says 30 fps, and 15 fps is given"), "{joints}: {said}");
-        assert!(said.contains(joints) && said.contains("--input-fps"), "{joints}: {said}");
+        let (code, _, printed) = orator(dir, &format!("animate {joints} --out x.bvh --input-fps 15"));
+        assert!(code == 1 && printed.contains("has a frame rate of 30 fps"), "{joints}: {printed}");
+        assert!(printed.contains(joints) && printed.contains("--input-fps"), "{joints}: {printed}");
         assert_eq!(done(dir, &format!("animate {joints} --out x.bvh --input-fps 30"))["fps_assumed"], false);
         std::fs::remove_file(dir.join("x.bvh")).unwrap();
     }
@@ -76,51 +76,51 @@ fn a_lift_at_30_frames_a_second_is_animated_at_30() {
     assert_eq!(mask.joints, npy::read(&dir.join("j.npy"), THIRTY).unwrap().joints);
     let described: Value = serde_json::from_slice(&std::fs::read(dir.join("j.npy.json")).unwrap()).unwrap();
     assert_eq!((&described["fps"], &described["shape"]), (&json!([30, 1]), &json!([45, 49, 3])));
-    // Given, the rate takes the place of the keypoints' own.
+    // `--input-fps` overrides the rate of the keypoints.
     assert_eq!(done(dir, "lift k.npz --input-fps 25 --out j.npz")["fps"]["num"], 25);
 }
 
 #[test]
-fn an_assumed_rate_is_said() {
+fn an_assumed_frame_rate_is_reported() {
     let folder = tempfile::tempdir().unwrap();
     let dir = folder.path();
     npy::write(&dir.join("a.npy"), &swinging(1, 20)).unwrap();
     std::fs::write(dir.join("b.txt"), authors_txt::format(&swinging(1, 20))).unwrap();
     joints_npz::write(&dir.join("c.npz"), &swinging(2, 20)).unwrap();
     for bare in ["a.npy", "b.txt"] {
-        let (_, _, said) = orator(dir, &format!("animate {bare} --out a.bvh"));
+        let (_, _, printed) = orator(dir, &format!("animate {bare} --out a.bvh"));
         assert!(
-            said.contains("20 frames at 15 fps (assumed: not stated in the file; set it with --input-fps)"),
-            "{said}"
+            printed.contains("20 frames at 15 fps (assumed: not stated in the file; set it with --input-fps)"),
+            "{printed}"
         );
         assert_eq!(done(dir, &format!("animate {bare} --out a.bvh"))["fps_assumed"], true);
-        let (_, _, said) = orator(dir, &format!("animate {bare} --out a.bvh --input-fps 30"));
-        assert!(said.contains("20 frames at 30 fps, 0.7 s"), "{said}");
+        let (_, _, printed) = orator(dir, &format!("animate {bare} --out a.bvh --input-fps 30"));
+        assert!(printed.contains("20 frames at 30 fps, 0.7 s"), "{printed}");
         let facts = done(dir, &format!("animate c.npz --out a.mp4 --compare {bare}"));
-        assert!(facts["notes"].to_string().contains("does not say its rate: taken for 15 fps"), "{facts}");
+        assert!(facts["notes"].to_string().contains("does not state its frame rate: 15 fps is assumed"), "{facts}");
     }
-    let (_, _, said) = orator(dir, "animate c.npz --out a.bvh");
-    assert!(!said.contains("assumed"), "{said}");
-    // What is written beside a name is not to be written over, and what is beside another motion is not believed.
-    let (code, _, said) = orator(dir, "animate c.npz --out d.npy d.npy.json");
-    assert!(code == 1 && said.contains("d.npy.json is reserved for the frame rate of d.npy"), "{said}");
+    let (_, _, printed) = orator(dir, "animate c.npz --out a.bvh");
+    assert!(!printed.contains("assumed"), "{printed}");
+    // The path of a description is reserved, and a description that does not match its motion is rejected.
+    let (code, _, printed) = orator(dir, "animate c.npz --out d.npy d.npy.json");
+    assert!(code == 1 && printed.contains("d.npy.json is reserved for the frame rate of d.npy"), "{printed}");
     done(dir, "animate c.npz --out d.npy");
     npy::write(&dir.join("d.npy"), &swinging(1, 10)).unwrap();
-    let (code, _, said) = orator(dir, "animate d.npy --out a.bvh");
-    assert!(code == 1 && said.contains("d.npy.json describes 20 frames and d.npy has 10"), "{said}");
+    let (code, _, printed) = orator(dir, "animate d.npy --out a.bvh");
+    assert!(code == 1 && printed.contains("d.npy.json describes 20 frames, but d.npy has 10"), "{printed}");
 }
 
 #[test]
-fn what_is_of_another_rate_is_measured_beside_it_by_time() {
+fn motions_at_different_rates_are_compared_by_time() {
     let folder = tempfile::tempdir().unwrap();
     let dir = folder.path();
     let motion = swinging(1, 240);
     joints_npz::write(&dir.join("truth.npz"), &Motion { fps: THIRTY, ..motion.clone() }).unwrap();
     npy::write(&dir.join("made.npy"), &motion).unwrap();
     let args = "evaluate --truth truth.npz --prediction made.npy --convention speech2gesture";
-    // 16 s beside 8: the rate is what is wrong.
-    let (code, _, said) = orator(dir, args);
-    assert!(code == 1 && said.contains("and the frame rates (--input-fps)"), "{said}");
+    // 16 s against 8 s: the error suggests the frame rate.
+    let (code, _, printed) = orator(dir, args);
+    assert!(code == 1 && printed.contains("and the frame rates (--input-fps)"), "{printed}");
     std::fs::write(path_of(&dir.join("made.npy")), "{\"fps\": 30}").unwrap();
     let same = done(dir, args);
     assert!(!same["notes"].to_string().contains("has no frame rate"), "{}", same["notes"]);
@@ -133,22 +133,22 @@ fn what_is_of_another_rate_is_measured_beside_it_by_time() {
 }
 
 #[test]
-fn units_of_captured_joints_are_found_out() {
+fn units_and_orientation_of_captured_joints_are_checked() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("gt_interval_1.txt");
     let motion = swinging(1, 20);
-    let times = |by: f32| {
-        let motion = Motion { joints: &motion.joints * by, ..motion.clone() };
+    let read_scaled = |factor: f32| {
+        let motion = Motion { joints: &motion.joints * factor, ..motion.clone() };
         std::fs::write(&path, authors_txt::format(&motion)).unwrap();
         captured::read(MotionKind::Authors, &path)
     };
-    times(1.0).unwrap();
-    for (by, unit) in [(100.0, "centimetres; multiply every coordinate by 0.01"), (1000.0, "millimetres")] {
-        let text = format!("{:#}", times(by).unwrap_err());
+    read_scaled(1.0).unwrap();
+    for (factor, unit) in [(100.0, "centimetres; multiply every coordinate by 0.01"), (1000.0, "millimetres")] {
+        let text = format!("{:#}", read_scaled(factor).unwrap_err());
         assert!(text.contains("gt_interval_1.txt") && text.contains(unit), "{text}");
     }
-    let turned = Motion { joints: motion.joints.mapv(|v| -v.abs()), ..motion };
-    joints_npz::write(&path.with_extension("npz"), &turned).unwrap();
+    let flipped = Motion { joints: motion.joints.mapv(|v| -v.abs()), ..motion };
+    joints_npz::write(&path.with_extension("npz"), &flipped).unwrap();
     let notes = motion_file::read(&path.with_extension("npz"), None).unwrap().notes;
     assert!(notes.iter().any(|note| note.contains("so y seems to point up")), "{notes:?}");
 }

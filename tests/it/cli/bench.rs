@@ -1,4 +1,4 @@
-//! The benchmark: its command line, small measurements, and what it says of arguments that make no sense.
+//! The benchmark: its command line, small measurements, and errors for invalid arguments.
 
 use crate::bench::child::{high_water_mib, n_running, ticks};
 use crate::bench::command::{Cli, measure};
@@ -6,24 +6,24 @@ use clap::CommandFactory;
 use orator_base::stage::progress::Silent;
 use serde_json::Value;
 
-fn facts(words: &str) -> Value {
-    measure(words.split_whitespace(), &Silent).unwrap().facts
+fn facts(args: &str) -> Value {
+    measure(args.split_whitespace(), &Silent).unwrap().facts
 }
 
-fn fails(words: &str, because: &str) {
-    let error = measure(words.split_whitespace(), &Silent).err().unwrap();
-    assert!(format!("{error:#}").contains(because), "{words}: {error:#}");
+fn fails(args: &str, expected: &str) {
+    let error = measure(args.split_whitespace(), &Silent).err().unwrap();
+    assert!(format!("{error:#}").contains(expected), "{args}: {error:#}");
 }
 
 #[test]
-fn the_command_line_is_sound() {
+fn the_command_line_is_valid() {
     Cli::command().debug_assert();
     fails("", "no part");
     fails("nothing", "unrecognized");
 }
 
 #[test]
-fn proc_is_read() {
+fn proc_files_are_parsed() {
     assert_eq!(high_water_mib("VmPeak:\t9 kB\nVmHWM:\t  2048 kB\n"), Some(2.0));
     let stat = "7 (a (b) c) R 1 7 7 0 -1 4194304 100 0 0 0 12 30 0 0 20 0 1 0 5 6 7";
     assert_eq!(ticks(stat), Some(42.0));
@@ -31,7 +31,7 @@ fn proc_is_read() {
 }
 
 #[test]
-fn the_lifter_is_measured_without_python_and_a_python_that_fails_is_named() {
+fn the_lifter_is_measured_without_python_and_python_errors_are_named() {
     let small = "lifter --channels 4 --steps 2 --rounds 1";
     let facts = facts(&format!("{small} --widths 3,3 --batch 4"));
     assert!(facts["secs_a_step"].as_f64().unwrap() > 0.0 && facts["window"] == 9, "{facts}");
@@ -52,7 +52,7 @@ fn generation_is_measured() {
 }
 
 #[test]
-fn the_step_of_the_trainer_is_measured() {
+fn a_training_step_is_measured() {
     let facts = facts("train --batch 2 --steps 1 --rounds 1");
     assert!(facts["secs_a_step"].as_f64().unwrap() > 0.0, "{facts}");
     assert_eq!(facts["parts"].as_object().unwrap().len(), 5, "{facts}");
@@ -71,7 +71,7 @@ fn the_renderer_is_measured() {
 #[test]
 fn claims_are_measured() {
     let facts = facts("claims --units 300 --workers 3");
-    // A claim and an end, and those that came second.
+    // A claim and an end per unit, and those of workers that came second.
     let created = facts["created"].as_f64().unwrap();
     assert!((2.0..4.0).contains(&created), "{facts}");
     fails("claims --units 0", "more than 0");

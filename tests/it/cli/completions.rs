@@ -1,4 +1,4 @@
-//! `orator completions` and `orator man`: every verb is in them, and the shells that are installed can read them.
+//! `orator completions` and `orator man` cover every subcommand, and bash can run its script.
 
 use std::path::Path;
 use std::process::Command;
@@ -10,7 +10,7 @@ fn orator(arguments: &[&str], dir: &Path) -> String {
 }
 
 #[test]
-fn scripts_name_every_verb_and_bash_can_read_its_own() {
+fn scripts_contain_the_subcommands_and_bash_runs_its_script() {
     let dir = tempfile::tempdir().unwrap();
     for shell in ["bash", "zsh", "fish"] {
         let script = orator(&["completions", shell], dir.path());
@@ -19,13 +19,13 @@ fn scripts_name_every_verb_and_bash_can_read_its_own() {
         }
     }
     std::fs::write(dir.path().join("orator.bash"), orator(&["completions", "bash"], dir.path())).unwrap();
-    let asked = "source ./orator.bash; COMP_WORDS=(orator stat); COMP_CWORD=1; _orator orator stat orator; echo ${COMPREPLY[@]}";
-    let output = Command::new("bash").args(["-c", asked]).current_dir(dir.path()).output().unwrap();
+    let call = "source ./orator.bash; COMP_WORDS=(orator stat); COMP_CWORD=1; _orator orator stat orator; echo ${COMPREPLY[@]}";
+    let output = Command::new("bash").args(["-c", call]).current_dir(dir.path()).output().unwrap();
     assert_eq!(String::from_utf8_lossy(&output.stdout).trim(), "status", "{output:?}");
 }
 
 #[test]
-fn the_manual_has_a_page_for_every_verb() {
+fn the_manual_has_a_page_per_subcommand() {
     let dir = tempfile::tempdir().unwrap();
     let page = orator(&["man"], dir.path());
     assert!(page.contains(".TH orator 1") && page.contains("evaluate"), "{page}");

@@ -3,7 +3,7 @@
 use std::process::Command;
 
 #[test]
-fn its_packages_are_those_of_the_libraries_that_the_program_links() {
+fn the_containerfile_has_the_packages_of_all_linked_libraries() {
     let file = std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/.ci/Containerfile")).unwrap();
     let output = |program: &str, argument: &str| {
         let output =
@@ -13,8 +13,10 @@ fn its_packages_are_those_of_the_libraries_that_the_program_links() {
     let (Some(linked), Some(_)) = (output("ldd", env!("CARGO_BIN_EXE_orator")), output("dpkg", "libc.so.6")) else {
         return orator_test_support::skip::skip("no ldd and dpkg");
     };
-    let ours = |line: &&str| ["libav", "libsw", "libopencv"].iter().any(|name| line.trim_start().starts_with(name));
-    let paths: Vec<&str> = linked.lines().filter(ours).filter_map(|line| line.split_whitespace().nth(2)).collect();
+    let is_media_library =
+        |line: &&str| ["libav", "libsw", "libopencv"].iter().any(|name| line.trim_start().starts_with(name));
+    let paths: Vec<&str> =
+        linked.lines().filter(is_media_library).filter_map(|line| line.split_whitespace().nth(2)).collect();
     assert!(paths.len() >= 6, "{linked}");
     for path in paths {
         let name = path.rsplit('/').next().unwrap();

@@ -1,5 +1,5 @@
-//! Error texts that users meet, as they stand in `tests/it/snapshots`: each names the place, what is expected, and
-//! what to do. Paths of the test are redacted.
+//! Error texts of the program, stored in `tests/it/snapshots`: each states the position, the expected value and what to
+//! do. Paths of the test are redacted.
 
 use crate::fixtures::untrained::write_untrained_speaker;
 use ndarray::Array3;
@@ -8,7 +8,7 @@ use orator_test_support::project::Project;
 use std::fs;
 use std::fs::File;
 
-/// Runs each command line in the project's folder and gives it with its exit code and error text.
+/// Runs each command line in the project's folder; returns it with its error text and exit code.
 fn texts(project: &Project, commands: &[&str]) -> String {
     let folder = project.dir().canonicalize().unwrap();
     let mut all = String::new();
@@ -33,7 +33,7 @@ macro_rules! snapshot {
 }
 
 #[test]
-fn a_wrong_configuration() {
+fn invalid_configurations() {
     let project = Project::with_clips("errors-config", 0, 1.0);
     fs::write(project.dir().join("two.toml"), "[segment]\nmin_framez = 3\n\n[lift]\nsmooth_arms = \"much\"\n").unwrap();
     fs::write(project.dir().join("no.toml"), "[segment\n").unwrap();
@@ -54,7 +54,7 @@ fn a_wrong_configuration() {
 }
 
 #[test]
-fn a_missing_model_and_an_unreadable_video() {
+fn missing_models_and_unreadable_videos() {
     let project = Project::with_clips("errors-run", 0, 1.0);
     fs::write(project.video("broken.mp4"), "no film").unwrap();
     fs::write(project.dir().join("other.safetensors"), "no weights").unwrap();
@@ -70,7 +70,7 @@ fn a_missing_model_and_an_unreadable_video() {
 }
 
 #[test]
-fn files_that_cannot_be_read() {
+fn unreadable_files() {
     let project = Project::with_clips("errors-files", 0, 1.0);
     let dir = project.dir();
     fs::write(dir.join("text.npz"), "no numbers").unwrap();
@@ -96,7 +96,7 @@ fn files_that_cannot_be_read() {
 }
 
 #[test]
-fn wrong_arguments_and_tables() {
+fn invalid_arguments_and_tables() {
     let project = Project::with_clips("errors-arguments", 0, 1.0);
     let dir = project.dir();
     write_untrained_speaker(&dir.join("host.safetensors"));

@@ -1,4 +1,4 @@
-//! The examples, run as functions on small made-up files.
+//! The examples, run as functions on small generated files.
 
 #![allow(dead_code)] // their `main`
 
@@ -16,7 +16,7 @@ mod lift_keypoints;
 mod read_dataset;
 
 #[test]
-fn keypoints_become_an_animation() {
+fn keypoints_are_lifted_to_an_animation() {
     let dir = tempfile::tempdir().unwrap();
     let unit = Unit { speaker: "host".into(), video: "a".into(), source: dir.path().join("a.mp4") };
     footage::write(dir.path(), &unit, &footage::good(40), "a");
@@ -27,7 +27,7 @@ fn keypoints_become_an_animation() {
 }
 
 #[test]
-fn speech_becomes_motion_and_a_file_without_sound_is_an_error_to_match() {
+fn speech_becomes_motion_and_unreadable_audio_is_a_typed_error() {
     let dir = tempfile::tempdir().unwrap();
     let [checkpoint, speech, out] = ["host.safetensors", "a.wav", "a.glb"].map(|name| dir.path().join(name));
     write_untrained_speaker(&checkpoint);

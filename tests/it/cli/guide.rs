@@ -1,4 +1,4 @@
-//! What the program says of itself: `orator guide`, and a standard output that nobody reads.
+//! `orator guide`, and commands whose standard output is closed.
 
 use std::process::{Command, Stdio};
 
@@ -15,7 +15,7 @@ fn printed(arguments: &[&str]) -> String {
 }
 
 #[test]
-fn the_list_names_every_page_and_every_page_is_printed_whole() {
+fn the_list_has_every_page_and_pages_are_printed_in_full() {
     let list = printed(&["guide"]);
     for topic in orator::guide::TOPICS {
         assert!(list.contains(topic.name) && list.contains(topic.summary), "{list}");
@@ -26,15 +26,15 @@ fn the_list_names_every_page_and_every_page_is_printed_whole() {
 }
 
 #[test]
-fn a_page_that_does_not_exist_is_refused_with_those_that_do() {
+fn an_unknown_page_is_an_error_that_lists_the_pages() {
     let output = orator(&["guide", "datset"]).output().unwrap();
-    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    let errors = String::from_utf8_lossy(&output.stderr).into_owned();
     assert_eq!(output.status.code(), Some(1));
-    assert!(said.contains("dataset") && said.contains("architecture"), "{said}");
+    assert!(errors.contains("dataset") && errors.contains("architecture"), "{errors}");
 }
 
 #[test]
-fn a_closed_standard_output_is_no_failure() {
+fn a_closed_standard_output_is_not_an_error() {
     for arguments in [&["guide", "dataset"][..], &["guide"], &["completions", "bash"], &["man"]] {
         let mut running = orator(arguments).stdout(Stdio::piped()).spawn().unwrap();
         drop(running.stdout.take());
@@ -43,9 +43,9 @@ fn a_closed_standard_output_is_no_failure() {
     }
 }
 
-/// The verbs that the guide and README show exist: each `orator VERB` in them has a help text.
+/// Each `orator VERB` in the guide and README is a subcommand of the program.
 #[test]
-fn every_verb_in_the_texts_exists() {
+fn every_subcommand_in_the_guide_and_readme_exists() {
     let readme = include_str!("../../../README.md");
     let texts = orator::guide::TOPICS.map(|topic| topic.text).join("\n") + readme;
     let words: Vec<&str> = texts.split(|c: char| c.is_whitespace() || c == '`').collect();

@@ -1,4 +1,4 @@
-//! The pipeline as another program uses it: run, looked at and refused without the command line.
+//! The pipeline as a library: run, status and errors without the command line.
 
 use crate::fixtures::footage;
 use orator::{BusyFolder, Event, Pipeline, Progress, Selection, Silent, StageName, Task, load_config};
@@ -6,11 +6,11 @@ use orator_base::stage::workdir;
 use orator_pipeline::{RunState, UnitState};
 use std::sync::Mutex;
 
-/// Keeps the events of a run.
+/// Records the events of a run.
 #[derive(Default)]
-struct Heard(Mutex<Vec<String>>);
+struct EventRecorder(Mutex<Vec<String>>);
 
-impl Progress for Heard {
+impl Progress for EventRecorder {
     fn begin(&self, _label: &str, _total: u64) -> Box<dyn Task> {
         Box::new(Silent)
     }
@@ -21,7 +21,7 @@ impl Progress for Heard {
 }
 
 #[test]
-fn a_program_runs_the_pipeline_and_asks_how_it_stands() {
+fn a_program_runs_the_pipeline_and_reads_its_status() {
     let dir = tempfile::tempdir().unwrap();
     let file = dir.path().join("pipeline.toml");
     std::fs::write(&file, "[[speaker]]\nname = \"host\"\nvideos = [\"a.mp4\", \"none-*.mp4\"]\n").unwrap();
@@ -32,14 +32,14 @@ fn a_program_runs_the_pipeline_and_asks_how_it_stands() {
     footage::write(work, unit, &footage::good(100), "a");
 
     let selection = Selection { from: StageName::Segment, to: StageName::Lift, ..Selection::default() };
-    let heard = Heard::default();
-    let report = pipeline.run(&selection, &heard).unwrap();
+    let recorder = EventRecorder::default();
+    let report = pipeline.run(&selection, &recorder).unwrap();
     let done: Vec<_> = report.units.iter().map(|unit| (unit.stage, unit.state)).collect();
     assert_eq!(done, [(StageName::Segment, RunState::Done), (StageName::Lift, RunState::Done)]);
     assert_eq!(report.stages[&StageName::Lift].done, 1);
-    let [failure] = &report.failures[..] else { panic!("the pattern that names no video") };
+    let [failure] = &report.failures[..] else { panic!("one pattern without a video") };
     assert_eq!(failure.speaker.as_deref(), Some("host"));
-    let mut events = heard.0.into_inner().unwrap();
+    let mut events = recorder.0.into_inner().unwrap();
     events.retain(|event| !event.starts_with("Advice"));
     assert!(events[0].starts_with("NoVideo") && events[2].starts_with("Done { stage: \"lift\""), "{events:?}");
     assert_eq!(pipeline.run(&selection, &Silent).unwrap().units[1].state, RunState::UpToDate);
@@ -53,7 +53,7 @@ fn a_program_runs_the_pipeline_and_asks_how_it_stands() {
 }
 
 #[test]
-fn what_stops_a_run_can_be_matched() {
+fn errors_that_stop_a_run_have_types() {
     let dir = tempfile::tempdir().unwrap();
     let file = dir.path().join("pipeline.toml");
     std::fs::write(&file, "[[speaker]]\nname = \"host\"\nvideos = [\"a.mp4\"]\n").unwrap();

@@ -1,4 +1,4 @@
-//! Verbs of the program.
+//! Subcommands, examples, library use and error texts of the program.
 
 pub(crate) mod bench;
 pub(crate) mod completions;

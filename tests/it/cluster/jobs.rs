@@ -1,4 +1,4 @@
-//! Jobs for schedulers, written without sending them.
+//! Jobs for schedulers, written but not submitted.
 
 use k8s_openapi::api::batch::v1::Job;
 use k8s_openapi::api::core::v1::PersistentVolumeClaim;
@@ -6,8 +6,8 @@ use orator_test_support::project::Project;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
-/// A manifest as its type holds it.
-fn through<T: DeserializeOwned + Serialize>(manifest: &serde_json::Value) -> serde_json::Value {
+/// Round trip of a manifest through its Kubernetes type.
+fn round_trip<T: DeserializeOwned + Serialize>(manifest: &serde_json::Value) -> serde_json::Value {
     serde_json::to_value(serde_json::from_value::<T>(manifest.clone()).unwrap()).unwrap()
 }
 
@@ -34,9 +34,10 @@ fn jobs_are_written_for_slurm_kubernetes_and_ssh() {
     let list: serde_json::Value = serde_json::from_slice(&std::fs::read(file).unwrap()).unwrap();
     let kinds: Vec<&str> = list["items"].as_array().unwrap().iter().filter_map(|item| item["kind"].as_str()).collect();
     assert_eq!(kinds, ["PersistentVolumeClaim", "Job", "Job"]);
-    // Every field is one that Kubernetes knows: none is lost on the way through its types.
+    // Every field is known to Kubernetes: none is dropped in the round trip through its types.
     let items = list["items"].as_array().unwrap();
-    let typed = [through::<PersistentVolumeClaim>(&items[0]), through::<Job>(&items[1]), through::<Job>(&items[2])];
+    let typed =
+        [round_trip::<PersistentVolumeClaim>(&items[0]), round_trip::<Job>(&items[1]), round_trip::<Job>(&items[2])];
     assert_eq!(items[..], typed[..]);
     let workers: Job = serde_json::from_value(items[1].clone()).unwrap();
     let spec = workers.spec.unwrap();

@@ -1,5 +1,5 @@
-//! A long video is worked on in spans, by one worker, by several of a run, and by several of a plan, some of them killed:
-//! the same bytes each time. With `ORATOR_LONG=1` (`make prove`) it has 17 minutes and eight workers.
+//! A long video is processed in spans by one worker, by several of a run, and by several of a plan, some of them
+//! killed: the bytes are identical. With `ORATOR_LONG=1` (`make prove`) it has 17 minutes and eight workers.
 
 use crate::fixtures::clips;
 use crate::fixtures::faults::plan_workers::{WorkerClocks, epochs, written};
@@ -13,7 +13,7 @@ use std::path::PathBuf;
 use std::process::Child;
 use std::time::Duration;
 
-/// A project with one video of `n_repeats` times 10 s at 2 pictures a second: a clip over and over.
+/// A project with one video, a clip of 10 s repeated `n_repeats` times, processed at 2 fps.
 fn project(name: &str, n_repeats: usize) -> Option<Project> {
     let project = Project::with_clips(name, 1, 10.0);
     let file = project.dir().join("pipeline.toml");
@@ -34,7 +34,7 @@ fn spans(project: &Project) -> usize {
     Timeline::read(&timeline).unwrap().spans().len()
 }
 
-/// The worker that has a unit in hand.
+/// Index of a worker with a unit in progress.
 fn holder(project: &Project, workers: &[Child]) -> Option<usize> {
     let files: BTreeMap<String, PathBuf> = files_under(&project.work()).into_iter().collect();
     let open = files
@@ -50,26 +50,26 @@ fn holder(project: &Project, workers: &[Child]) -> Option<usize> {
 }
 
 #[test]
-fn a_long_video_is_shared_and_its_bytes_are_those_of_one_worker() {
+fn workers_share_a_long_video_and_give_the_bytes_of_one_worker() {
     let is_long = std::env::var_os("ORATOR_LONG").is_some();
     let (n_repeats, n_spans, n_workers) = if is_long { (102, 9, 8) } else { (19, 2, 2) };
-    let Some(alone) = project("alone", n_repeats) else { return };
-    assert_eq!(alone.run(&["--jobs", "1"]).code, 0);
-    assert_eq!(spans(&alone), n_spans);
-    let expected = written(&alone.work());
-    let compare = |made: BTreeMap<String, Vec<u8>>| {
-        assert_eq!(made.keys().collect::<Vec<_>>(), expected.keys().collect::<Vec<_>>());
+    let Some(single) = project("alone", n_repeats) else { return };
+    assert_eq!(single.run(&["--jobs", "1"]).code, 0);
+    assert_eq!(spans(&single), n_spans);
+    let expected = written(&single.work());
+    let compare = |output: BTreeMap<String, Vec<u8>>| {
+        assert_eq!(output.keys().collect::<Vec<_>>(), expected.keys().collect::<Vec<_>>());
         let differing: Vec<&String> =
-            made.iter().filter(|(name, of)| expected[*name] != **of).map(|(n, _)| n).collect();
+            output.iter().filter(|(name, of)| expected[*name] != **of).map(|(n, _)| n).collect();
         assert!(differing.is_empty(), "{differing:?}");
     };
     let Some(shared) = project("shared", n_repeats) else { return };
-    // Killed in the middle of a span, the run goes on after those that are done.
+    // A run killed within a span resumes after the completed spans.
     let mut killed = shared.start(&["run", "--jobs", "1"]);
     let done =
         |project: &Project| files_under(&project.work()).iter().any(|(name, _)| name.ends_with(".parts/0.record.json"));
     while !done(&shared) {
-        assert!(killed.try_wait().unwrap().is_none(), "it ended before it was killed");
+        assert!(killed.try_wait().unwrap().is_none(), "a process ended before it was killed");
         std::thread::sleep(Duration::from_millis(20));
     }
     killed.kill().unwrap();
@@ -81,8 +81,8 @@ fn a_long_video_is_shared_and_its_bytes_are_those_of_one_worker() {
     let plan = planned.answer(&["plan", "--no-timing", "--max-part", "2"]);
     let n_units = plan.json["units"].as_u64().unwrap();
     assert!(plan.code == 0 && (n_units == 4 || is_long), "{n_units}: {}", plan.errors);
-    // Their clocks are up to 15 minutes apart. Workers are killed with a unit in hand: one when spans are shared, the
-    // others when one of them is done.
+    // Clocks differ by up to 15 minutes. Workers are killed with a unit in progress: one when spans are shared, the
+    // others when a span is done.
     let (mut rng, mut clocks) = (ChaCha8Rng::seed_from_u64(5), WorkerClocks::new());
     let mut start = || clocks.start(&planned, &mut rng);
     let mut workers: Vec<Child> = (0..n_workers).map(|_| start()).collect();
@@ -94,7 +94,7 @@ fn a_long_video_is_shared_and_its_bytes_are_those_of_one_worker() {
         };
         let at = loop {
             let are_running = workers.iter_mut().all(|worker| worker.try_wait().unwrap().is_none());
-            assert!(are_running, "it ended before it was killed");
+            assert!(are_running, "a process ended before it was killed");
             if let Some(at) = Some(()).filter(|()| is_reached()).and_then(|()| holder(&planned, &workers)) {
                 break at;
             }
@@ -107,8 +107,8 @@ fn a_long_video_is_shared_and_its_bytes_are_those_of_one_worker() {
     for mut worker in workers {
         assert!(worker.wait().unwrap().success());
     }
-    let taken_over = epochs(&planned.work(), "claim").values().filter(|epoch| **epoch > 1).count();
-    assert!(taken_over > 0, "no killed worker had a unit");
+    let reclaimed = epochs(&planned.work(), "claim").values().filter(|epoch| **epoch > 1).count();
+    assert!(reclaimed > 0, "no killed worker had a unit");
     assert_eq!(epochs(&planned.work(), "end").len() as u64, n_units);
     let status = planned.answer(&["status", "--plan", "work/plan.json"]).json;
     assert!((status["ended_media_secs"].as_f64().unwrap() - status["media_secs"].as_f64().unwrap()).abs() < 1e-6);

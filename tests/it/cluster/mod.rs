@@ -1,8 +1,8 @@
 //! Several workers on one plan.
 
+mod blocked_paths;
+mod changed_videos;
 mod jobs;
 mod long_video;
-mod planted;
-mod sealed;
 mod timing;
 mod workers;

@@ -1,10 +1,10 @@
-//! `orator plan` prints what the work takes, near what a run takes.
+//! `orator plan` estimates the time of the work, close to the time of a run.
 
 use orator_test_support::project::Project;
 use serde_json::json;
 
 #[test]
-fn a_plan_predicts_what_a_run_takes() {
+fn a_plan_predicts_the_time_of_a_run() {
     let project = Project::with_clips("timed", 3, 5.0);
     let untimed = project.answer(&["plan", "--no-timing"]);
     assert_eq!((untimed.code, untimed.json.get("stages")), (0, None), "{}", untimed.errors);
@@ -16,14 +16,14 @@ fn a_plan_predicts_what_a_run_takes() {
     let wall = |n: &str| plan.json["wall_secs"][n].as_f64().unwrap();
     assert!(wall("3") < wall("1") && plan.json["peak_mib"].as_f64().unwrap() > 10.0, "{}", plan.json);
     assert!(!project.work().join("timing").exists());
-    // What is known is not timed again.
+    // Known times are not measured again.
     let file = project.work().join("stage_times.json");
     let known = std::fs::read(&file).unwrap();
     assert_eq!(project.answer(&["plan"]).code, 0);
     assert_eq!(std::fs::read(&file).unwrap(), known);
-    // Within half and twice: other tests may be at work beside this one.
+    // Within a factor of five: other tests may run at the same time.
     let run = project.answer(&["run"]);
     let planned: f64 = plan.json["stages"].as_object().unwrap().keys().map(|stage| secs(stage)).sum();
-    let took = run.json["work_secs"].as_f64().unwrap();
-    assert!(run.code == 0 && (0.2..5.0).contains(&(took / planned)), "{planned} s planned, {took} s");
+    let measured = run.json["work_secs"].as_f64().unwrap();
+    assert!(run.code == 0 && (0.2..5.0).contains(&(measured / planned)), "{planned} s planned, {measured} s");
 }

@@ -1,6 +1,5 @@
-//! Workers on one plan are killed, stand still and are started again: the datasets are those of one undisturbed run.
-//! `ORATOR_KILLS` says how often (`make prove`: 200, by eight workers). Their clocks are
-//! minutes apart and jump while they work.
+//! Workers on one plan are killed, stopped and restarted: the datasets are those of one undisturbed run. `ORATOR_KILLS`
+//! sets the number of kills (`make prove`: 200, with eight workers). The clocks of workers differ by minutes and jump.
 
 use crate::fixtures::faults::plan_workers::{WorkerClocks, epochs, worker, written};
 use orator_test_support::project::{Project, files_under};
@@ -14,13 +13,13 @@ fn signal(child: &Child, signal: Signal) {
     kill_process(Pid::from_child(child), signal).unwrap();
 }
 
-/// Processes that a process has started.
+/// Child processes of a process.
 fn children(of: u32) -> Vec<Pid> {
     let processes = std::fs::read_dir("/proc").unwrap().flatten();
     let numbers = processes.filter_map(|entry| entry.file_name().to_string_lossy().parse::<i32>().ok());
     let is_child = |process: &i32| {
         let stat = std::fs::read_to_string(format!("/proc/{process}/stat")).unwrap_or_default();
-        // Behind the name, which may hold anything: state, parent.
+        // After the name, which may contain any character: state, parent.
         let parent = stat.rsplit_once(')').and_then(|(_, rest)| rest.split_whitespace().nth(1)?.parse().ok());
         parent == Some(of)
     };
@@ -35,86 +34,86 @@ fn handles_term(process: Pid) -> bool {
 }
 
 #[test]
-fn killed_and_lost_workers_leave_the_bytes_of_one_run() {
+fn killed_and_stopped_workers_give_the_bytes_of_one_run() {
     let n_kills: usize = std::env::var("ORATOR_KILLS").ok().and_then(|n| n.parse().ok()).unwrap_or(4);
     let (n_clips, n_workers) = (6, if n_kills > 20 { 8 } else { 4 });
-    let calm = Project::with_clips("calm", n_clips, 4.6);
-    assert_eq!(calm.run(&[]).code, 0);
-    let expected = written(&calm.work());
+    let undisturbed = Project::with_clips("calm", n_clips, 4.6);
+    assert_eq!(undisturbed.run(&[]).code, 0);
+    let expected = written(&undisturbed.work());
     assert!(expected.keys().any(|name| name.ends_with(".tar")));
     let (mut rng, mut clocks) = (ChaCha8Rng::seed_from_u64(7), WorkerClocks::new());
-    let (mut n_killed, mut n_lost, mut n_taken_over, mut n_plans) = (0, 0, 0, 0);
-    while n_killed + n_lost < n_kills {
+    let (mut n_killed, mut n_stopped, mut n_reclaimed, mut n_plans) = (0, 0, 0, 0);
+    while n_killed + n_stopped < n_kills {
         n_plans += 1;
         let project = Project::with_clips("crowd", n_clips, 4.6);
         let plan = project.answer(&["plan", "--no-timing"]);
         assert_eq!((plan.code, &plan.json["units"]), (0, &serde_json::json!(n_clips)), "{}", plan.errors);
         let mut workers: Vec<Child> = (0..n_workers).map(|_| clocks.start(&project, &mut rng)).collect();
-        let mut still: Vec<Child> = Vec::new();
-        let begun = Instant::now();
+        let mut stopped: Vec<Child> = Vec::new();
+        let begin = Instant::now();
         while epochs(&project.work(), "end").len() < n_clips {
             assert!(
-                begun.elapsed() < Duration::from_secs(240),
+                begin.elapsed() < Duration::from_secs(240),
                 "{} of {n_clips}",
                 epochs(&project.work(), "end").len()
             );
             std::thread::sleep(Duration::from_millis(rng.random_range(50..400)));
             clocks.jump(&mut rng);
             let at = rng.random_range(0..workers.len());
-            if n_killed + n_lost < n_kills && workers[at].try_wait().unwrap().is_none() {
+            if n_killed + n_stopped < n_kills && workers[at].try_wait().unwrap().is_none() {
                 let next = clocks.start(&project, &mut rng);
                 let mut old = std::mem::replace(&mut workers[at], next);
-                // Its processes of units go with it.
+                // The unit processes of a killed worker end with it.
                 if rng.random_bool(0.7) {
                     old.kill().unwrap();
                     old.wait().unwrap();
                     n_killed += 1;
                 } else {
                     signal(&old, Signal::STOP);
-                    still.push(old);
-                    n_lost += 1;
+                    stopped.push(old);
+                    n_stopped += 1;
                 }
             }
         }
-        // Those that stood still come back late, find their units in the hands of others, and end well.
-        for mut late in still {
+        // Stopped workers continue late, find their units claimed by others, and exit successfully.
+        for mut late in stopped {
             signal(&late, Signal::CONT);
             assert!(late.wait().unwrap().success());
         }
         for mut worker in workers {
             assert!(worker.wait().unwrap().success());
         }
-        let made = project.run(&["--only", "dataset"]);
-        assert_eq!(made.code, 0, "{}", made.errors);
-        let (made, claims) = (written(&project.work()), epochs(&project.work(), "claim"));
-        assert_eq!(made.keys().collect::<Vec<_>>(), expected.keys().collect::<Vec<_>>());
+        let run = project.run(&["--only", "dataset"]);
+        assert_eq!(run.code, 0, "{}", run.errors);
+        let (output, claims) = (written(&project.work()), epochs(&project.work(), "claim"));
+        assert_eq!(output.keys().collect::<Vec<_>>(), expected.keys().collect::<Vec<_>>());
         let differing: Vec<&String> =
-            made.iter().filter(|(name, bytes)| expected[*name] != **bytes).map(|(name, _)| name).collect();
+            output.iter().filter(|(name, bytes)| expected[*name] != **bytes).map(|(name, _)| name).collect();
         assert!(differing.is_empty(), "{differing:?}");
-        n_taken_over += claims.values().map(|epoch| *epoch as usize - 1).sum::<usize>();
+        n_reclaimed += claims.values().map(|epoch| *epoch as usize - 1).sum::<usize>();
     }
-    assert!(n_taken_over <= n_killed + n_lost, "{n_taken_over} taken over of {n_killed} killed and {n_lost} lost");
+    assert!(n_reclaimed <= n_killed + n_stopped, "{n_reclaimed} reclaimed: {n_killed} killed, {n_stopped} stopped");
     eprintln!(
-        "{n_plans} plans of {n_clips} units, {n_workers} workers at a time, clocks {}: {n_killed} workers killed, {n_lost} lost \
-         and late, {n_taken_over} units taken over; the bytes are those of one run",
+        "{n_plans} plans of {n_clips} units, {n_workers} workers at a time, clocks {}: {n_killed} workers killed, \
+         {n_stopped} stopped, {n_reclaimed} units reclaimed; the bytes are those of one run",
         clocks.describe()
     );
 }
 
 #[test]
-fn a_bad_video_fails_alone_and_a_plan_is_kept() {
+fn an_invalid_video_fails_alone_and_changed_plans_are_rejected() {
     let project = Project::with_clips("cluster", 2, 4.6);
     std::fs::write(project.video("broken.mp4"), b"no video").unwrap();
     assert_eq!(project.answer(&["plan", "--no-timing"]).code, 0);
-    // An exclusive run is refused while workers have the folder.
+    // Two workers process a shard each.
     let first = project.answer(&["work", "--plan", "work/plan.json", "--shard", "0/2"]);
     let second = project.answer(&["work", "--plan", "work/plan.json", "--shard", "1/2"]);
     assert_eq!(first.json["done"].as_u64().unwrap() + second.json["done"].as_u64().unwrap(), 2, "{}", first.errors);
-    assert_eq!(first.code + second.code, 2, "one of them had the broken one");
+    assert_eq!(first.code + second.code, 2, "one of the shards has the invalid video");
     let status = project.answer(&["status", "--plan", "work/plan.json"]);
     assert_eq!((status.json["n_done"].as_u64(), status.json["n_failed"].as_u64()), (Some(2), Some(1)));
     assert_eq!(status.json["failures"].as_object().unwrap().len(), 1);
-    // Nothing is left to do; the failed one is taken again when that is asked for, but only with the content that was planned.
+    // No unit is left; `--retry` processes the failed one again, but only with the planned content.
     let again = project.answer(&["work", "--plan", "work/plan.json"]);
     assert_eq!((again.code, again.json["done"].as_u64()), (2, Some(0)));
     assert_eq!(again.json["failed_before"].as_array().unwrap().len(), 1);
@@ -136,14 +135,14 @@ fn a_bad_video_fails_alone_and_a_plan_is_kept() {
     let file = project.dir().join("pipeline.toml");
     let settings = std::fs::read_to_string(&file).unwrap();
     std::fs::write(&file, settings.replace("lambda_gan = 0.15", "lambda_gan = 0.2")).unwrap();
-    assert_eq!(project.answer(&["work", "--plan", "work/plan.json"]).code, 0, "a training's setting is not the plan's");
+    assert_eq!(project.answer(&["work", "--plan", "work/plan.json"]).code, 0, "training settings are not planned");
     std::fs::write(&file, settings.replace("[pose2d]", "[pose2d]\nperson_every = 7")).unwrap();
     let other = project.answer(&["work", "--plan", "work/plan.json"]);
     assert!(other.code == 1 && other.errors.contains("changed since the plan was written"), "{}", other.errors);
 }
 
 #[test]
-fn a_worker_that_is_asked_to_end_with_all_its_processes_finishes_its_unit() {
+fn a_terminated_worker_finishes_its_unit_before_it_exits() {
     let project = Project::with_clips("asked", 2, 4.6);
     assert_eq!(project.answer(&["plan", "--no-timing"]).code, 0);
     let worker = worker(&project);
@@ -157,10 +156,10 @@ fn a_worker_that_is_asked_to_end_with_all_its_processes_finishes_its_unit() {
         }
         std::thread::sleep(Duration::from_millis(20));
     };
-    // As a scheduler does: the worker and whatever it has started.
+    // As a scheduler does: a signal to the worker and to all its processes.
     signal(&worker, Signal::TERM);
     for child in started {
-        // One may have ended meanwhile.
+        // The process may have ended meanwhile.
         let _ = kill_process(child, Signal::TERM);
     }
     assert_eq!(worker.wait_with_output().unwrap().status.code(), Some(143));
@@ -169,7 +168,7 @@ fn a_worker_that_is_asked_to_end_with_all_its_processes_finishes_its_unit() {
 }
 
 #[test]
-fn eight_workers_at_once_do_every_unit_once() {
+fn eight_concurrent_workers_process_every_unit_once() {
     let n_clips = 8;
     let project = Project::with_clips("eight", n_clips, 4.6);
     assert_eq!(project.answer(&["plan", "--no-timing"]).code, 0);

@@ -1,4 +1,4 @@
-//! Published models of other formats to ONNX: each layer kind against plain arithmetic, real files, damaged files.
+//! Conversion of published models to ONNX: each layer kind against plain arithmetic, real files, damaged files.
 
 pub(crate) mod damaged;
 pub(crate) mod ncnn;

@@ -1,11 +1,11 @@
-//! ncnn: each kind of layer against plain arithmetic, and what is said of wrong files.
+//! ncnn: each kind of layer against plain arithmetic, and errors for invalid files.
 
 use crate::fixtures::source_models::ncnn_model::{LAYERS, small, with_layers};
 use crate::fixtures::source_models::picture::{Picture, align_corners, numbers};
 use crate::fixtures::source_models::run::assert_close;
 
 #[test]
-fn every_layer_computes_what_it_says() {
+fn layers_match_plain_arithmetic() {
     let image = Picture::new([6, 6, 2], |y, x, c| (y * 5 + x * 3 + c * 7) as f32 / 8.0 - 2.0);
     let Some(found) = small().run(&image.channels_first()) else { return };
     let (weight, bias) = (numbers(72, 1), numbers(4, 2));
@@ -31,8 +31,8 @@ fn every_layer_computes_what_it_says() {
 }
 
 #[test]
-fn what_is_wrong_is_named() {
-    let said = |from: &str, to: &str| with_layers(&LAYERS.replace(from, to)).error();
+fn errors_name_the_cause() {
+    let error_of = |from: &str, to: &str| with_layers(&LAYERS.replace(from, to)).error();
     for (from, to, expected) in [
         ("7767517", "7767516", "expected 7767517"),
         ("17 21", "18 21", "17 layers"),
@@ -48,8 +48,8 @@ fn what_is_wrong_is_named() {
         ("0=4 1=1", "0=4 1=x", "line 7"),
         ("0=4 1=1", "0=4 8=1 1=1", "parameter 8"),
     ] {
-        let said = said(from, to);
-        assert!(said.contains(expected), "{said}");
+        let error = error_of(from, to);
+        assert!(error.contains(expected), "{error}");
     }
     let mut model = small();
     model.files[1].push(0);

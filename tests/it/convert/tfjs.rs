@@ -1,10 +1,10 @@
-//! TensorFlow.js: every kind of node that is known, and what follows the networks of MoveNet and NanoDet.
+//! TensorFlow.js: every supported kind of node, and the post-processing of MoveNet and NanoDet.
 
 use crate::fixtures::source_models::picture::{Picture, half_pixel, numbers, sigmoid};
 use crate::fixtures::source_models::run::assert_close;
 use crate::fixtures::source_models::tfjs_models::{BINS, CELLS, SCALE, SIDE, movenet, movenet_with, nanodet};
 
-/// A weight of the shape rows, columns, inputs, outputs.
+/// Accessor to a weight of the shape [rows, columns, inputs, outputs].
 fn weight(shape: [usize; 4], seed: usize) -> impl Fn(usize, usize, usize, usize) -> f32 {
     let values = numbers(shape.iter().product(), seed);
     move |row, column, input, output| values[((row * shape[1] + column) * shape[2] + input) * shape[3] + output]
@@ -16,14 +16,14 @@ fn depthwise(seed: usize) -> impl Fn(usize, usize, usize, usize) -> f32 {
 }
 
 #[test]
-fn a_movenet_gives_heat_maps_lowered_far_from_the_person_in_the_middle() {
+fn movenet_heat_maps_are_weighted_by_distance_to_the_person() {
     let image = Picture::new([SIDE, SIDE, 3], |y, x, c| (y * 9 + x * 5 + c * 11) as f32);
     let Some(found) = movenet().run(&image.data) else { return };
-    let moved = image.padded([2, 2, 0, 0], 0.0);
+    let shifted = image.padded([2, 2, 0, 0], 0.0);
     let (mean, factor, offset) = SCALE;
-    let scaled = Picture::new([SIDE, SIDE, 3], |y, x, c| (moved.at(y, x, c) - mean[c]) * factor[c] - offset);
+    let scaled = Picture::new([SIDE, SIDE, 3], |y, x, c| (shifted.at(y, x, c) - mean[c]) * factor[c] - offset);
     let bias = numbers(4, 2);
-    // SAME: 8 and 4 cells in steps of 2 take zeros below and at the right.
+    // SAME: 8 and 4 cells with stride 2 are padded with zeros below and at the right.
     let conv = scaled.padded([0, 0, 1, 1], 0.0).convolved([3, 2, 4], weight([3, 3, 3, 4], 1), |c| bias[c]);
     let conv = conv.map(|number| number.clamp(0.0, 6.0));
     let deep = conv.padded([1; 4], 0.0).convolved([3, 1, 4], depthwise(3), |c| bias[c]).map(|number| number.max(0.0));
@@ -38,18 +38,18 @@ fn a_movenet_gives_heat_maps_lowered_far_from_the_person_in_the_middle() {
     let cell = |k: &usize| (sigmoid(centre.data[*k]) * cell_weights[*k] * 1e6) as i64;
     let best = (0..CELLS * CELLS).max_by_key(cell).unwrap();
     let (row, column) = (best / CELLS, best % CELLS);
-    let lowered = Picture::new([CELLS, CELLS, 17], |y, x, c| {
+    let weighted = Picture::new([CELLS, CELLS, 17], |y, x, c| {
         let down = y as f32 - (row as f32 + regression.at(row, column, 2 * c));
         let along = x as f32 - (column as f32 + regression.at(row, column, 2 * c + 1));
         let quarters = (down * down + along * along) * (4.0 / CELLS as f32).powi(2);
         sigmoid(heat.at(y, x, c)) / (1.0 + quarters * quarters)
     });
-    assert!(deep.data.iter().any(|number| *number > 0.0) && lowered.data.iter().any(|number| *number > 0.05));
-    assert_close(&found[0], &[1, 17, CELLS as i64, CELLS as i64], &lowered.channels_first());
+    assert!(deep.data.iter().any(|number| *number > 0.0) && weighted.data.iter().any(|number| *number > 0.05));
+    assert_close(&found[0], &[1, 17, CELLS as i64, CELLS as i64], &weighted.channels_first());
 }
 
 #[test]
-fn a_nanodet_gives_boxes_of_people() {
+fn nanodet_gives_boxes_of_persons() {
     let image = Picture::new([32, 32, 3], |y, x, c| ((y * 9 + x * 5 + c * 11) % 64) as f32 / 64.0 - 0.5);
     let Some(found) = nanodet().run(&image.channels_first()) else { return };
     let bias = numbers(4, 2);
@@ -69,7 +69,7 @@ fn a_nanodet_gives_boxes_of_people() {
                 bias[c]
             });
         for (y, x) in (0..head.height).flat_map(|y| (0..head.width).map(move |x| (y, x))) {
-            // Two bins, 0 and one stride: the mean is the second one's probability.
+            // Two bins, 0 and one stride: the mean is the stride times the probability of the second.
             let side = |side: usize| {
                 let bin = |bin: usize| head.at(y, x, 80 + side * BINS + bin);
                 sigmoid(bin(1) - bin(0)) * stride
@@ -85,10 +85,10 @@ fn a_nanodet_gives_boxes_of_people() {
 }
 
 #[test]
-fn what_is_wrong_is_named() {
+fn errors_name_the_cause() {
     let unknown = movenet_with("Swish").error();
     assert!(unknown.contains("kpt_heatmap_0/conv2d_5/BiasAdd\" (Swish)"), "{unknown}");
-    let said = |from: &str, to: &str| {
+    let error_of = |from: &str, to: &str| {
         let mut model = nanodet();
         let text = String::from_utf8(model.files[0].clone()).unwrap();
         assert!(text.contains(from), "{from}");
@@ -104,8 +104,8 @@ fn what_is_wrong_is_named() {
         ("\"size\":\"32\"", "\"size\":\"-1\"", "invalid size -1"),
         ("VkFMSUQ=", "U0FN", "\"SAM\""),
     ] {
-        let said = said(from, to);
-        assert!(said.contains(expected), "{expected}: {said}");
+        let error = error_of(from, to);
+        assert!(error.contains(expected), "{expected}: {error}");
     }
     let mut model = nanodet();
     model.files.reverse();

@@ -1,15 +1,15 @@
-//! TFLite: each operator against plain arithmetic, and what is said of wrong files.
+//! TFLite: each operator against plain arithmetic, and errors for invalid files.
 
 use crate::fixtures::source_models::picture::{Picture, half_pixel, numbers, sigmoid};
 use crate::fixtures::source_models::run::assert_close;
 use crate::fixtures::source_models::tflite_model::{ending_with, small};
 
 #[test]
-fn every_operator_computes_what_it_says() {
+fn operators_match_plain_arithmetic() {
     let image = Picture::new([4, 4, 2], |y, x, c| (y * 5 + x * 3 + c * 7) as f32 / 8.0 - 1.0);
     let Some(found) = small().run(&image.data) else { return };
     let (weight, bias) = (numbers(54, 1), numbers(3, 2));
-    // SAME over 6 x 5 in steps of 2: a row below, a column on either side.
+    // SAME over 6 x 5 with stride 2: a row below, a column on each side.
     let padded = image.padded([1, 0, 1, 1], 0.0).padded([0, 1, 1, 1], 0.0);
     let at =
         |row: usize, column: usize, input: usize, output: usize| weight[((output * 3 + row) * 3 + column) * 2 + input];
@@ -35,7 +35,7 @@ fn every_operator_computes_what_it_says() {
 }
 
 #[test]
-fn what_is_wrong_is_named() {
+fn errors_name_the_cause() {
     let unknown = ending_with(99).error();
     assert!(unknown.contains("operator 14 (builtin operator 99)"), "{unknown}");
     let mut model = small();

@@ -1,4 +1,4 @@
-//! The dataset's folder: round trip, the same bytes twice, damage is an error, and what others read in it.
+//! The dataset folder: round trip, deterministic bytes, errors for damage, and a reader in Python.
 
 use crate::fixtures::samples::random_sample;
 use crate::fixtures::write_dataset::write_dataset;
@@ -13,7 +13,7 @@ use std::process::Command;
 
 const FPS: FrameRate = FrameRate::new(15, 1);
 
-fn three() -> Vec<(Split, Sample)> {
+fn three_samples() -> Vec<(Split, Sample)> {
     vec![
         (Split::Train, random_sample("talk-0a1b2c3d-000000", 70, 1)),
         (Split::Train, random_sample("talk-0a1b2c3d-000102", 64, 2)),
@@ -27,9 +27,9 @@ fn same_motion(a: &Motion, b: &Motion) -> bool {
 }
 
 #[test]
-fn what_is_written_comes_back() {
+fn a_written_dataset_is_read_back() {
     let dir = tempfile::tempdir().unwrap();
-    let written = three();
+    let written = three_samples();
     write_dataset(dir.path(), "host", FPS, &written).unwrap();
     let dataset = Dataset::open(dir.path()).unwrap();
     assert_eq!((dataset.info().speaker.as_str(), dataset.info().splits["train"].frames), ("host", 134));
@@ -54,7 +54,7 @@ fn folder_bytes(dir: &Path) -> Vec<(String, Vec<u8>)> {
 }
 
 #[test]
-fn shards_are_plain_ustar_of_bounded_size_and_the_same_twice() {
+fn shards_are_ustar_files_of_bounded_size_and_deterministic() {
     use orator_dataset::write::tar::ShardWriter;
     let (one, two) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
     let samples: Vec<_> = (0..5).map(|n| random_sample(&format!("talk-0a1b2c3d-{n:06}"), 64, n)).collect();
@@ -87,10 +87,10 @@ fn damage_is_an_error_and_never_a_panic() {
     let samples = [(Split::Train, random_sample("talk-0a1b2c3d-000000", 6, 1))];
     write_dataset(dir.path(), "host", FPS, &samples).unwrap();
     let shard = dir.path().join("train-talk-0a1b2c3d-0000.tar");
-    let whole = std::fs::read(&shard).unwrap();
+    let original = std::fs::read(&shard).unwrap();
     let mut rng = ChaCha8Rng::seed_from_u64(7);
     for _ in 0..300 {
-        let mut bytes = whole.clone();
+        let mut bytes = original.clone();
         let at = rng.random_range(0..bytes.len());
         bytes[at] ^= 1 << rng.random_range(0..8);
         std::fs::write(&shard, &bytes).unwrap();
@@ -98,14 +98,14 @@ fn damage_is_an_error_and_never_a_panic() {
         let sample = &dataset.samples(Split::Train)[0];
         assert!(dataset.read(sample).is_err() || at >= (sample.offset + sample.size) as usize);
     }
-    for length in [0, 511, 512, whole.len() / 2, whole.len() - 1] {
-        std::fs::write(&shard, &whole[..length]).unwrap();
+    for length in [0, 511, 512, original.len() / 2, original.len() - 1] {
+        std::fs::write(&shard, &original[..length]).unwrap();
         let message = Dataset::open(dir.path()).err().unwrap().to_string();
         assert!(message.contains("train-talk-0a1b2c3d-0000.tar"), "{message}");
     }
     std::fs::remove_file(&shard).unwrap();
     assert!(Dataset::open(dir.path()).is_err());
-    std::fs::write(&shard, &whole).unwrap();
+    std::fs::write(&shard, &original).unwrap();
     for name in ["info.json", "stats.json", "index.jsonl"] {
         let path = dir.path().join(name);
         let text = std::fs::read(&path).unwrap();
@@ -129,7 +129,7 @@ fn damage_is_an_error_and_never_a_panic() {
     Dataset::open(dir.path()).unwrap();
 }
 
-/// Reads the shards as a stranger would and prints sums; needs NumPy only.
+/// Reads a shard with NumPy only and prints sums.
 const PYTHON: &str = r"
 import io, json, sys, tarfile, wave
 import numpy as np
@@ -149,7 +149,7 @@ for key, members in samples.items():
 #[test]
 fn python_reads_the_same_numbers() {
     let dir = tempfile::tempdir().unwrap();
-    let written = three();
+    let written = three_samples();
     write_dataset(dir.path(), "host", FPS, &written).unwrap();
     let Some(python) = python("numpy") else { return };
     let output = Command::new(python)
@@ -164,9 +164,9 @@ fn python_reads_the_same_numbers() {
     for (line, (_, sample)) in lines.iter().zip(&written) {
         let n = sample.n_frames().to_string();
         let pcm: i64 = sample.sound.samples.iter().map(|s| (s * 32_768.0) as i64).sum();
-        let seen = sample.motion.mask.iter().filter(|&&m| m).count();
+        let n_visible = sample.motion.mask.iter().filter(|&&m| m).count();
         let expected =
-            format!("{} {n} 49 3 {n} 59 3 {n} 49 16000 {} {pcm} {seen}", sample.key, sample.sound.samples.len());
+            format!("{} {n} 49 3 {n} 59 3 {n} 49 16000 {} {pcm} {n_visible}", sample.key, sample.sound.samples.len());
         assert_eq!(line[..13].join(" "), expected);
         let sum: f64 = sample.motion.joints.iter().filter(|v| !v.is_nan()).map(|&v| f64::from(v)).sum();
         assert!((line[13].parse::<f64>().unwrap() - sum).abs() < 1e-6);

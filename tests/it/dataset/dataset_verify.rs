@@ -1,5 +1,4 @@
-//! `dataset verify`: whatever single bit flips, whatever file is cut short, missing or strange, is found, and no damage
-//! makes it panic.
+//! `dataset verify` detects every flipped bit and every truncated, missing or unknown file, and never panics.
 
 use crate::fixtures::samples::constant_sample;
 use crate::fixtures::write_dataset::write_dataset;
@@ -22,12 +21,12 @@ fn write(dir: &Path) {
     write_dataset(dir, "host", FrameRate::new(15, 1), &samples).unwrap();
 }
 
-fn n_wrong(dir: &Path, deep: bool) -> usize {
+fn n_problems(dir: &Path, deep: bool) -> usize {
     verify(dir, deep, &Silent).map_or(1, |found| found.problems.len())
 }
 
 #[test]
-fn a_thousand_flipped_bits_and_cuts_are_all_found() {
+fn flipped_bits_and_truncated_files_are_all_detected() {
     let dir = tempfile::tempdir().unwrap();
     write(dir.path());
     assert_eq!(verify(dir.path(), true, &Silent).unwrap().problems, []);
@@ -36,25 +35,25 @@ fn a_thousand_flipped_bits_and_cuts_are_all_found() {
     let mut rng = ChaCha8Rng::seed_from_u64(4);
     for round in 0..1_000 {
         let (name, path) = &files[rng.random_range(0..files.len())];
-        let whole = fs::read(path).unwrap();
-        let at = rng.random_range(0..whole.len());
-        let mut damaged = whole.clone();
+        let original = fs::read(path).unwrap();
+        let at = rng.random_range(0..original.len());
+        let mut damaged = original.clone();
         if round % 2 == 0 {
             damaged[at] ^= 1 << rng.random_range(0..8);
         } else {
             damaged.truncate(at);
         }
         fs::write(path, damaged).unwrap();
-        assert!(n_wrong(dir.path(), true) > 0, "round {round}: {name} at {at}");
+        assert!(n_problems(dir.path(), true) > 0, "round {round}: {name} at {at}");
         let small = !name.ends_with(".tar");
-        assert!(!small || n_wrong(dir.path(), false) > 0, "round {round}, fast: {name} at {at}");
-        fs::write(path, whole).unwrap();
+        assert!(!small || n_problems(dir.path(), false) > 0, "round {round}, fast: {name} at {at}");
+        fs::write(path, original).unwrap();
     }
-    assert_eq!(n_wrong(dir.path(), true), 0);
+    assert_eq!(n_problems(dir.path(), true), 0);
 }
 
 #[test]
-fn missing_and_strange_files_are_named() {
+fn missing_and_unknown_files_are_named() {
     let dir = tempfile::tempdir().unwrap();
     write(dir.path());
     for (name, path) in files_under(dir.path()) {
@@ -70,13 +69,13 @@ fn missing_and_strange_files_are_named() {
     assert!(verify(&dir.path().join("nothing"), false, &Silent).unwrap_err().to_string().contains("is not a dataset"));
 }
 
-/// What it says, and how to bring it about.
-type Spoilt = (&'static str, fn(&mut Sample));
+/// Expected message, and the change that causes it.
+type InvalidCase = (&'static str, fn(&mut Sample));
 
-/// Numbers that cannot be, in files whose hashes are right.
+/// Impossible values, in files with valid hashes.
 #[test]
-fn numbers_that_cannot_be_are_found() {
-    let spoilt: [Spoilt; 4] = [
+fn impossible_values_are_detected() {
+    let cases: [InvalidCase; 4] = [
         ("the bone to joint 5", |sample| sample.motion.joints[[2, 5, 1]] += 0.01),
         ("but visible in the mask", |sample| {
             sample.motion.joints.slice_mut(ndarray::s![1, 20, ..]).fill(f32::NAN);
@@ -85,12 +84,12 @@ fn numbers_that_cannot_be_are_found() {
         ("a keypoint is not finite", |sample| sample.pose2d[[0, 3, 0]] = f32::INFINITY),
         ("a keypoint's score", |sample| sample.pose2d[[0, 3, 2]] = 2.0),
     ];
-    for (expected, spoil) in spoilt {
+    for (expected, change) in cases {
         let dir = tempfile::tempdir().unwrap();
-        // a long good sample keeps the video's median lengths
-        let mut bad = constant_sample("talk-0a1b2c3d-000102", 4, 2);
-        spoil(&mut bad);
-        let samples = [(Split::Train, constant_sample("talk-0a1b2c3d-000000", 40, 1)), (Split::Train, bad)];
+        // A long valid sample determines the video's median bone lengths.
+        let mut invalid = constant_sample("talk-0a1b2c3d-000102", 4, 2);
+        change(&mut invalid);
+        let samples = [(Split::Train, constant_sample("talk-0a1b2c3d-000000", 40, 1)), (Split::Train, invalid)];
         write_dataset(dir.path(), "host", FrameRate::new(15, 1), &samples).unwrap();
         assert_eq!(verify(dir.path(), false, &Silent).unwrap().problems, []);
         let found = verify(dir.path(), true, &Silent).unwrap();

@@ -1,5 +1,5 @@
-//! `orator forget`: what was derived from a video is gone, the others' stays byte for byte, and a kill is finished by the
-//! next forget.
+//! `orator forget` removes all data derived from a video, leaves other data unchanged byte for byte, and completes an
+//! interrupted removal.
 
 use orator_base::stage::progress::Silent;
 use orator_dataset::forget::removal::PENDING;
@@ -19,13 +19,13 @@ fn problems(project: &Project) -> usize {
 }
 
 #[test]
-fn a_forgotten_video_leaves_nothing_and_the_others_are_untouched() {
+fn forgetting_removes_all_data_of_a_video_and_no_other_data() {
     let project = Project::with_clips("forget", 2, 6.0);
     assert_eq!(project.run(&[]).code, 0);
     let clips = project.clips();
-    let (gone, stays) = (&clips[0], &clips[1]);
-    let name = gone.file_name().unwrap().to_str().unwrap();
-    let stem = stays.file_stem().unwrap().to_str().unwrap().replace('_', "-");
+    let (forgotten, other) = (&clips[0], &clips[1]);
+    let name = forgotten.file_name().unwrap().to_str().unwrap();
+    let stem = other.file_stem().unwrap().to_str().unwrap().replace('_', "-");
     let before = bytes_under(&project.work());
     for kind in ["gan/host", "seq2seq/host", "seq2seq/other"] {
         fs::create_dir_all(project.work().join(kind)).unwrap();
@@ -38,9 +38,13 @@ fn a_forgotten_video_leaves_nothing_and_the_others_are_untouched() {
     assert_eq!(plan.code, 0, "{}", plan.errors);
     assert!(plan.json["would_remove"].as_array().unwrap().len() > 8, "{}", plan.json);
     assert!(before.iter().all(|(name, bytes)| fs::read(project.work().join(name)).unwrap() == *bytes));
-    for (wanted, says) in [("gone.mp4", "expected one of"), ("", "expected one of")] {
-        let answer = project.answer(&["forget", "--video", wanted]);
-        assert!(answer.code == 1 && answer.errors.contains(says) && answer.errors.contains(name), "{}", answer.errors);
+    for (video, expected) in [("gone.mp4", "expected one of"), ("", "expected one of")] {
+        let answer = project.answer(&["forget", "--video", video]);
+        assert!(
+            answer.code == 1 && answer.errors.contains(expected) && answer.errors.contains(name),
+            "{}",
+            answer.errors
+        );
     }
 
     let answer = project.answer(&["forget", "--video", name]);
@@ -50,31 +54,31 @@ fn a_forgotten_video_leaves_nothing_and_the_others_are_untouched() {
     let advice = answer.json["advice"].to_string();
     assert!(advice.contains("exclude = ["), "{advice}");
     for kind in ["gan/host", "seq2seq/host"] {
-        assert!(!project.work().join(kind).exists(), "a model cannot unlearn");
+        assert!(!project.work().join(kind).exists(), "models trained on it are removed");
     }
     fs::remove_dir_all(project.work().join("seq2seq/other")).unwrap();
-    assert!(!report.exists(), "a report that shows it");
+    assert!(!report.exists(), "a report that shows it is removed");
     assert_eq!(problems(&project), 0);
-    // no name of it is left, and what was made of the other is what it was
+    // No file names the video, and the files of the other video are unchanged.
     let after = bytes_under(&project.work());
     let own = |(file, _): &(&String, &Vec<u8>)| file.contains(&stem) && !file.contains("dataset/host/videos");
-    let kept: Vec<_> = before.iter().filter(own).collect();
-    assert!(kept.len() > 10, "{kept:?}");
-    for (file, bytes) in kept {
+    let unchanged: Vec<_> = before.iter().filter(own).collect();
+    assert!(unchanged.len() > 10, "{unchanged:?}");
+    for (file, bytes) in unchanged {
         assert!(after.get(file) == Some(bytes), "{file}");
     }
-    let told = |bytes: &[u8]| bytes.windows(name.len()).any(|window| window == name.as_bytes());
-    assert!(!after.iter().any(|(file, bytes)| file.contains(name) || told(bytes)));
+    let names_it = |bytes: &[u8]| bytes.windows(name.len()).any(|window| window == name.as_bytes());
+    assert!(!after.iter().any(|(file, bytes)| file.contains(name) || names_it(bytes)));
 
     let again = project.answer(&["forget", "--video", name]);
     assert_eq!((again.code, again.json["removed"].as_array().unwrap().len()), (0, 0), "{}", again.json);
     assert!(
         again.json["searched"]["marks"].as_u64().unwrap() >= 6,
-        "the proof knows its content still: {}",
+        "the search still knows its content: {}",
         again.json
     );
 
-    // the line it printed keeps the video away
+    // The printed line excludes the video from the next run.
     let config = project.dir().join("pipeline.toml");
     let line = advice.split("exclude = ").nth(1).unwrap().split(']').next().unwrap().replace("\\\"", "\"");
     let text = fs::read_to_string(&config).unwrap();
@@ -92,28 +96,28 @@ fn a_forgotten_video_leaves_nothing_and_the_others_are_untouched() {
 
     let all = project.answer(&["forget", "--speaker", "host"]);
     assert_eq!(all.code, 0, "{} {}", all.json, all.errors);
-    let left: Vec<String> = files_under(&project.work()).into_iter().map(|(file, _)| file).collect();
-    assert_eq!(left, [".lock", "hashes.json"]);
+    let remaining: Vec<String> = files_under(&project.work()).into_iter().map(|(file, _)| file).collect();
+    assert_eq!(remaining, [".lock", "hashes.json"]);
 }
 
 #[test]
-fn a_kill_in_the_middle_is_seen_and_finished() {
+fn an_interrupted_removal_is_detected_and_completed() {
     let project = Project::with_clips("forget-kill", 2, 6.0);
     assert_eq!(project.run(&[]).code, 0);
     let dataset = project.work().join("dataset/host");
     let clip = project.clips()[1].clone();
     let stem = clip.file_stem().unwrap().to_str().unwrap().to_owned();
-    // the stages' files of one video went, the dataset still has it
+    // The stage files of one video are removed, the dataset still contains it.
     fs::write(dataset.join(PENDING), "half").unwrap();
     fs::remove_dir_all(project.work().join("extract/host")).unwrap();
     fs::remove_file(project.work().join("dataset/host.record.json")).unwrap();
-    assert!(problems(&project) > 0, "half forgotten is not sound");
+    assert!(problems(&project) > 0, "an unfinished removal is a problem");
     let answer = project.answer(&["forget", "--video", &stem]);
     assert_eq!(answer.code, 0, "{} {}", answer.json, answer.errors);
     assert!(!dataset.join(PENDING).exists() && problems(&project) == 0);
     assert!(files_under(&project.work()).iter().all(|(file, _)| !file.contains(&stem.replace('_', "-"))));
 
-    // between the two renames of the new dataset: the old one is put back and is whole
+    // Interrupted between the two renames of the new dataset: the old dataset is restored.
     let stem = project.clips()[0].file_stem().unwrap().to_str().unwrap().to_owned();
     fs::rename(&dataset, project.work().join("dataset/.host.old")).unwrap();
     let answer = project.answer(&["forget", "--video", &stem, "--keep-models"]);
@@ -122,11 +126,11 @@ fn a_kill_in_the_middle_is_seen_and_finished() {
 }
 
 #[test]
-fn a_dataset_alone_forgets_too_and_a_hidden_copy_is_found() {
+fn a_dataset_alone_forgets_videos_and_copies_are_reported() {
     let project = Project::with_clips("forget-dataset", 2, 6.0);
     assert_eq!(project.run(&[]).code, 0);
     let name = project.clips()[0].file_name().unwrap().to_str().unwrap().to_owned();
-    // someone put a copy of the truth where nobody expects it
+    // A file of the user names the video.
     fs::write(project.work().join("notes.txt"), format!("see {name}")).unwrap();
     let answer = project.answer(&["forget", "--video", &name, "--keep-models"]);
     assert_eq!(answer.code, 1, "{} {}", answer.json, answer.errors);
@@ -134,14 +138,14 @@ fn a_dataset_alone_forgets_too_and_a_hidden_copy_is_found() {
     assert!(found.len() == 1 && found[0]["file"].as_str().unwrap().ends_with("notes.txt"), "{found:?}");
 
     let other = project.clips()[1].file_name().unwrap().to_str().unwrap().to_owned();
-    assert_eq!(project.run(&[]).code, 0, "the forgotten one comes back");
+    assert_eq!(project.run(&[]).code, 0, "a run adds the forgotten video again");
     let parts = files_under(&project.work().join("dataset/host/videos"));
     let (_, part) = parts.iter().find(|(_, path)| fs::read_to_string(path).is_ok_and(|t| t.contains(&other))).unwrap();
-    let sound = fs::read_to_string(part).unwrap();
-    fs::write(part, sound.replacen("0.", "1.", 1)).unwrap();
+    let original = fs::read_to_string(part).unwrap();
+    fs::write(part, original.replacen("0.", "1.", 1)).unwrap();
     let answer = project.answer(&["forget", "--video", &name, "--keep-models"]);
     assert!(answer.code == 1 && answer.errors.contains("nothing was removed"), "{}", answer.errors);
-    fs::write(part, sound).unwrap();
+    fs::write(part, original).unwrap();
     fs::write(project.work().join("notes.txt"), "").unwrap();
     assert_eq!(project.answer(&["forget", "--video", &name, "--keep-models"]).code, 0);
     fs::write(project.dir().join("pipeline.toml"), "").unwrap();
@@ -155,12 +159,12 @@ fn a_dataset_alone_forgets_too_and_a_hidden_copy_is_found() {
 }
 
 #[test]
-fn a_page_that_shows_a_name_with_quotes_and_a_line_break_goes_too() {
+fn a_page_with_an_escaped_video_name_is_removed() {
     let project = Project::with_clips("forget-quote", 0, 1.0);
     let name = "a \"talk\" & <more>\nof it.mp4";
     fs::write(project.video(name), "no video").unwrap();
     project.name_videos(&["videos/host"]);
-    assert_eq!(project.run(&["--to", "extract"]).code, 2, "it is no video");
+    assert_eq!(project.run(&["--to", "extract"]).code, 2, "it is not a video");
     assert_eq!(project.answer(&["report"]).code, 0);
     let page = project.work().join("report.html");
     assert!(fs::read_to_string(&page).unwrap().contains("&quot;talk&quot;"), "the page shows it");

@@ -1,4 +1,4 @@
-//! `orator import`: datasets from captured motion and from other datasets, and what becomes of what cannot come in.
+//! `orator import`: datasets from captured motion and from other datasets, and takes that cannot be imported.
 
 use orator_base::motion::bones;
 use orator_base::motion::resample;
@@ -25,7 +25,7 @@ use std::path::{Path, PathBuf};
 
 const FPS: FrameRate = FrameRate::new(15, 1);
 
-/// A BVH take of `n_frames` at 30 fps: the reference's nine frames to and fro.
+/// A BVH take of `n_frames` at 30 fps: the reference's nine frames back and forth.
 fn bvh(n_frames: usize) -> String {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/reference/bvh_take.bvh");
     let text = fs::read_to_string(path).unwrap();
@@ -36,7 +36,7 @@ fn bvh(n_frames: usize) -> String {
     format!("{head}Frames: {n_frames}\nFrame Time: 0.0333333\n{frames}")
 }
 
-/// Noise of a seed.
+/// Writes seeded noise.
 fn wav(path: &Path, secs: f64, seed: u64) {
     let mut noise = rand_chacha::ChaCha8Rng::seed_from_u64(seed);
     let samples = (0..(secs * 22_050.0) as usize).map(|_| noise.random_range(-0.5f32..0.5)).collect();
@@ -59,7 +59,7 @@ fn plan(sources: &[&Path]) -> ImportPlan {
     }
 }
 
-/// Imports into the new folder `out`, which must then be a sound dataset.
+/// Imports into the new folder `out`, which must then be a valid dataset.
 fn imported(sources: &[&Path], out: &Path) -> Imported {
     fs::create_dir_all(out).unwrap();
     let imported = import(&plan(sources), out, &Silent).unwrap();
@@ -67,19 +67,19 @@ fn imported(sources: &[&Path], out: &Path) -> Imported {
     imported
 }
 
-/// The samples as they lie in a dataset's shards, and their JSON.
+/// Samples in the shards of a dataset by key, with their JSON.
 fn samples(dir: &Path) -> BTreeMap<String, (Sample, Vec<u8>)> {
     let tars: Vec<PathBuf> = files_under(dir).into_iter().map(|(_, path)| path).filter(|path| is_tar(path)).collect();
     let loose = shards::open(&tars);
-    let waiting = loose.videos.into_iter().flat_map(|video| video.samples);
-    waiting.map(|waiting| (waiting.key.clone(), waiting.read().unwrap())).collect()
+    let all = loose.videos.into_iter().flat_map(|video| video.samples);
+    all.map(|sample| (sample.key.clone(), sample.read().unwrap())).collect()
 }
 
 fn is_tar(path: &Path) -> bool {
     path.extension().is_some_and(|ending| ending == "tar")
 }
 
-/// What the dataset must hold of a take: the source's joints at 15 fps, its own bones on every frame.
+/// Expected motion of a take: the joints of the source at 15 fps, with its bone lengths in every frame.
 fn expected(captured: &CapturedMotion, n_frames: usize) -> Motion {
     let lengths = bones::measure(&captured.motion);
     let mut motion = resample::at_rate(&captured.motion, FPS);
@@ -89,14 +89,15 @@ fn expected(captured: &CapturedMotion, n_frames: usize) -> Motion {
     motion
 }
 
-fn furthest(a: &Motion, b: &Motion) -> f32 {
+fn max_difference(a: &Motion, b: &Motion) -> f32 {
     assert_eq!((a.joints.shape(), &a.mask), (b.joints.shape(), &b.mask));
-    let off = a.joints.iter().zip(&b.joints).map(|(a, b)| if a.is_nan() && b.is_nan() { 0.0 } else { (a - b).abs() });
-    off.fold(0.0, f32::max)
+    let differences =
+        a.joints.iter().zip(&b.joints).map(|(a, b)| if a.is_nan() && b.is_nan() { 0.0 } else { (a - b).abs() });
+    differences.fold(0.0, f32::max)
 }
 
 #[test]
-fn a_folder_of_bvh_and_sound_becomes_a_dataset() {
+fn bvh_files_with_audio_become_a_dataset() {
     let dir = tempfile::tempdir().unwrap();
     let source = dir.path().join("trn");
     let file = |name: &str| source.join(name);
@@ -111,7 +112,7 @@ fn a_folder_of_bvh_and_sound_becomes_a_dataset() {
     write(file("bvh/broken.bvh"), &bvh(200)[..9000]);
     let out = dir.path().join("out");
     let answer = imported(&[&source], &out);
-    let ended: BTreeMap<&str, (&str, &str)> = answer
+    let outcomes: BTreeMap<&str, (&str, &str)> = answer
         .lines
         .iter()
         .map(|line| {
@@ -125,29 +126,29 @@ fn a_folder_of_bvh_and_sound_becomes_a_dataset() {
         ("silent", ("refused", "no sound")),
         ("talk", ("kept", "")),
     ];
-    assert_eq!(ended, all.into());
-    let says = |stem: &str| answer.lines.iter().find(|line| line.file.contains(stem)).unwrap().message.clone();
-    assert!(says("broken").contains("broken.bvh"), "{}", says("broken"));
-    assert!(says("apart").contains("1.333 s apart"), "{}", says("apart"));
-    for account in read_ledgers(&out).unwrap().iter().filter(|account| account.failure.is_none()) {
-        assert!(account.ledger.is_whole(), "{account:?}");
+    assert_eq!(outcomes, all.into());
+    let message = |stem: &str| answer.lines.iter().find(|line| line.file.contains(stem)).unwrap().message.clone();
+    assert!(message("broken").contains("broken.bvh"), "{}", message("broken"));
+    assert!(message("apart").contains("1.333 s apart"), "{}", message("apart"));
+    for ledger in read_ledgers(&out).unwrap().iter().filter(|ledger| ledger.failure.is_none()) {
+        assert!(ledger.ledger.is_whole(), "{ledger:?}");
     }
 
     let samples = samples(&out);
     let (sample, _) = samples.values().next().unwrap();
-    assert_eq!((samples.len(), sample.n_frames()), (1, 145), "9.7 s of sound");
+    assert_eq!((samples.len(), sample.n_frames()), (1, 145), "9.7 s of audio");
     let captured = captured::read(MotionKind::Bvh, &file("bvh/talk.bvh")).unwrap();
-    assert!(furthest(&sample.motion, &expected(&captured, 145)) < 1e-6);
+    assert!(max_difference(&sample.motion, &expected(&captured, 145)) < 1e-6);
     assert_eq!(sample.sound.samples.len(), 154_667);
     let facts = &sample.meta["imported"];
     assert_eq!((facts["motion"].as_str(), facts["sound"].as_str()), (Some("talk.bvh"), Some("talk.wav")));
     assert!((facts["sound_secs"].as_f64().unwrap() - 9.7).abs() < 1e-3);
-    // 301 frames end at 10.0 s, where frame 150 of the dataset begins
+    // 301 frames end at 10.0 s, where frame 150 of the dataset begins.
     assert!((facts["motion_secs"].as_f64().unwrap() - 151.0 / 15.0).abs() < 1e-9);
     assert_eq!((sample.meta["text"].as_str(), sample.meta["words"][0]["start_secs"].as_f64()), (Some("so"), Some(0.5)));
     let dataset = Dataset::open(&out).unwrap();
     assert!(dataset.info().notes.iter().any(|note| note.contains("faces the camera")));
-    // the same sources give the same bytes
+    // The same sources give the same bytes.
     let again = dir.path().join("again");
     imported(&[&source], &again);
     let bytes = |dir: &Path| files_under(dir).into_iter().map(|(name, path)| (name, fs::read(path).unwrap())).collect();
@@ -156,7 +157,7 @@ fn a_folder_of_bvh_and_sound_becomes_a_dataset() {
 }
 
 #[test]
-fn datasets_are_merged_byte_for_byte_and_come_back_from_other_hands() {
+fn datasets_are_merged_exactly_and_repacked_shards_are_imported() {
     let dir = tempfile::tempdir().unwrap();
     let path = |name: &str| dir.path().join(name);
     for (name, n_frames, seed) in [("a", 160, 1), ("b", 200, 2)] {
@@ -174,7 +175,7 @@ fn datasets_are_merged_byte_for_byte_and_come_back_from_other_hands() {
         }
     }
 
-    // taken apart and put together again by someone else: other order, other names, something added
+    // Repacked shards: another order, other member names, extra members.
     fs::create_dir(path("loose")).unwrap();
     let mut tar = tar::Builder::new(fs::File::create(path("loose/train-000007.tar")).unwrap());
     let mut members: Vec<(String, Vec<u8>)> = Vec::new();
@@ -192,8 +193,8 @@ fn datasets_are_merged_byte_for_byte_and_come_back_from_other_hands() {
         tar.append_data(&mut header, name, bytes.as_slice()).unwrap();
     }
     tar.finish().unwrap();
-    let back = imported(&[&path("loose")], &path("back"));
-    assert!(back.notes.iter().any(|note| note.contains("skipped 2 .txt files")), "{:?}", back.notes);
+    let repacked = imported(&[&path("loose")], &path("back"));
+    assert!(repacked.notes.iter().any(|note| note.contains("skipped 2 .txt files")), "{:?}", repacked.notes);
     let (before, after) = (samples(&path("merged")), samples(&path("back")));
     assert_eq!(before.keys().collect::<Vec<_>>(), after.keys().collect::<Vec<_>>());
     for (key, (sample, json)) in &before {
@@ -201,7 +202,7 @@ fn datasets_are_merged_byte_for_byte_and_come_back_from_other_hands() {
         assert!(sample.members().unwrap()[1..] == again.members().unwrap()[1..] && json == json_again, "{key}");
     }
 
-    // a sample that lost a member fails, the other comes in; another rate fails
+    // A sample without one of its members fails, the other is imported; another frame rate is an error.
     let mut tar = tar::Builder::new(fs::File::create(path("loose/train-000007.tar")).unwrap());
     for (name, bytes) in members.iter().filter(|(name, _)| !(name.contains("/a-") && name.ends_with("wav"))) {
         let mut header = tar::Header::new_gnu();
@@ -209,8 +210,8 @@ fn datasets_are_merged_byte_for_byte_and_come_back_from_other_hands() {
         tar.append_data(&mut header, name, bytes.as_slice()).unwrap();
     }
     tar.finish().unwrap();
-    let half = imported(&[&path("loose")], &path("half"));
-    let failed: Vec<_> = half.lines.iter().filter(|line| line.outcome == "failed").collect();
+    let partial = imported(&[&path("loose")], &path("half"));
+    let failed: Vec<_> = partial.lines.iter().filter(|line| line.outcome == "failed").collect();
     assert!(failed.len() == 1 && failed[0].message.contains("has no a-"), "{failed:?}");
     let mut other_rate = plan(&[&both[0]]);
     (other_rate.limits.fps, other_rate.about.fps) = (FrameRate::new(30, 1), FrameRate::new(30, 1));
@@ -220,15 +221,15 @@ fn datasets_are_merged_byte_for_byte_and_come_back_from_other_hands() {
 }
 
 #[test]
-fn the_same_take_twice_comes_in_once() {
+fn a_duplicate_take_is_imported_once() {
     let dir = tempfile::tempdir().unwrap();
     for folder in ["one", "two"] {
         write(dir.path().join(folder).join("a.bvh"), &bvh(160));
         wav(&dir.path().join(folder).join("a.wav"), 5.3, 1);
     }
     let answer = imported(&[dir.path()], &dir.path().join("out"));
-    let ended: Vec<(&str, &str)> = answer.lines.iter().map(|line| (line.outcome, line.reason.as_str())).collect();
-    assert_eq!(ended, [("kept", ""), ("refused", "duplicate")]);
+    let outcomes: Vec<(&str, &str)> = answer.lines.iter().map(|line| (line.outcome, line.reason.as_str())).collect();
+    assert_eq!(outcomes, [("kept", ""), ("refused", "duplicate")]);
 }
 
 #[test]
@@ -241,7 +242,7 @@ fn the_authors_clips_and_ted_become_datasets() {
     for (key, (sample, _)) in samples(&dir.path().join("clips")) {
         let name = sample.meta["imported"]["motion"].as_str().unwrap().to_owned();
         let captured = captured::read(MotionKind::Authors, &data.join("released_clips").join(name)).unwrap();
-        assert_eq!(furthest(&sample.motion, &expected(&captured, sample.n_frames())), 0.0, "{key}");
+        assert_eq!(max_difference(&sample.motion, &expected(&captured, sample.n_frames())), 0.0, "{key}");
     }
     let ted = imported(&[&data.join("speech_motion/ted_expressive")], &dir.path().join("ted"));
     assert_eq!((count(&ted, ""), ted.lines.len()), (14, 14));
@@ -251,15 +252,15 @@ fn the_authors_clips_and_ted_become_datasets() {
             captured::read(MotionKind::Ted, &data.join("speech_motion/ted_expressive").join(name)).unwrap().motion;
         source.joints = source.joints.slice(ndarray::s![..sample.n_frames(), .., ..]).to_owned();
         source.mask = source.mask.slice(ndarray::s![..sample.n_frames(), ..]).to_owned();
-        assert!(furthest(&sample.motion, &source) < 1e-6, "{key}");
-        let there = |root: usize| (0..21).filter(|k| sample.motion.mask[[0, root + k]]).count();
-        assert_eq!((there(L_HAND), there(R_HAND)), (16, 16), "three joints a finger, no tips");
+        assert!(max_difference(&sample.motion, &source) < 1e-6, "{key}");
+        let n_visible = |root: usize| (0..21).filter(|k| sample.motion.mask[[0, root + k]]).count();
+        assert_eq!((n_visible(L_HAND), n_visible(R_HAND)), (16, 16), "three joints a finger, no tips");
         assert!(!sample.meta["text"].as_str().unwrap().is_empty());
     }
 }
 
 #[test]
-fn the_verb_says_what_failed_and_replaces_only_datasets() {
+fn the_command_reports_failures_and_replaces_only_datasets() {
     let dir = tempfile::tempdir().unwrap();
     write(dir.path().join("in/good.bvh"), &bvh(160));
     wav(&dir.path().join("in/good.wav"), 5.3, 1);
@@ -273,11 +274,11 @@ fn the_verb_says_what_failed_and_replaces_only_datasets() {
     };
     let (code, json) = run(&["in", "--out", "out"]);
     assert_eq!((code, json["imported"].as_u64(), json["failed"].as_u64()), (Some(2), Some(1), Some(1)));
-    assert_eq!(run(&["in", "--out", "out"]).0, Some(1), "it is not empty");
+    assert_eq!(run(&["in", "--out", "out"]).0, Some(1), "the folder is not empty");
     let ledger = fs::read_to_string(dir.path().join("out/ledger.jsonl")).unwrap();
     assert!(ledger.contains("bad.bvh is not a valid BVH") && !ledger.contains("in/"), "{ledger}");
     assert_eq!(run(&["in/good.bvh", "--out", "out", "--force"]).0, Some(0));
-    assert_eq!(run(&["in", "out", "--out", "out", "--force"]).0, Some(1), "it would be read while it is replaced");
+    assert_eq!(run(&["in", "out", "--out", "out", "--force"]).0, Some(1), "the output is an input");
     let (code, json) = run(&["in", "--out", "in", "--force"]);
     assert!(code == Some(1) && json["error"].as_str().unwrap().contains("not a dataset"), "{json}");
     let (code, json) = run(&["in/bad.bvh", "--out", "none"]);
@@ -286,7 +287,7 @@ fn the_verb_says_what_failed_and_replaces_only_datasets() {
 }
 
 #[test]
-fn silent_captures_become_a_dataset_that_no_speech_is_learnt_from() {
+fn a_dataset_without_audio_is_rejected_by_training() {
     let dir = tempfile::tempdir().unwrap();
     let source = dir.path().join("trn");
     for (name, n_frames) in [("one", 200), ("two", 230)] {
@@ -303,7 +304,7 @@ fn silent_captures_become_a_dataset_that_no_speech_is_learnt_from() {
     assert!(fs::read_to_string(out.join("README.md")).unwrap().contains("There is no sound"));
     let dataset = orator_dataset::Dataset::open(&out).unwrap();
     let settings = orator_dataset::config::Settings::default().gan;
-    let refused =
+    let error =
         orator_gesture::train::gan::train::train(&dataset, &settings, &dir.path().join("gan"), &Silent).err().unwrap();
-    assert!(refused.to_string().contains("imported without audio"), "{refused:#}");
+    assert!(error.to_string().contains("imported without audio"), "{error:#}");
 }

@@ -1,4 +1,4 @@
-//! Readers of captured motion: joints as the source has them, in house axes.
+//! Readers of captured motion: joints as in the source, in the axes of this project.
 
 use orator_base::types::skeleton::{L_HAND, L_WRIST, N_JOINTS, NECK, R_HAND, R_SHOULDER, R_WRIST, swap_authors_order};
 use orator_base::types::time::FrameRate;
@@ -14,7 +14,7 @@ fn reference(name: &str) -> std::path::PathBuf {
 }
 
 #[test]
-fn a_bvh_take_is_where_the_reference_puts_it() {
+fn a_bvh_take_has_the_reference_positions() {
     let take = captured::read(MotionKind::Bvh, &reference("bvh_take.bvh")).unwrap();
     let golden: serde_json::Value =
         serde_json::from_slice(&std::fs::read(reference("bvh_golden.json")).unwrap()).unwrap();
@@ -30,16 +30,16 @@ fn a_bvh_take_is_where_the_reference_puts_it() {
     }
     assert!(worst < 1e-6, "{worst} m");
     assert_eq!(take.motion.n_frames(), 9);
-    // the speaker's right is image left, up is up, and they face the camera
+    // The speaker faces the camera, so their right is at the left of the image.
     assert!(take.motion.joints[[0, R_SHOULDER, 0]] < -0.1 && take.motion.joints[[0, L_WRIST, 0]] > 0.2);
 }
 
 #[test]
-fn z_up_inches_and_a_lost_hand_are_the_same_speaker() {
+fn z_up_inches_and_a_missing_hand_give_the_same_joints() {
     let text = std::fs::read_to_string(reference("bvh_take.bvh")).unwrap();
-    let whole = captured::read(MotionKind::Bvh, &reference("bvh_take.bvh")).unwrap().motion;
+    let original = captured::read(MotionKind::Bvh, &reference("bvh_take.bvh")).unwrap().motion;
     let dir = tempfile::tempdir().unwrap();
-    // a root above all that turns y up into z up; every length in inches
+    // An extra root that turns y-up into z-up; lengths in inches.
     let (head, frames) = text.split_once("Frame Time: 0.0333333\n").unwrap();
     let inches = |line: &str| match line.trim_start().strip_prefix("OFFSET ") {
         Some(offset) => {
@@ -70,31 +70,31 @@ fn z_up_inches_and_a_lost_hand_are_the_same_speaker() {
     assert!(bvh::unit_note(&take.facts).unwrap().contains("the unit is the inch: converted to metres"));
     assert_eq!(take.facts["joints_missing"].as_array().unwrap().len(), 22, "the left wrist and its hand");
     for ((t, j, k), &v) in take.motion.joints.indexed_iter() {
-        let lost = (L_HAND..R_HAND).contains(&j) || j == L_WRIST;
-        let off = (v - whole.joints[[t, j, k]]).abs();
-        assert!(if lost { v.is_nan() && !take.motion.mask[[t, j]] } else { off < 2e-6 }, "{t} {j} {k}: {off}");
+        let missing = (L_HAND..R_HAND).contains(&j) || j == L_WRIST;
+        let error = (v - original.joints[[t, j, k]]).abs();
+        assert!(if missing { v.is_nan() && !take.motion.mask[[t, j]] } else { error < 2e-6 }, "{t} {j} {k}: {error}");
     }
 }
 
 #[test]
-fn what_is_no_speaker_is_an_error_that_says_why() {
+fn a_file_without_a_speaker_is_an_error_with_the_reason() {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("b.bvh");
     let text = std::fs::read_to_string(reference("bvh_take.bvh")).unwrap();
-    let said = |text: &str| {
+    let error_of = |text: &str| {
         std::fs::write(&path, text).unwrap();
         format!("{:#}", captured::read(MotionKind::Bvh, &path).unwrap_err())
     };
-    let named = said(&text.replace("Neck", "Pole"));
+    let named = error_of(&text.replace("Neck", "Pole"));
     assert!(named.contains("b.bvh") && named.contains("neck") && named.contains("LeftForeArm"), "{named}");
-    let huge = said(&text.replace("28.5", "9000"));
+    let huge = error_of(&text.replace("28.5", "9000"));
     assert!(huge.contains("centimetre"), "{huge}");
-    let broken = said(&text[..text.len() - 30]);
+    let broken = error_of(&text[..text.len() - 30]);
     assert!(broken.contains("b.bvh") && broken.contains("9 frames"), "{broken}");
 }
 
 #[test]
-fn ted_joints_stay_where_they_are() {
+fn ted_joints_keep_their_positions() {
     let Some(folder) = real_data("data/speech_motion/ted_expressive") else { return };
     let take = captured::read(MotionKind::Ted, &folder.join("_3IOjpSGFqY_164_0_12.npz")).unwrap();
     let mut npz = orator_formats::npz::Npz::open(&folder.join("_3IOjpSGFqY_164_0_12.npz")).unwrap();
@@ -109,7 +109,7 @@ fn ted_joints_stay_where_they_are() {
             }
         }
         for root in [L_HAND, R_HAND] {
-            assert!((0..5).all(|finger| !take.motion.mask[[t, root + 4 + 4 * finger]]), "tips are not there");
+            assert!((0..5).all(|finger| !take.motion.mask[[t, root + 4 + 4 * finger]]), "finger tips are missing");
         }
     }
     assert_eq!(take.motion.n_frames(), 92);
@@ -117,7 +117,7 @@ fn ted_joints_stay_where_they_are() {
 }
 
 #[test]
-fn the_authors_clips_are_permuted_and_nothing_else() {
+fn the_authors_clips_are_only_permuted() {
     let Some(folder) = real_data("data/released_clips") else { return };
     let path = folder.join("gt_interval_3821.txt");
     let take = captured::read(MotionKind::Authors, &path).unwrap();
@@ -134,7 +134,7 @@ fn the_authors_clips_are_permuted_and_nothing_else() {
 }
 
 #[test]
-fn the_authors_clips_survive_the_round_trip() {
+fn the_authors_clips_round_trip() {
     let Some(folder) = real_data("data/released_clips") else { return };
     for (name, n_frames) in [("gt_interval_3821", 242), ("gt_interval_102571", 679), ("prediction_interval_3821", 242)]
     {
@@ -142,7 +142,7 @@ fn the_authors_clips_survive_the_round_trip() {
         let motion = authors_txt::read(&path, FrameRate::new(15, 1)).unwrap();
         assert_eq!(motion.n_frames(), n_frames);
         let (written, original) = (authors_txt::format(&motion), std::fs::read_to_string(&path).unwrap());
-        assert_eq!(written.len(), original.len(), "{name}: the same layout to the byte");
+        assert_eq!(written.len(), original.len(), "{name}: equal length");
         for (ours, theirs) in written.split_whitespace().zip(original.split_whitespace()) {
             let (ours, theirs): (f64, f64) = (ours.parse().unwrap(), theirs.parse().unwrap());
             assert!((ours - theirs).abs() < 4e-8, "{name}: {ours} for {theirs}");
@@ -150,7 +150,7 @@ fn the_authors_clips_survive_the_round_trip() {
         let distance = |frame: usize, a: usize, b: usize| {
             (0..3).map(|k| (motion.joints[[frame, a, k]] - motion.joints[[frame, b, k]]).powi(2)).sum::<f32>().sqrt()
         };
-        let (mut tips_further, mut seen) = (0, 0);
+        let (mut tips_further, mut n_tips) = (0, 0);
         for frame in 0..n_frames {
             assert!((0..3).all(|k| motion.joints[[frame, NECK, k]] == 0.0));
             if name.starts_with("gt") {
@@ -159,11 +159,11 @@ fn the_authors_clips_survive_the_round_trip() {
             for root in [L_HAND, R_HAND] {
                 for finger in 0..5 {
                     let base = root + 1 + 4 * finger;
-                    seen += 1;
+                    n_tips += 1;
                     tips_further += usize::from(distance(frame, root, base + 3) > distance(frame, root, base));
                 }
             }
         }
-        assert!(tips_further * 10 > seen * 8, "{name}: {tips_further} of {seen} finger tips lie beyond their base");
+        assert!(tips_further * 10 > n_tips * 8, "{name}: {tips_further} of {n_tips} finger tips lie beyond their base");
     }
 }

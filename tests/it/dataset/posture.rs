@@ -1,4 +1,4 @@
-//! Head and trunk in datasets: written, read, verified, imported and forgotten; without them no trace.
+//! Head and trunk angles in datasets: written, read, verified, imported and forgotten; absent unless enabled.
 
 use crate::fixtures::gesture_dataset::{FPS, dataset, dataset_of, with_posture};
 use crate::fixtures::media::lifted_videos::{settings, shard_as, video};
@@ -19,7 +19,7 @@ use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// Angles of all samples as bits, so that what is missing compares.
+/// Angles of all samples as bits, so that NaN equals NaN.
 fn angles(dataset: &Dataset) -> Vec<(String, Option<Vec<u32>>)> {
     let samples = Split::ALL.iter().flat_map(|split| dataset.samples(*split));
     let bits = |sample: Sample| {
@@ -33,7 +33,7 @@ fn posed(folder: &Path) -> Dataset {
     dataset_of(folder, posed_sample)
 }
 
-/// The sample with its angles, its one joint without an x missing as a whole.
+/// The sample with angles, and with all coordinates of its incomplete joint missing.
 fn posed_sample(mut sample: Sample, phase: f64) -> Sample {
     let middle = sample.n_frames() / 2;
     sample.motion.joints.slice_mut(s![middle, 5, ..]).fill(f32::NAN);
@@ -42,10 +42,10 @@ fn posed_sample(mut sample: Sample, phase: f64) -> Sample {
 }
 
 #[test]
-fn angles_are_kept_to_the_bit_and_go_with_their_video() {
+fn angles_are_stored_exactly_and_removed_with_their_video() {
     let folder = tempfile::tempdir().unwrap();
-    let place = folder.path().join("dataset");
-    let dataset = posed(&place);
+    let target = folder.path().join("dataset");
+    let dataset = posed(&target);
     let written = angles(&dataset);
     assert!(written.iter().all(|(_, angles)| angles.is_some()) && written.len() == 3);
     let stats = dataset.stats().posture.clone().unwrap();
@@ -53,17 +53,17 @@ fn angles_are_kept_to_the_bit_and_go_with_their_video() {
     // Every ninth frame of 99 and 64 hides the head; validation does not count.
     assert_eq!((head.n_seen, trunk.n_seen), ([163 - 11 - 8; 3], [163; 3]));
     assert!((0.3..0.35).contains(&trunk.mean[1]) || (0.25..0.3).contains(&trunk.mean[1]), "{:?}", trunk.mean);
-    let card = fs::read_to_string(place.join("README.md")).unwrap();
+    let card = fs::read_to_string(target.join("README.md")).unwrap();
     assert!(card.contains("the head in 88.3 %, the trunk in 100.0 % of the frames"), "{card}");
     assert!(["head.npy", "trunk.npy"].iter().all(|name| dataset.info().members.contains_key(*name)));
     drop(dataset);
-    assert_eq!(verify(&place, true, &Silent).unwrap().problems, []);
+    assert_eq!(verify(&target, true, &Silent).unwrap().problems, []);
 
-    // The shards by themselves give the same angles.
+    // Importing only the shards gives the same angles.
     let is_tar = |path: &PathBuf| path.extension().is_some_and(|ending| ending == "tar");
     let fps = FrameRate::new(15, 1);
     let plan = ImportPlan {
-        sources: files_under(&place).into_iter().map(|(_, path)| path).filter(is_tar).collect(),
+        sources: files_under(&target).into_iter().map(|(_, path)| path).filter(is_tar).collect(),
         kind: None,
         about: About::new("host", fps),
         limits: TakeLimits { fps, min_frames: 64, max_difference_secs: 0.5, no_sound: false },
@@ -74,58 +74,58 @@ fn angles_are_kept_to_the_bit_and_go_with_their_video() {
     import(&plan, &imported, &Silent).unwrap();
     assert_eq!(verify(&imported, true, &Silent).unwrap().problems, []);
     let again = angles(&Dataset::open(&imported).unwrap());
-    assert!(again == written, "other angles behind an import");
+    assert!(again == written, "the import changed angles");
 
-    without(&place, &BTreeSet::from(["a-00000000".to_owned()])).unwrap();
-    assert_eq!(verify(&place, true, &Silent).unwrap().problems, []);
-    let left = Dataset::open(&place).unwrap();
-    assert_eq!(left.stats().posture.as_ref().unwrap()[&PostureChannel::Trunk].n_seen, [64; 3]);
-    assert!(angles(&left) == written[1..], "other angles behind a forgotten video");
-    assert!(files_under(&place).iter().all(|(name, _)| !name.contains("a-00000000")));
+    without(&target, &BTreeSet::from(["a-00000000".to_owned()])).unwrap();
+    assert_eq!(verify(&target, true, &Silent).unwrap().problems, []);
+    let remaining = Dataset::open(&target).unwrap();
+    assert_eq!(remaining.stats().posture.as_ref().unwrap()[&PostureChannel::Trunk].n_seen, [64; 3]);
+    assert!(angles(&remaining) == written[1..], "other angles changed");
+    assert!(files_under(&target).iter().all(|(name, _)| !name.contains("a-00000000")));
 }
 
 #[test]
-fn a_damaged_angle_is_found() {
+fn a_damaged_angle_is_detected() {
     let folder = tempfile::tempdir().unwrap();
-    let place = folder.path().join("dataset");
-    let dataset = posed(&place);
+    let target = folder.path().join("dataset");
+    let dataset = posed(&target);
     let sample = dataset.samples(Split::Train).remove(0);
     let at = sample.head.unwrap();
-    let path = place.join(&sample.shard);
+    let path = target.join(&sample.shard);
     drop(dataset);
-    let whole = fs::read(&path).unwrap();
-    let mut damaged = whole.clone();
+    let original = fs::read(&path).unwrap();
+    let mut damaged = original.clone();
     damaged[(at.offset + at.size - 2) as usize] ^= 0x40;
     fs::write(&path, &damaged).unwrap();
-    let found = verify(&place, true, &Silent).unwrap().problems;
+    let found = verify(&target, true, &Silent).unwrap().problems;
     assert!(
         found.iter().any(|problem| problem.message.contains("is damaged") && problem.message.contains(&*sample.key)),
         "{found:?}"
     );
-    // A header that promises other rows.
-    let mut damaged = whole;
+    // A header with another number of rows.
+    let mut damaged = original;
     let text = &mut damaged[at.offset as usize..][..128];
     let shape = text.windows(4).position(|bytes| bytes == b"(99,").unwrap();
     text[shape + 1] = b'8';
     fs::write(&path, &damaged).unwrap();
-    assert!(!verify(&place, true, &Silent).unwrap().problems.is_empty());
+    assert!(!verify(&target, true, &Silent).unwrap().problems.is_empty());
 
-    // Angles beyond half a turn were never angles; each may be missing alone.
-    for (value, n_wrong) in [(4.0, 3), (f32::INFINITY, 3), (f32::NAN, 0)] {
-        let place = folder.path().join(format!("{value}"));
-        dataset_of(&place, |sample, phase| {
+    // Angles beyond half a turn are invalid; a single angle may be missing.
+    for (value, n_problems) in [(4.0, 3), (f32::INFINITY, 3), (f32::NAN, 0)] {
+        let target = folder.path().join(format!("{value}"));
+        dataset_of(&target, |sample, phase| {
             let mut sample = posed_sample(sample, phase);
             sample.posture.as_mut().unwrap().trunk[[5, 1]] = value;
             sample
         });
-        let found = verify(&place, true, &Silent).unwrap().problems;
+        let found = verify(&target, true, &Silent).unwrap().problems;
         assert!(found.iter().all(|problem| problem.message.contains("frame 5: an angle of the trunk")), "{found:?}");
-        assert_eq!(found.len(), n_wrong);
+        assert_eq!(found.len(), n_problems);
     }
 }
 
 #[test]
-fn a_dataset_without_angles_has_no_trace_of_them() {
+fn a_dataset_without_angles_does_not_mention_them() {
     let folder = tempfile::tempdir().unwrap();
     let dataset = dataset(&folder.path().join("dataset"));
     assert!(angles(&dataset).iter().all(|(_, angles)| angles.is_none()));
@@ -136,7 +136,7 @@ fn a_dataset_without_angles_has_no_trace_of_them() {
 }
 
 #[test]
-fn a_run_writes_angles_where_they_are_asked_for() {
+fn a_run_writes_angles_if_enabled() {
     let folder = tempfile::tempdir().unwrap();
     let videos = [video(folder.path(), "talk", 300, 1)];
     let named = [(&videos[0], Split::Train)];

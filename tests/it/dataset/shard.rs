@@ -1,4 +1,4 @@
-//! The dataset stage over a made-up work folder: what is in the dataset, and what has no say in its bytes.
+//! The dataset stage on a generated work folder: content of the dataset, and inputs that do not affect its bytes.
 
 use crate::fixtures::footage::{FPS, good};
 use crate::fixtures::media::lifted_videos::{settings, shard, shard_as, shard_with, unit, video, video_with};
@@ -20,13 +20,13 @@ fn bytes(dir: &Path) -> Vec<(String, Vec<u8>)> {
     files_under(dir).into_iter().map(|(name, file)| (name, fs::read(file).unwrap())).collect()
 }
 
-fn sound(dir: &Path) {
+fn assert_valid(dir: &Path) {
     let found = verify(dir, true, &Silent).unwrap();
     assert!(found.problems.is_empty() && found.n_samples > 0, "{found:?}");
 }
 
 #[test]
-fn neither_the_order_of_videos_nor_their_folder_changes_a_byte() {
+fn bytes_do_not_depend_on_the_order_or_folder_of_videos() {
     let (one, two) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
     let names = ["b-roll", "a_Talk", "c"];
     let videos = |root: &Path| -> Vec<Unit> {
@@ -39,7 +39,7 @@ fn neither_the_order_of_videos_nor_their_folder_changes_a_byte() {
     let (_, second) = shard(one.path(), &units, "second");
     let (_, third) = shard(two.path(), &videos(two.path()), "third");
     assert_eq!(bytes(&first), bytes(&second));
-    // neither does what the first run put on record
+    // The record of the first run has no effect, either.
     fs::remove_file(one.path().join("work/splits/host.json")).unwrap();
     assert_eq!(bytes(&first), bytes(&shard(one.path(), &units, "anew").1));
     assert_eq!(bytes(&first), bytes(&third));
@@ -48,13 +48,13 @@ fn neither_the_order_of_videos_nor_their_folder_changes_a_byte() {
 }
 
 #[test]
-fn samples_hold_the_frames_and_the_sound_of_their_interval() {
+fn samples_contain_the_frames_and_audio_of_their_interval() {
     let dir = tempfile::tempdir().unwrap();
     let units = [video(dir.path(), "long", 200, 3), video(dir.path(), "short", 140, 9)];
     let (report, out) = shard(dir.path(), &units, "out");
     let dataset = Dataset::open(&out).unwrap();
-    sound(&out);
-    // the longer video's bones are the weighted median
+    assert_valid(&out);
+    // The weighted median of bone lengths is that of the longer video.
     let lengths = &dataset.info().bone_lengths_metres;
     assert!(!out.join("videos/none.json").exists());
     assert!((lengths[0] - 0.13).abs() < 1e-6 && lengths[L_HAND - 1] == 0.0, "{lengths:?}");
@@ -67,10 +67,10 @@ fn samples_hold_the_frames_and_the_sound_of_their_interval() {
         let start = sample.meta["first_frame"].as_u64().unwrap() as usize;
         assert_eq!(sample.key, format!("{name}-{}-{start:06}", &source[..8]));
         let audio = Artifact::Sound.path(&dir.path().join("work"), unit);
-        let whole: Vec<i16> = hound::WavReader::open(audio).unwrap().samples().map(Result::unwrap).collect();
+        let recorded: Vec<i16> = hound::WavReader::open(audio).unwrap().samples().map(Result::unwrap).collect();
         let range = samples_of(FPS, 16_000, start..start + sample.n_frames());
         let mut expected: Vec<f32> =
-            whole[range.start..range.end.min(whole.len())].iter().map(|&s| f32::from(s) / 32_768.0).collect();
+            recorded[range.start..range.end.min(recorded.len())].iter().map(|&s| f32::from(s) / 32_768.0).collect();
         expected.resize(range.len(), 0.0);
         assert_eq!(sample.sound.samples, expected);
         let keypoints = good(start + sample.n_frames()).keypoints;
@@ -79,13 +79,13 @@ fn samples_hold_the_frames_and_the_sound_of_their_interval() {
             let (a, b) = (parent(joint).unwrap(), joint);
             let bone = &sample.motion.joints.slice(s![0, b, ..]) - &sample.motion.joints.slice(s![0, a, ..]);
             let own = if name == "long" { 0.13 } else { 0.19 };
-            let wanted = if lengths[joint - 1] == 0.0 { 0.0 } else { own };
-            assert!((f64::from(bone.mapv(|v| v * v).sum().sqrt()) - wanted).abs() < 1e-5);
+            let length = if lengths[joint - 1] == 0.0 { 0.0 } else { own };
+            assert!((f64::from(bone.mapv(|v| v * v).sum().sqrt()) - length).abs() < 1e-5);
         }
     }
     let footage = &dataset.stats().footage;
     assert_eq!((footage.n_videos, footage.n_intervals, footage.secs), (2, 4, 340.0 / 15.0));
-    // each wav lacks its last sample, and frames are rounded to samples
+    // Each wav lacks its last sample, and frames are rounded to samples.
     assert!(footage.padded_sound_secs > 0.0 && footage.padded_sound_secs < 5.0 / 16_000.0);
     assert_eq!(dataset.stats().n_seen[5], dataset.info().splits["train"].frames as u64);
     assert_eq!((footage.kept_secs, footage.failed_secs), (340.0 / 15.0, 0.0));
@@ -93,7 +93,7 @@ fn samples_hold_the_frames_and_the_sound_of_their_interval() {
 }
 
 #[test]
-fn a_new_video_moves_no_other_to_another_split() {
+fn a_new_video_changes_no_split_of_other_videos() {
     let dir = tempfile::tempdir().unwrap();
     let units: Vec<Unit> = (0..14).map(|n| video(dir.path(), &format!("talk{n}"), 130, n)).collect();
     let split_of = |out: &Path| {
@@ -111,25 +111,25 @@ fn a_new_video_moves_no_other_to_another_split() {
 }
 
 #[test]
-fn a_new_video_costs_itself_and_changes_no_shard() {
+fn a_new_video_changes_no_existing_shard() {
     let dir = tempfile::tempdir().unwrap();
     let mut units: Vec<Unit> = (0..3).map(|n| video(dir.path(), &format!("talk{n}"), 130, n)).collect();
     let (_, first) = shard(dir.path(), &units, "first");
-    let place = dir.path().join("work/dataset/host");
-    fs::create_dir_all(place.parent().unwrap()).unwrap();
-    fs::rename(&first, &place).unwrap();
-    let before = bytes(&place);
+    let target = dir.path().join("work/dataset/host");
+    fs::create_dir_all(target.parent().unwrap()).unwrap();
+    fs::rename(&first, &target).unwrap();
+    let before = bytes(&target);
     units.push(video(dir.path(), "another", 140, 77));
     let (report, grown) = shard(dir.path(), &units, "grown");
     let line = report.unwrap().line;
     assert!(line.contains("3 videos reused unchanged"), "{line}");
-    sound(&grown);
+    assert_valid(&grown);
     let after = bytes(&grown);
     let of_video = |name: &str| name.ends_with(".tar") || name.starts_with("videos/");
     let same = before.iter().filter(|(name, _)| of_video(name)).filter(|file| after.contains(file)).count();
     assert_eq!(same, before.iter().filter(|(name, _)| of_video(name)).count());
-    // a damaged shard is not taken over but written anew
-    let tar = fs::read_dir(&place)
+    // A damaged shard is not reused.
+    let tar = fs::read_dir(&target)
         .unwrap()
         .map(|entry| entry.unwrap().path())
         .find(|path| path.extension().is_some_and(|e| e == "tar"));
@@ -138,27 +138,27 @@ fn a_new_video_costs_itself_and_changes_no_shard() {
     damaged[5_000] ^= 1;
     fs::remove_file(&tar).unwrap();
     fs::write(&tar, damaged).unwrap();
-    let (report, mended) = shard(dir.path(), &units, "mended");
+    let (report, repaired) = shard(dir.path(), &units, "mended");
     assert!(report.unwrap().line.contains("2 videos reused unchanged"));
-    assert_eq!(bytes(&mended), after);
-    // what is on record outlives the dataset
-    fs::remove_dir_all(&place).unwrap();
+    assert_eq!(bytes(&repaired), after);
+    // The record remains without the dataset.
+    fs::remove_dir_all(&target).unwrap();
     assert_eq!(bytes(&shard(dir.path(), &units, "at-once").1), after);
 }
 
 #[test]
-fn shared_sound_keeps_videos_in_one_split() {
+fn videos_with_shared_audio_are_in_one_split() {
     let dir = tempfile::tempdir().unwrap();
     let mut settings = settings(dir.path());
     settings.dataset.split_by = SplitUnit::Video;
     let old = video(dir.path(), "old", 150, 1);
-    let lone = video(dir.path(), "lone", 160, 2);
-    let (_, first) = shard_as(&settings, &[lone.clone(), old.clone()], &[], "first");
-    let place = dir.path().join("work/dataset/host");
-    fs::create_dir_all(place.parent().unwrap()).unwrap();
-    fs::rename(&first, &place).unwrap();
+    let single = video(dir.path(), "lone", 160, 2);
+    let (_, first) = shard_as(&settings, &[single.clone(), old.clone()], &[], "first");
+    let target = dir.path().join("work/dataset/host");
+    fs::create_dir_all(target.parent().unwrap()).unwrap();
+    fs::rename(&first, &target).unwrap();
     let copy = video_with(dir.path(), "copy", 140, 3, 1);
-    let videos = [old.clone(), lone.clone(), copy.clone()];
+    let videos = [old.clone(), single.clone(), copy.clone()];
     let (_, out) = shard_as(&settings, &videos, &[], "second");
     let info = Dataset::open(&out).unwrap().info().clone();
     let of = |name: &str| info.videos.iter().find(|video| video.file == format!("{name}.mp4")).unwrap();
@@ -167,8 +167,8 @@ fn shared_sound_keeps_videos_in_one_split() {
         (of("copy").split, &of("copy").split_by),
         (Some(Split::Validation), &SplitBy::SoundOf(of("old").name.clone()))
     );
-    sound(&out);
-    // a name in the configuration wins, and the leak is said
+    assert_valid(&out);
+    // A split named in the configuration has precedence, and the leak is reported.
     let (report, out) = shard_as(&settings, &videos, &[(&copy, Split::Train)], "named");
     let line = report.unwrap().line;
     assert!(line.contains("s of audio: assign both to one split"), "{line}");
@@ -176,11 +176,11 @@ fn shared_sound_keeps_videos_in_one_split() {
     let leakage: serde_json::Value = serde_json::from_str(&leakage).unwrap();
     assert_eq!(leakage["leaks"].as_array().unwrap().len(), 1, "{leakage}");
     assert!(leakage["shared"][0]["secs"].as_f64().unwrap() > 8.0);
-    sound(&out);
+    assert_valid(&out);
 }
 
 #[test]
-fn what_is_not_there_is_said() {
+fn missing_and_duplicate_videos_are_reported() {
     let dir = tempfile::tempdir().unwrap();
     let good = video(dir.path(), "good", 150, 1);
     let twin = video(dir.path(), "twin", 150, 2);
@@ -193,12 +193,12 @@ fn what_is_not_there_is_said() {
     assert!(line.contains("1 video left out because an earlier stage failed"), "{line}");
     assert!(line.contains("1 video left out as duplicates of other videos"), "{line}");
     assert_eq!(Dataset::open(&out).unwrap().info().splits["train"].videos.len(), 1);
-    let accounts = read_ledgers(&out).unwrap();
-    let of = |name: &str| accounts.iter().find(|account| account.file == format!("{name}.mp4")).unwrap();
+    let ledgers = read_ledgers(&out).unwrap();
+    let of = |name: &str| ledgers.iter().find(|ledger| ledger.file == format!("{name}.mp4")).unwrap();
     assert_eq!(of("never").failure.as_deref(), Some("run: not every stage is done"));
-    let twice = if of("twin").split.is_none() { of("twin") } else { of("good") };
-    assert_eq!(twice.ledger.refused_secs()["duplicate"], 10.0);
-    sound(&out);
+    let duplicate = if of("twin").split.is_none() { of("twin") } else { of("good") };
+    assert_eq!(duplicate.ledger.refused_secs()["duplicate"], 10.0);
+    assert_valid(&out);
 
     let short = video(dir.path(), "short", 100, 5);
     let error = shard(dir.path(), &[short], "none").0.unwrap_err().to_string();

@@ -1,4 +1,4 @@
-//! Splits by whole videos: filled toward their shares, kept on record, and never moved.
+//! Splits by video: filled up to their shares, recorded, and never changed.
 
 use crate::fixtures::media::lifted_videos::{settings, shard, shard_as, video};
 use orator_base::stage::Unit;
@@ -16,17 +16,17 @@ use std::path::Path;
 const PLAN: SplitPlan =
     SplitPlan { unit: SplitUnit::Video, validation: 0.15, test: 0.1, guard_secs: 8.0, min_block_secs: 9.0 };
 
-fn new(name: &str, secs: f64) -> Unassigned<'_> {
+fn unassigned(name: &str, secs: f64) -> Unassigned<'_> {
     Unassigned { name, content: name, duration_secs: secs, kept: vec![(0.0, secs)], named: None, recorded: None }
 }
 
 #[test]
-fn splits_fill_toward_their_shares_whatever_the_order() {
+fn split_sizes_approach_their_shares_in_any_order() {
     let mut rng = ChaCha8Rng::seed_from_u64(7);
     for n in [3, 8, 20, 200] {
         let names: Vec<String> = (0..n).map(|k| format!("v{k:03}")).collect();
         let secs: Vec<f64> = names.iter().map(|_| rng.random_range(20.0..900.0)).collect();
-        let mut videos: Vec<Unassigned> = names.iter().zip(&secs).map(|(name, secs)| new(name, *secs)).collect();
+        let mut videos: Vec<Unassigned> = names.iter().zip(&secs).map(|(name, secs)| unassigned(name, *secs)).collect();
         let of = |videos: &[Unassigned]| -> BTreeMap<String, Split> {
             let split = |(video, answer): (&Unassigned, Assignment)| match answer {
                 Assignment::In(split, SplitBy::Share) => (video.name.to_owned(), split),
@@ -42,7 +42,7 @@ fn splits_fill_toward_their_shares_whatever_the_order() {
         for (split, share) in [(Split::Train, 0.75), (Split::Validation, 0.15), (Split::Test, 0.1)] {
             let filled: f64 = videos.iter().filter(|video| first[video.name] == split).map(|v| v.duration_secs).sum();
             assert!(filled > 0.0, "{n} videos: {split:?} is empty");
-            // A video is whole: no split is off by more than one of them, and many videos meet the shares.
+            // Videos are not divided: a split is off by at most one video, and many videos meet the shares.
             assert!((filled - share * total).abs() <= longest, "{n} videos, {split:?}: {filled} of {total}");
             assert!(n < 200 || (filled / total - share).abs() < 0.01, "{split:?}: {filled} of {total}");
         }
@@ -62,12 +62,12 @@ fn by_video(root: &Path) -> Settings {
 }
 
 #[test]
-fn the_record_outlives_the_dataset_and_the_dataset_the_record() {
+fn splits_are_restored_from_the_record_or_the_dataset() {
     let dir = tempfile::tempdir().unwrap();
     let settings = by_video(dir.path());
     let units: Vec<Unit> = (0..9).map(|n| video(dir.path(), &format!("v{n}"), 140 + 4 * n as usize, n)).collect();
     let record = dir.path().join("work/splits/host.json");
-    // The run ends before its dataset is put in its place: the record stands, and the next run goes on from it.
+    // The run ends before its dataset is moved into place: the next run continues from the record.
     let few = splits(&shard_as(&settings, &units[..4], &[], "killed").1);
     assert!(record.is_file());
     let grown = splits(&shard_as(&settings, &units, &[], "grown").1);
@@ -78,25 +78,25 @@ fn the_record_outlives_the_dataset_and_the_dataset_the_record() {
         let units: Vec<Unit> = (0..9).map(|n| video(other.path(), &format!("v{n}"), 140 + 4 * n as usize, n)).collect();
         splits(&shard_as(&settings, &units, &[], "out").1)
     };
-    assert_ne!(at_once, grown, "the record had nothing to hold");
-    // A lost dataset: the record alone.
+    assert_ne!(at_once, grown, "the record has no effect");
+    // Without a dataset: from the record.
     assert_eq!(splits(&shard_as(&settings, &units, &[], "again").1), grown);
-    // A lost record: the dataset that is there.
-    let place = dir.path().join("work/dataset/host");
-    fs::create_dir_all(place.parent().unwrap()).unwrap();
-    fs::rename(dir.path().join("again"), &place).unwrap();
+    // Without a record: from the existing dataset.
+    let target = dir.path().join("work/dataset/host");
+    fs::create_dir_all(target.parent().unwrap()).unwrap();
+    fs::rename(dir.path().join("again"), &target).unwrap();
     let before = fs::read(&record).unwrap();
     fs::remove_file(&record).unwrap();
     assert_eq!(splits(&shard_as(&settings, &units, &[], "taken-over").1), grown);
     assert_eq!(fs::read(&record).unwrap(), before);
-    // A damaged record is an error that says what to do, not a new division.
+    // A damaged record is an error that states what to do, not a new assignment.
     fs::write(&record, &before[..before.len() / 2]).unwrap();
     let error = format!("{:#}", shard_as(&settings, &units, &[], "damaged").0.unwrap_err());
     assert!(error.contains("host.json is damaged") && error.contains("delete it"), "{error}");
 }
 
 #[test]
-fn what_was_chosen_for_few_videos_stays_for_many() {
+fn the_split_unit_chosen_for_few_videos_is_used_for_more() {
     let dir = tempfile::tempdir().unwrap();
     let units: Vec<Unit> = (0..9).map(|n| video(dir.path(), &format!("v{n}"), 140 + 4 * n as usize, n)).collect();
     let record = |dir: &Path| SplitRecord::read(&dir.join("work/splits/host.json")).unwrap().unwrap();
@@ -113,11 +113,11 @@ fn what_was_chosen_for_few_videos_stays_for_many() {
     assert_eq!((second.unit, second.videos.len()), (SplitUnit::Time, 9));
     let card = fs::read_to_string(out.join("README.md")).unwrap();
     assert!(card.contains("divided by time") && card.contains("chosen for 7 videos"), "{card}");
-    // Asked for by name, another division is made.
+    // An explicit `split_by` gives another division.
     let (report, _) = shard_as(&by_video(dir.path()), &units, &[], "by-video");
     assert!(report.unwrap().line.contains("split by video (the configuration says so)"));
     assert!(record(dir.path()).videos.values().all(|video| video.blocks.is_empty()));
-    // Nine at once are whole.
+    // Nine videos in the first run are split by video.
     let other = tempfile::tempdir().unwrap();
     let units: Vec<Unit> = (0..9).map(|n| video(other.path(), &format!("v{n}"), 140, n)).collect();
     let (report, out) = shard(other.path(), &units, "out");
@@ -126,7 +126,7 @@ fn what_was_chosen_for_few_videos_stays_for_many() {
 }
 
 #[test]
-fn a_dataset_of_an_earlier_version_keeps_its_splits() {
+fn a_dataset_of_an_earlier_version_retains_its_splits() {
     let dir = tempfile::tempdir().unwrap();
     let units: Vec<Unit> = (0..4).map(|n| video(dir.path(), &format!("v{n}"), 140, n)).collect();
     let (_, out) = shard_as(&by_video(dir.path()), &units[..3], &[], "old");
@@ -137,9 +137,9 @@ fn a_dataset_of_an_earlier_version_keeps_its_splits() {
     info["videos"].as_array_mut().unwrap().iter_mut().for_each(|video| video["split_by"] = "content".into());
     fs::write(out.join("info.json"), info.to_string()).unwrap();
     let before = splits(&out);
-    let place = dir.path().join("work/dataset/host");
-    fs::create_dir_all(place.parent().unwrap()).unwrap();
-    fs::rename(&out, &place).unwrap();
+    let target = dir.path().join("work/dataset/host");
+    fs::create_dir_all(target.parent().unwrap()).unwrap();
+    fs::rename(&out, &target).unwrap();
     fs::remove_dir_all(dir.path().join("work/splits")).unwrap();
     let (report, out) = shard(dir.path(), &units, "new");
     assert!(report.unwrap().line.contains("split by video (as it was before)"));

@@ -1,4 +1,4 @@
-//! Splits by time: a long video has samples in all three, and nothing that one split is made from reaches into another.
+//! Splits by time: a long video has samples in all three splits, and no split depends on frames or audio of another.
 
 use crate::fixtures::footage::FPS;
 use crate::fixtures::media::lifted_videos::{made_video, settings, shard, shard_with, unit, video, video_with};
@@ -42,7 +42,7 @@ fn frames(dataset: &Dataset) -> Vec<(Range<usize>, Split)> {
 }
 
 #[test]
-fn one_long_talk_gives_all_three_splits_without_a_leak() {
+fn one_long_video_gives_all_three_splits_without_a_leak() {
     let dir = tempfile::tempdir().unwrap();
     let (report, out) = shard(dir.path(), &[talk(dir.path())], "out");
     let report = report.unwrap();
@@ -53,37 +53,37 @@ fn one_long_talk_gives_all_three_splits_without_a_leak() {
     let rule = dataset.info().split_rule.clone().unwrap();
     assert_eq!(rule.unit, SplitUnit::Time);
     let secs = |split: Split| dataset.info().splits[split.name()].secs;
-    let kept: f64 = Split::ALL.map(secs).iter().sum();
-    assert!(kept > 560.0, "{kept} s of 600 are left");
+    let total: f64 = Split::ALL.map(secs).iter().sum();
+    assert!(total > 560.0, "{total} s of 600 are used");
     for (split, share) in [(Split::Train, 0.7), (Split::Validation, 0.15), (Split::Test, 0.15)] {
-        assert!((secs(split) / kept - share).abs() < 0.03, "{split:?}: {} of {kept}", secs(split));
+        assert!((secs(split) / total - share).abs() < 0.03, "{split:?}: {} of {total}", secs(split));
     }
-    // The video is counted in each split and kept once; every second is accounted for.
+    // The video is counted in each split, its seconds once.
     assert_eq!(Split::ALL.map(|split| dataset.info().splits[split.name()].videos.len()), [1; 3]);
     let footage = &dataset.stats().footage;
-    assert!((footage.kept_secs - kept).abs() < 1e-6 && footage.refused_secs["between splits"] > 10.0);
+    assert!((footage.kept_secs - total).abs() < 1e-6 && footage.refused_secs["between splits"] > 10.0);
     assert_eq!(dataset.stats().n_seen[5], dataset.info().splits["train"].frames as u64);
 
-    // Frames that had a say in a window of a split, and in no frame of another.
-    let reach = (context_secs(&LiftConfig::default()) * FPS.per_sec()).ceil() as usize;
-    assert!(rule.guard_secs > FPS.secs(WINDOW) + FPS.secs(reach));
-    let reached = |frames: &Range<usize>| frames.start.saturating_sub(reach)..frames.end + reach;
-    let apart = |a: &Range<usize>, b: &Range<usize>| a.end <= b.start || b.end <= a.start;
+    // Frames that influence a window of a split influence no frame of another.
+    let margin = (context_secs(&LiftConfig::default()) * FPS.per_sec()).ceil() as usize;
+    assert!(rule.guard_secs > FPS.secs(WINDOW) + FPS.secs(margin));
+    let extended = |frames: &Range<usize>| frames.start.saturating_sub(margin)..frames.end + margin;
+    let disjoint = |a: &Range<usize>, b: &Range<usize>| a.end <= b.start || b.end <= a.start;
     let frames = frames(&dataset);
     for (own, split) in &frames {
         for (other, _) in frames.iter().filter(|(_, of)| of != split) {
-            assert!(apart(&reached(own), other), "{own:?} and {other:?}");
-            assert!(apart(&reached(own), &reached(other)), "{own:?} and {other:?} were made from a common frame");
-            // A window moved out of its sample by its whole length does not meet the other either.
-            assert!(apart(&(own.start.saturating_sub(WINDOW)..own.end + WINDOW), other));
+            assert!(disjoint(&extended(own), other), "{own:?} and {other:?}");
+            assert!(disjoint(&extended(own), &extended(other)), "{own:?} and {other:?} depend on a common frame");
+            // A window shifted out of its sample by its length does not overlap the other sample, either.
+            assert!(disjoint(&(own.start.saturating_sub(WINDOW)..own.end + WINDOW), other));
             let sound = |frames: &Range<usize>| samples_of(FPS, 16_000, frames.clone());
             let context = sound(own).start.saturating_sub(mel::FFT)..sound(own).end + mel::FFT;
-            assert!(apart(&context, &sound(other)));
+            assert!(disjoint(&context, &sound(other)));
         }
     }
 }
 
-/// All windows of the training split as the trainer sees them.
+/// All windows of the training split as loaded by the trainer.
 fn windows(out: &Path) -> Vec<f32> {
     let dataset = Dataset::open(out).unwrap();
     let normal = normalisation(&dataset).unwrap();
@@ -94,7 +94,7 @@ fn windows(out: &Path) -> Vec<f32> {
 }
 
 #[test]
-fn other_splits_have_no_say_in_what_is_trained_on() {
+fn training_windows_do_not_depend_on_other_splits() {
     let dir = tempfile::tempdir().unwrap();
     let (_, out) = shard(dir.path(), &[talk(dir.path())], "out");
     let frames = frames(&Dataset::open(&out).unwrap());
@@ -125,44 +125,44 @@ fn other_splits_have_no_say_in_what_is_trained_on() {
 }
 
 #[test]
-fn a_division_that_cannot_be_is_found() {
+fn inconsistent_splits_are_detected() {
     let dir = tempfile::tempdir().unwrap();
     let (_, out) = shard(dir.path(), &[talk(dir.path())], "out");
     let info = fs::read_to_string(out.join("info.json")).unwrap();
     let mut entry = fs::read_dir(out.join("videos")).unwrap().map(|entry| entry.unwrap().path());
     let entry = entry.find(|path| path.extension().is_some_and(|end| end == "json")).unwrap();
-    let whole = fs::read_to_string(&entry).unwrap();
-    let found = |what: &str| {
+    let original = fs::read_to_string(&entry).unwrap();
+    let found = |expected: &str| {
         let problems = problems(&out);
-        assert!(problems.iter().any(|problem| problem.contains(what)), "{what}: {problems:?}");
+        assert!(problems.iter().any(|problem| problem.contains(expected)), "{expected}: {problems:?}");
     };
-    // A video in two splits is right only by time.
+    // A video in two splits is valid only with splits by time.
     fs::write(out.join("info.json"), info.replace("\"unit\": \"time\"", "\"unit\": \"video\"")).unwrap();
     found("it has samples in several splits, but the dataset is not divided by time");
-    // A gap shorter than stated.
+    // A gap shorter than `guard_secs`.
     let mut wide: serde_json::Value = serde_json::from_str(&info).unwrap();
     wide["split_rule"]["guard_secs"] = 9.0.into();
     fs::write(out.join("info.json"), wide.to_string()).unwrap();
     found("expected at least 9.00 s between splits");
     fs::write(out.join("info.json"), &info).unwrap();
     // A sample outside its block.
-    let mut moved: serde_json::Value = serde_json::from_str(&whole).unwrap();
+    let mut moved: serde_json::Value = serde_json::from_str(&original).unwrap();
     moved["blocks"][0]["split"] = "test".into();
     fs::write(&entry, moved.to_string()).unwrap();
     found("is not in a block of the train split");
     assert!(VideoEntry::read(&entry).is_ok());
-    fs::write(&entry, whole).unwrap();
+    fs::write(&entry, original).unwrap();
     assert_eq!(problems(&out), [""; 0]);
 }
 
 #[test]
-fn a_new_talk_moves_no_block_and_short_clips_fill_splits() {
+fn a_new_video_changes_no_block_and_short_clips_fill_splits() {
     let dir = tempfile::tempdir().unwrap();
     let talk = talk(dir.path());
     let (_, first) = shard(dir.path(), std::slice::from_ref(&talk), "first");
-    let place = dir.path().join("work/dataset/host");
-    fs::create_dir_all(place.parent().unwrap()).unwrap();
-    fs::rename(&first, &place).unwrap();
+    let target = dir.path().join("work/dataset/host");
+    fs::create_dir_all(target.parent().unwrap()).unwrap();
+    fs::rename(&first, &target).unwrap();
     let clips: Vec<Unit> = (0..2).map(|n| video(dir.path(), &format!("clip{n}"), 300, 10 + n)).collect();
     let (report, out) = shard(dir.path(), &[talk, clips[0].clone(), clips[1].clone()], "second");
     assert!(report.unwrap().line.contains("1 video reused unchanged"));
@@ -172,21 +172,21 @@ fn a_new_talk_moves_no_block_and_short_clips_fill_splits() {
     assert!(of("talk.mp4").split.is_none() && of("talk.mp4").blocks.len() == 3);
     assert!(of("clip0.mp4").split.is_some() && of("clip1.mp4").split.is_some());
 
-    // One short video alone is divided as far as it goes; a shorter one trains.
-    let alone = tempfile::tempdir().unwrap();
-    let (report, out) = shard(alone.path(), &[video(alone.path(), "minute", 900, 5)], "minute");
+    // A single short video is divided as far as possible; a shorter one is used for training.
+    let single = tempfile::tempdir().unwrap();
+    let (report, out) = shard(single.path(), &[video(single.path(), "minute", 900, 5)], "minute");
     assert!(!report.unwrap().line.contains("warning"));
     assert_eq!(Dataset::open(&out).unwrap().info().splits.values().filter(|split| split.samples > 0).count(), 3);
-    let alone = tempfile::tempdir().unwrap();
-    let (report, out) = shard(alone.path(), &[video(alone.path(), "short", 150, 5)], "short");
+    let single = tempfile::tempdir().unwrap();
+    let (report, out) = shard(single.path(), &[video(single.path(), "short", 150, 5)], "short");
     assert!(report.unwrap().line.contains("no sample in the test split: too little footage was accepted"));
     assert_eq!(Dataset::open(&out).unwrap().info().splits["train"].samples, 2);
 }
 
 #[test]
-fn sound_that_two_talks_share_is_never_in_two_splits() {
+fn audio_shared_by_two_videos_is_never_in_two_splits() {
     let dir = tempfile::tempdir().unwrap();
-    // A re-upload that is shorter: the same sound from the beginning on, divided elsewhere.
+    // A shorter re-upload: the same audio from the beginning, with other block boundaries.
     let (talk, copy) = (talk(dir.path()), video_with(dir.path(), "copy", 6_000, 2, 1));
     let (report, out) = shard(dir.path(), &[talk.clone(), copy.clone()], "out");
     let line = report.unwrap().line;
@@ -198,7 +198,7 @@ fn sound_that_two_talks_share_is_never_in_two_splits() {
     let dataset = Dataset::open(&out).unwrap();
     assert!(dataset.stats().footage.refused_secs["duplicate"] > 5.0);
     assert!(dataset.info().videos.iter().all(|video| video.samples > 0));
-    // A split named in the configuration holds for the whole video, and the leak is said.
+    // A split named in the configuration applies to the complete video.
     let named = tempfile::tempdir().unwrap();
     assert_eq!(settings(named.path()).dataset.split_by, SplitUnit::Auto);
     let talk = made_video(named.path(), "talk", TALK, (1, 1), 600, |_, _| ());

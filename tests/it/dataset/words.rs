@@ -1,5 +1,5 @@
-//! Words of transcripts in datasets: each in one sample or counted, checked, imported, forgotten; what is wrong with a
-//! transcript is said and costs no video.
+//! Words of transcripts in datasets: assigned to a sample or counted, verified, imported, forgotten; transcript errors
+//! are reported and exclude no video.
 
 use crate::fixtures::media::lifted_videos::{settings, shard_with_words, video};
 use orator_base::stage::Unit;
@@ -20,13 +20,13 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// Subtitles of a cue a second, each of one word.
+/// Subtitles with one cue of one word per second.
 fn srt(n_words: usize, word: &str) -> String {
     let time = |secs: usize| format!("{:02}:{:02}:{:02},000", secs / 3600, secs / 60 % 60, secs % 60);
     (0..n_words).map(|n| format!("{}\n{} --> {}\n{word}{n}\n\n", n + 1, time(n), time(n + 1))).collect()
 }
 
-/// Two videos of 20 s, and their datasets with these transcripts.
+/// Two videos of 20 s.
 struct TwoTalks {
     dir: tempfile::TempDir,
     videos: [Unit; 2],
@@ -39,7 +39,7 @@ impl TwoTalks {
         Self { dir, videos }
     }
 
-    /// Dataset, with the report's line.
+    /// Writes a dataset with the transcripts (name, content) of the videos; returns its report line and folder.
     fn dataset(&self, transcripts: [Option<(&str, &[u8])>; 2], out: &str) -> (String, PathBuf) {
         let written = self.videos.iter().zip(transcripts).filter_map(|(unit, transcript)| {
             let (name, bytes) = transcript?;
@@ -63,31 +63,31 @@ fn words(dir: &Path) -> BTreeMap<String, Option<Vec<Word>>> {
     samples.into_iter().map(|sample| (sample.key.to_string(), dataset.read(&sample).unwrap().words)).collect()
 }
 
-fn account(dir: &Path, name: &str) -> TranscriptReport {
+fn transcript_report(dir: &Path, name: &str) -> TranscriptReport {
     let lines = read_ledgers(dir).unwrap().into_iter();
     lines.filter(|line| line.file.starts_with(name)).find_map(|line| line.ledger.words).unwrap()
 }
 
 #[test]
-fn every_word_lies_in_one_sample_or_is_counted() {
+fn every_word_is_in_one_sample_or_counted() {
     let talks = TwoTalks::new();
     let (first, second) = (srt(20, "alpha"), srt(18, "omega"));
     let (line, out) = talks.dataset([Some(("a.srt", first.as_bytes())), Some(("b.vtt", second.as_bytes()))], "out");
     assert!(line.contains("38 of 38 words"), "{line}");
-    let said = words(&out);
-    assert_eq!(said.len(), 4, "two intervals of each video");
-    let all: Vec<&Word> = said.values().flatten().flatten().collect();
+    let by_sample = words(&out);
+    assert_eq!(by_sample.len(), 4, "two intervals of each video");
+    let all: Vec<&Word> = by_sample.values().flatten().flatten().collect();
     let names: BTreeSet<&str> = all.iter().map(|word| word.word.as_str()).collect();
     assert_eq!((all.len(), names.len()), (38, 38));
     assert!(all.iter().all(|word| word.start_secs >= 0.0 && word.end_secs <= 10.0 + 1e-6));
     let expected = WordCount { n_words: 20, n_kept: 20, n_refused: 0, n_outside: 0 };
-    assert_eq!(account(&out, "first").count, expected);
+    assert_eq!(transcript_report(&out, "first").count, expected);
     let info = Dataset::open(&out).unwrap();
     assert!(info.info().members.contains_key("words.json"));
     assert_eq!(info.stats().footage.words.unwrap().n_kept, 38);
     drop(info);
 
-    // The shards by themselves give the same words.
+    // Importing only the shards gives the same words.
     let tars: Vec<PathBuf> = files_under(&out).into_iter().map(|(_, path)| path).collect();
     let tars = tars.into_iter().filter(|path| path.extension().is_some_and(|ending| ending == "tar")).collect();
     let fps = FrameRate::new(15, 1);
@@ -102,20 +102,21 @@ fn every_word_lies_in_one_sample_or_is_counted() {
     fs::create_dir(&imported).unwrap();
     import(&plan, &imported, &Silent).unwrap();
     assert_eq!(verify(&imported, true, &Silent).unwrap().problems, []);
-    assert_eq!(words(&imported), said);
+    assert_eq!(words(&imported), by_sample);
 
-    // A forgotten video leaves none of its words.
-    let gone = said.keys().find(|key| key.starts_with("first")).unwrap().rsplit_once('-').unwrap().0.to_owned();
-    without(&out, &BTreeSet::from([gone])).unwrap();
+    // Forgetting a video removes its words.
+    let forgotten =
+        by_sample.keys().find(|key| key.starts_with("first")).unwrap().rsplit_once('-').unwrap().0.to_owned();
+    without(&out, &BTreeSet::from([forgotten])).unwrap();
     assert_eq!(verify(&out, true, &Silent).unwrap().problems, []);
-    let holds = |word: &str| {
+    let is_stored = |word: &str| {
         files_under(&out).into_iter().any(|(_, path)| String::from_utf8_lossy(&fs::read(path).unwrap()).contains(word))
     };
-    assert!(!holds("alpha") && !holds("a.srt") && holds("omega"));
+    assert!(!is_stored("alpha") && !is_stored("a.srt") && is_stored("omega"));
 }
 
 #[test]
-fn a_dataset_without_transcripts_has_no_trace_of_words() {
+fn a_dataset_without_transcripts_does_not_mention_words() {
     let talks = TwoTalks::new();
     let (_, out) = talks.dataset([None, None], "out");
     assert!(words(&out).values().all(Option::is_none));
@@ -125,12 +126,12 @@ fn a_dataset_without_transcripts_has_no_trace_of_words() {
 }
 
 #[test]
-fn what_is_wrong_with_a_transcript_is_said_and_costs_no_video() {
+fn transcript_errors_are_reported_and_exclude_no_video() {
     let talks = TwoTalks::new();
     let good = srt(20, "so");
     let many: String =
         (0..100_000).map(|n| format!("{}\t{}\tso\n", f64::from(n) / 5000.0, f64::from(n) / 5000.0)).collect();
-    for (name, bytes, said) in [
+    for (name, bytes, expected) in [
         ("other.srt", srt(40, "so").into_bytes(), "20 of 40 words lie after the end of the sound (20.00 s"),
         ("late.srt", srt(21, "so").into_bytes(), "1 of 21 words lie after the end of the sound and were left out"),
         ("empty.srt", Vec::new(), "the transcript holds no word"),
@@ -143,11 +144,11 @@ fn what_is_wrong_with_a_transcript_is_said_and_costs_no_video() {
     ] {
         let (line, out) =
             talks.dataset([Some(("good.srt", good.as_bytes())), Some((name, &bytes))], &format!("out-{name}"));
-        assert!(line.contains(said), "{name}: {line}");
-        let of_second = account(&out, "second");
+        assert!(line.contains(expected), "{name}: {line}");
+        let of_second = transcript_report(&out, "second");
         assert_eq!((of_second.file.as_deref(), of_second.count.is_whole()), (Some(name), true));
-        assert_eq!(account(&out, "first").count.n_kept, 20);
-        assert!(words(&out).values().all(Option::is_some), "{name}: readers find one form");
+        assert_eq!(transcript_report(&out, "first").count.n_kept, 20);
+        assert!(words(&out).values().all(Option::is_some), "{name}: samples have word lists");
         assert!(!of_second.notes.iter().any(|note| note.contains(talks.dir.path().to_str().unwrap())));
     }
     let (line, _) = talks.dataset([Some(("good.srt", good.as_bytes())), None], "one");
@@ -155,7 +156,7 @@ fn what_is_wrong_with_a_transcript_is_said_and_costs_no_video() {
 }
 
 #[test]
-fn a_wrong_count_of_words_is_found() {
+fn an_invalid_word_count_is_detected() {
     let talks = TwoTalks::new();
     let (_, out) = talks.dataset([Some(("a.srt", srt(20, "so").as_bytes())), None], "out");
     let entry =
@@ -164,6 +165,6 @@ fn a_wrong_count_of_words_is_found() {
     let text = fs::read_to_string(&path).unwrap();
     fs::write(&path, text.replace("\"n_kept\": 20", "\"n_kept\": 19")).unwrap();
     let found = verify(&out, true, &Silent).unwrap().problems;
-    let said = |what: &str| found.iter().any(|problem| problem.file == name && problem.message.contains(what));
-    assert!(said("account for every word") && said("counts 19 words in samples, the samples contain 20"), "{found:?}");
+    let has = |message: &str| found.iter().any(|problem| problem.file == name && problem.message.contains(message));
+    assert!(has("account for every word") && has("counts 19 words in samples, the samples contain 20"), "{found:?}");
 }

@@ -1,6 +1,6 @@
-//! Simulated evaluations with known truth: how often a verdict is false where nothing differs, and how often a clear
-//! difference is found. Errors are first-order autoregressions. 300 evaluations of one setting; `ORATOR_LONG` makes them
-//! 2,000 of each.
+//! Simulated evaluations with known truth: the rate of false conclusions where nothing differs, and the rate at which a
+//! clear difference is detected. Errors are first-order autoregressions. 300 evaluations of one setting; `ORATOR_LONG`
+//! runs 2,000 of each.
 
 use orator_gesture::evaluate::table::block_length::BlockLength;
 use orator_gesture::evaluate::table::jackknife::BlockGroups;
@@ -12,7 +12,7 @@ use rand_distr::StandardNormal;
 use rayon::prelude::*;
 use statrs::distribution::{Beta, ContinuousCDF};
 
-/// Motion of an evaluation.
+/// Clips and errors of a simulated evaluation.
 #[derive(Clone, Copy, Debug)]
 struct Setting {
     fps: f64,
@@ -20,12 +20,12 @@ struct Setting {
     clips: &'static [f64],
     /// Integrated autocorrelation time of the errors, seconds.
     time: f64,
-    /// Metrics that vote together, correlated by 1/2.
+    /// Number of metrics tested together, with a correlation of 1/2.
     n_metrics: usize,
 }
 
 const CLIPS: [&[f64]; 5] = [&[20.0], &[30.0], &[60.0], &[5.0; 8], &[10.0, 20.0, 7.0, 12.0]];
-/// Times found in real motion: of the errors of mean poses of speakers 0.4 to 1.6 s for three clips of four.
+/// Autocorrelation times, seconds, as in real motion: 0.4 to 1.6 s for the errors of mean poses in three of four clips.
 const TIMES: [f64; 4] = [0.4, 0.8, 1.2, 1.6];
 
 impl Setting {
@@ -47,9 +47,9 @@ impl Setting {
         self.clips.iter().map(&mut clip).collect()
     }
 
-    /// Whether a verdict is given on metrics whose differences have mean `shift` and standard deviation `deviation`;
+    /// Whether a difference is found in metrics whose differences have mean `shift` and standard deviation `deviation`;
     /// `None` where there are too few blocks.
-    fn verdict(&self, seed: u64, shift: f64, deviation: f64) -> Option<bool> {
+    fn conclusion(&self, seed: u64, shift: f64, deviation: f64) -> Option<bool> {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let mut all = vec![self.noise(&mut rng)];
         for _ in 1..self.n_metrics {
@@ -91,10 +91,11 @@ impl Setting {
         (groups.len() >= sign_flips::MIN_BLOCKS).then(|| tested.iter().any(|metric| metric.p <= LEVEL))
     }
 
-    /// Number of verdicts, and of evaluations with too few blocks.
+    /// Number of conclusions, and of evaluations with too few blocks.
     fn counts(&self, n: u64, shift: f64, deviation: f64) -> (u64, u64) {
-        let all: Vec<Option<bool>> = (0..n).into_par_iter().map(|seed| self.verdict(seed, shift, deviation)).collect();
-        let count = |wanted: Option<bool>| all.iter().filter(|found| **found == wanted).count() as u64;
+        let all: Vec<Option<bool>> =
+            (0..n).into_par_iter().map(|seed| self.conclusion(seed, shift, deviation)).collect();
+        let count = |expected: Option<bool>| all.iter().filter(|found| **found == expected).count() as u64;
         (count(Some(true)), count(None))
     }
 }
@@ -110,7 +111,7 @@ fn is_long() -> bool {
 }
 
 #[test]
-fn false_verdicts_stay_below_5_percent() {
+fn false_conclusions_stay_below_5_percent() {
     let mut settings = vec![Setting { fps: 15.0, clips: CLIPS[0], time: 0.8, n_metrics: 1 }];
     if is_long() {
         let all = CLIPS.iter().flat_map(|clips| TIMES.map(|time| (*clips, time)));
@@ -122,15 +123,15 @@ fn false_verdicts_stay_below_5_percent() {
     let mut high = Vec::new();
     for setting in settings {
         let (n_false, n_few) = setting.counts(n, 0.0, 1.0);
-        let [low, most] = interval(n_false, n);
+        let [lower, upper] = interval(n_false, n);
         eprintln!(
             "{setting:?}: {n_false} of {n} false, {:.1} % [{:.1}, {:.1}]; too few blocks in {n_few}",
             100.0 * n_false as f64 / n as f64,
-            100.0 * low,
-            100.0 * most
+            100.0 * lower,
+            100.0 * upper
         );
-        // The interval of 300 evaluations is wide.
-        if if is_long() { most > 0.05 } else { low > 0.03 } {
+        // The confidence interval of 300 evaluations is wide.
+        if if is_long() { upper > 0.05 } else { lower > 0.03 } {
             high.push(format!("{setting:?}: {n_false}"));
         }
     }
@@ -140,11 +141,11 @@ fn false_verdicts_stay_below_5_percent() {
 /// Joint errors of 153.8 and 92.7 mm in 7 blocks of 4 s, the first with a bootstrap interval of 139 to 170 mm: block
 /// means have a standard deviation of 15.5 / 1.96 * sqrt(7) * sqrt(7 / 6) = 22.6 mm.
 #[test]
-fn a_clear_difference_is_called_from_20_s() {
+fn a_clear_difference_is_detected_from_20_s() {
     let n = if is_long() { 2000 } else { 200 };
     for time in TIMES {
         let setting = Setting { fps: 15.0, clips: CLIPS[0], time, n_metrics: 1 };
-        // Variance of the mean of 4 s of an autoregression of variance 1.
+        // Variance of the mean over 4 s of an autoregression with variance 1.
         let length = 8.0 / time;
         let variance = 2.0 / length * (1.0 - (1.0 - (-length).exp()) / length);
         let (n_found, n_few) = setting.counts(n, 153.8 - 92.7, 22.6 / variance.sqrt());

@@ -1,4 +1,5 @@
-//! Checkpoints of both trainings in one table, on a dataset of the 49 joints and on imported captures, and what is refused.
+//! Checkpoints of both kinds of training in one table, on a dataset of the 49 joints and on imported captures, and
+//! invalid combinations.
 
 use crate::fixtures::animation::captures::write_capture;
 use crate::fixtures::browser::Browser;
@@ -27,7 +28,7 @@ use serde_json::Value;
 use std::f64::consts::TAU;
 use std::path::Path;
 
-/// A training of a few steps.
+/// Trains for a few steps.
 fn train_sequence(source: TrainingSource, network: SequenceNetwork, out: &Path) {
     let schedule =
         Seq2seqConfig { steps: 4, epoch_steps: 2, checkpoint_every: 2, keep_checkpoints: 2, ..Default::default() };
@@ -42,17 +43,17 @@ fn train_gan(project: &Project, data: &str, out: &str) {
     assert_eq!(answer.code, 0, "{}", answer.errors);
 }
 
-/// Keys of the rows, and the checkpoints that they are of.
+/// Keys of the rows, and their checkpoints.
 fn rows(answer: &ProgramAnswer) -> Vec<(String, String)> {
     let text = |row: &Value, key: &str| row[key].as_str().unwrap_or_default().to_owned();
     let rows = answer.json["predictors"].as_array().unwrap();
     rows.iter().map(|row| (text(row, "name"), text(row, "checkpoint"))).collect()
 }
 
-fn value(answer: &ProgramAnswer, name: &str, part: &str, who: &str) -> Option<f64> {
+fn value(answer: &ProgramAnswer, name: &str, part: &str, key: &str) -> Option<f64> {
     let metrics = answer.json["metrics"].as_array().unwrap();
     let metric = metrics.iter().find(|metric| metric["name"] == name && metric["part"] == part);
-    metric.unwrap()["values"][who]["value"].as_f64()
+    metric.unwrap()["values"][key]["value"].as_f64()
 }
 
 fn notes(answer: &ProgramAnswer) -> String {
@@ -61,7 +62,7 @@ fn notes(answer: &ProgramAnswer) -> String {
 }
 
 #[test]
-fn networks_of_both_trainings_stand_in_one_table() {
+fn networks_of_both_trainings_are_evaluated_in_one_table() {
     let project = Project::with_clips("several", 0, 1.0);
     let data = dataset(&project.dir().join("data"));
     train_gan(&project, "data", "gan");
@@ -87,28 +88,28 @@ fn networks_of_both_trainings_stand_in_one_table() {
         of("truth", ""),
     ];
     assert_eq!(rows(&answer), expected);
-    let error = |who: &str| value(&answer, "mpjpe", "all", who).unwrap();
+    let error = |key: &str| value(&answer, "mpjpe", "all", key).unwrap();
     assert!(error("prediction_2") > 0.0 && error("prediction_2") != error("mismatched_prediction_2"));
     assert!(value(&answer, "mpjpe", "hands", "prediction_3").is_some());
     let conclusions = answer.json["conclusions"].as_array().unwrap();
     let of: Vec<&str> = conclusions.iter().map(|conclusion| conclusion["predictor"].as_str().unwrap()).collect();
     assert_eq!(of, ["prediction", "prediction_2", "prediction_3"]);
     assert_eq!(conclusions[0]["depends_on_audio"], answer.json["depends_on_audio"]);
-    // the GAN's figures are those of the GAN alone
-    let alone = project.answer(&["evaluate", "--dataset", "data", "--checkpoint", "gan"]);
-    assert_eq!(alone.json["truth"], answer.json["truth"]);
-    assert!(alone.json["conclusions"].is_null() && alone.json["predictors"][0]["checkpoint"].is_null());
+    // The metrics of the GAN equal those of an evaluation of the GAN only.
+    let single = project.answer(&["evaluate", "--dataset", "data", "--checkpoint", "gan"]);
+    assert_eq!(single.json["truth"], answer.json["truth"]);
+    assert!(single.json["conclusions"].is_null() && single.json["predictors"][0]["checkpoint"].is_null());
     let metrics = |answer: &ProgramAnswer| answer.json["metrics"].as_array().unwrap().clone();
-    for (one, several) in metrics(&alone).iter().zip(metrics(&answer)) {
-        for who in ["prediction", "mismatched_prediction", "nearest_neighbour"] {
-            // Intervals differ, and the rounding of sums: all rows of a table share blocks, as long as the slowest of its
-            // errors needs.
-            let value = |metric: &Value| metric["values"][who]["value"].as_f64();
+    for (one, several) in metrics(&single).iter().zip(metrics(&answer)) {
+        for key in ["prediction", "mismatched_prediction", "nearest_neighbour"] {
+            // Intervals and the rounding of sums differ: all rows of a table share blocks, with the length required by
+            // the slowest of its errors.
+            let value = |metric: &Value| metric["values"][key]["value"].as_f64();
             let is_same = match (value(one), value(&several)) {
                 (Some(one), Some(several)) => (one - several).abs() <= 1e-6 * (1.0 + one.abs()),
                 (one, several) => one == several,
             };
-            assert!(is_same, "{} {who}", one["plain_name"]);
+            assert!(is_same, "{} {key}", one["plain_name"]);
         }
     }
     let genea = project.answer(&[&several[..], &["--convention", "genea"]].concat());
@@ -136,27 +137,27 @@ fn networks_of_both_trainings_stand_in_one_table() {
     assert!(fails(&["gan", "other.safetensors"]).contains("other.safetensors"));
 }
 
-/// Take of a capture as a sample of a dataset at `FPS`.
+/// A capture as a sample of a dataset at `FPS`.
 fn imported(dir: &Path, name: &str) -> Sample {
     let file = |ending: &str| Some(dir.join(format!("{name}.{ending}"))).filter(|path| path.exists());
     let [motion, sound, transcript] = ["bvh", "wav", "tsv"].map(file);
     let files = TakeFiles { kind: MotionKind::Bvh, motion: motion.unwrap(), sound, transcript };
     let limits = TakeLimits { fps: FPS, min_frames: 30, max_difference_secs: 0.5, no_sound: false };
     match ImportedTake::read(&files, &limits).unwrap().outcome {
-        TakeOutcome::Accepted(kept) => kept.sample,
-        TakeOutcome::Rejected(refusal) => panic!("{refusal:?}"),
+        TakeOutcome::Accepted(accepted) => accepted.sample,
+        TakeOutcome::Rejected(rejection) => panic!("{rejection:?}"),
     }
 }
 
 #[test]
-fn captured_skeletons_are_measured_beside_the_gan_on_the_joints_of_both() {
+fn captured_skeletons_and_the_gan_are_evaluated_on_common_joints() {
     let project = Project::with_clips("captured", 0, 1.0);
-    let (captures, loud) = (project.dir().join("captures"), project.dir().join("loud"));
+    let (captures, at_48_khz) = (project.dir().join("captures"), project.dir().join("loud"));
     for (name, secs, phase) in [("a", 9.0, 0.0), ("b", 9.0, 2.0), ("c", 14.0, 4.0)] {
         write_capture(&captures, name, secs, phase, true);
-        write_capture(&loud, name, secs, phase, false);
+        write_capture(&at_48_khz, name, secs, phase, false);
         let sound = audio::read_mono(&captures.join(format!("{name}.wav")), 48_000).unwrap().unwrap();
-        wav::write(&loud.join(format!("{name}.wav")), &sound).unwrap();
+        wav::write(&at_48_khz.join(format!("{name}.wav")), &sound).unwrap();
     }
     let take = |split, name: &str| (split, imported(&captures, name));
     let samples = [take(Split::Train, "a"), take(Split::Train, "b"), take(Split::Validation, "c")];
@@ -164,7 +165,7 @@ fn captured_skeletons_are_measured_beside_the_gan_on_the_joints_of_both() {
     let data = project.dir().join("data");
     write_dataset(&data, "host", FPS, &samples).unwrap();
     for (dir, network, out) in
-        [(&captures, SequenceNetwork::Words, "spoken"), (&loud, SequenceNetwork::Contextual, "heard")]
+        [(&captures, SequenceNetwork::Words, "spoken"), (&at_48_khz, SequenceNetwork::Contextual, "heard")]
     {
         let captures = CaptureFolder::open(dir, &["c".to_owned()], JointMapping::default()).unwrap();
         train_sequence(TrainingSource::Captures(&captures), network, &project.dir().join(out));
@@ -176,37 +177,37 @@ fn captured_skeletons_are_measured_beside_the_gan_on_the_joints_of_both() {
         answer
     };
     let answer = measure(&["gan", "spoken", "heard"]);
-    let said = notes(&answer);
+    let text = notes(&answer);
     assert!(
-        said.contains("8 joints of 48; left out: 40 finger joints") && said.contains("100.0 % of the frames"),
-        "{said}"
+        text.contains("8 joints of 48; left out: 40 finger joints") && text.contains("100.0 % of the frames"),
+        "{text}"
     );
-    assert!(said.contains("seq2seq words was trained on the captures captures"), "{said}");
-    assert!(said.contains("the motion of seq2seq words was resampled from 20 fps to 15 fps"), "{said}");
-    assert!(said.contains("seq2seq contextual was trained on audio at 48000 Hz"), "{said}");
-    assert!(!said.contains("has none"), "{said}");
-    let body = |name: &str, who: &str| value(&answer, name, "body", who);
-    for who in
+    assert!(text.contains("seq2seq words was trained on the captures captures"), "{text}");
+    assert!(text.contains("the motion of seq2seq words was resampled from 20 fps to 15 fps"), "{text}");
+    assert!(text.contains("seq2seq contextual was trained on audio at 48000 Hz"), "{text}");
+    assert!(!text.contains("has none"), "{text}");
+    let body = |name: &str, row: &str| value(&answer, name, "body", row);
+    for row in
         ["prediction", "prediction_2", "prediction_3", "mean_pose", "nearest_neighbour", "mismatched_prediction_2"]
     {
-        assert!(body("mpjpe", who).unwrap() > 0.0, "{who}");
-        assert_eq!(value(&answer, "mpjpe", "hands", who), None, "{who}");
-        assert!(body("frechet_pose", who).is_some());
+        assert!(body("mpjpe", row).unwrap() > 0.0, "{row}");
+        assert_eq!(value(&answer, "mpjpe", "hands", row), None, "{row}");
+        assert!(body("frechet_pose", row).is_some());
     }
-    // hardly trained networks stay near the mean of their captures, in the axes of the import
-    for who in ["prediction_2", "prediction_3"] {
-        let [own, mean] = [who, "mean_pose"].map(|who| body("mpjpe", who).unwrap());
-        assert!(own < 1.5 * mean, "{who}: {own}, mean pose {mean}");
+    // Networks after a few steps are near the mean of their captures, in the axes of the import.
+    for row in ["prediction_2", "prediction_3"] {
+        let [own, mean] = [row, "mean_pose"].map(|row| body("mpjpe", row).unwrap());
+        assert!(own < 1.5 * mean, "{row}: {own}, mean pose {mean}");
     }
     assert_ne!(body("mpjpe", "prediction_2"), body("mpjpe", "mismatched_prediction_2"));
-    // numbers of whole poses are of the arms
+    // Metrics of complete poses cover the body part only.
     let genea = measure(&["spoken", "--convention", "genea", "--report", "page.html"]);
     for name in ["hellinger_speed", "cca"] {
         assert!(value(&genea, name, "body", "mismatched_prediction").is_some(), "{name}");
     }
     assert!(rows(&genea).iter().all(|(_, checkpoint)| checkpoint.is_empty()));
 
-    // a dataset without words, at another rate than the GAN's
+    // A dataset without words.
     let silent: Vec<(Split, Sample)> =
         samples.into_iter().map(|(split, sample)| (split, Sample { words: None, ..sample })).collect();
     write_dataset(&project.dir().join("silent"), "host", FPS, &silent).unwrap();
@@ -215,28 +216,28 @@ fn captured_skeletons_are_measured_beside_the_gan_on_the_joints_of_both() {
 }
 
 #[test]
-fn a_captured_motion_comes_back_as_it_is_imported() {
+fn a_captured_motion_round_trips_as_it_is_imported() {
     let folder = tempfile::tempdir().unwrap();
     write_capture(folder.path(), "a", 9.0, 1.0, false);
     let expected = imported(folder.path(), "a").motion;
     let read = || Bvh::read(&folder.path().join("a.bvh")).unwrap();
     let maps = ExponentialMaps::of([Ok(("a".to_owned(), read()))], &JointMapping::default()).unwrap();
     let text = maps.to_bvh(maps.features(&read()).unwrap().view());
-    let mut made = resample::at_rate(&bvh::from_text(&text).unwrap().motion, FPS);
-    bones::with_lengths(&mut made, &bones::measure(&expected));
-    // metres; the ends aside, where the two resamplings have other neighbours
+    let mut resampled = resample::at_rate(&bvh::from_text(&text).unwrap().motion, FPS);
+    bones::with_lengths(&mut resampled, &bones::measure(&expected));
+    // Metres, except at the ends, where the two resamplings have different neighbours.
     let mut worst = 0.0f32;
-    for t in 10..made.n_frames() - 10 {
+    for t in 10..resampled.n_frames() - 10 {
         for joint in 0..=L_HAND {
-            let apart = |k: usize| (made.joints[[t, joint, k]] - expected.joints[[t, joint, k]]).powi(2);
-            worst = worst.max((0..3).map(apart).sum::<f32>().sqrt());
+            let difference = |k: usize| (resampled.joints[[t, joint, k]] - expected.joints[[t, joint, k]]).powi(2);
+            worst = worst.max((0..3).map(difference).sum::<f32>().sqrt());
         }
     }
-    assert!(made.n_frames() + 2 >= expected.n_frames() && worst < 0.01, "{worst} m");
+    assert!(resampled.n_frames() + 2 >= expected.n_frames() && worst < 0.01, "{worst} m");
 }
 
 #[test]
-fn a_dataset_of_another_rate_than_the_speakers_is_refused() {
+fn a_dataset_at_another_rate_than_the_speaker_is_rejected() {
     let project = Project::with_clips("rates", 0, 1.0);
     let data = dataset(&project.dir().join("data"));
     train_sequence(TrainingSource::Dataset(&data), SequenceNetwork::Words, &project.dir().join("words"));
@@ -254,17 +255,17 @@ fn a_dataset_of_another_rate_than_the_speakers_is_refused() {
 }
 
 #[test]
-fn a_sound_at_another_rate_is_the_same_sound() {
+fn resampled_audio_has_the_same_waveform() {
     let tone = |rate: u32| {
         let sample = |i: u32| (0.4 * (TAU * 440.0 * f64::from(i) / f64::from(rate)).sin()) as f32;
         Sound { rate, samples: (0..rate).map(sample).collect() }
     };
     for (from, to) in [(16_000, 48_000), (48_000, 16_000), (16_000, 44_100), (16_000, 16_000)] {
-        let made = audio::at_rate(&tone(from), to).unwrap();
+        let resampled = audio::at_rate(&tone(from), to).unwrap();
         let expected = tone(to);
-        assert_eq!((made.rate, made.samples.len()), (to, expected.samples.len()));
+        assert_eq!((resampled.rate, resampled.samples.len()), (to, expected.samples.len()));
         let middle = to as usize / 10..to as usize * 9 / 10;
-        let apart = middle.map(|i| (made.samples[i] - expected.samples[i]).abs()).fold(0.0, f32::max);
-        assert!(apart < 1e-3, "{from} to {to}: {apart}");
+        let difference = middle.map(|i| (resampled.samples[i] - expected.samples[i]).abs()).fold(0.0, f32::max);
+        assert!(difference < 1e-3, "{from} to {to}: {difference}");
     }
 }

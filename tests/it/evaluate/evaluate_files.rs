@@ -1,5 +1,5 @@
-//! `orator evaluate --truth --prediction`: what it measures on files, what it says of bad ones, and that only what is
-//! comparable is compared.
+//! `orator evaluate --truth --prediction`: metrics of files, errors and notes for invalid ones, and comparisons limited
+//! to comparable values.
 
 use crate::fixtures::motion_folders::{folders, spoken, write_npy};
 use ndarray::{Array3, s};
@@ -13,17 +13,17 @@ use serde_json::Value;
 use std::fs::{self, File};
 use std::path::{Path, PathBuf};
 
-/// A convention of one figure, which is soon measured.
+/// A convention with one metric, which is fast.
 const SMALL: [&str; 2] = ["--convention", "speech2gesture"];
 
-fn value(answer: &ProgramAnswer, name: &str, part: &str, who: &str) -> f64 {
+fn value(answer: &ProgramAnswer, name: &str, part: &str, row: &str) -> f64 {
     let metrics = answer.json["metrics"].as_array().unwrap();
-    let is_it = |metric: &&Value| metric["name"] == name && metric["part"] == part;
-    metrics.iter().find(is_it).unwrap()["values"][who]["value"].as_f64().unwrap()
+    let matches = |metric: &&Value| metric["name"] == name && metric["part"] == part;
+    metrics.iter().find(matches).unwrap()["values"][row]["value"].as_f64().unwrap()
 }
 
 #[test]
-fn folders_are_measured_with_all_that_defends_the_figures() {
+fn folders_are_evaluated_with_baselines_and_intervals() {
     let project = Project::with_clips("judged", 0, 1.0);
     folders(project.dir(), &[24, 20]);
     let args = ["evaluate", "--truth", "truth", "--prediction", "prediction", "--audio", "audio"];
@@ -31,16 +31,16 @@ fn folders_are_measured_with_all_that_defends_the_figures() {
     assert_eq!(answer.code, 0, "{}", answer.errors);
     let result = &answer.json;
     assert_eq!((&result["n_clips"], &result["fps"]["num"]), (&2.into(), &15.into()));
-    // 44 s: blocks of a sixteenth, or longer where the errors forget slowly
+    // 44 s: blocks of a sixteenth, or longer for slowly decorrelating errors.
     let [n_blocks, secs, slow] =
         ["n_blocks", "block_secs", "decorrelation_secs"].map(|key| result[key].as_f64().unwrap());
     assert!((7.0..=16.0).contains(&n_blocks) && secs >= 2.75 && secs >= 1.5 * slow, "{n_blocks} {secs} {slow}");
-    for who in
+    for row in
         ["prediction", "mean_pose", "median_pose", "nearest_neighbour", "mismatched_prediction", "mismatched_truth"]
     {
-        let metric = &result["metrics"][0]["values"][who];
+        let metric = &result["metrics"][0]["values"][row];
         let [low, value, high] = ["low", "value", "high"].map(|key| metric[key].as_f64().unwrap());
-        assert!(low <= value && value <= high, "{who}: {metric}");
+        assert!(low <= value && value <= high, "{row}: {metric}");
     }
     assert_eq!((value(&answer, "pck_3d", "all", "truth"), value(&answer, "mpjpe", "all", "truth")), (1.0, 0.0));
     assert!(value(&answer, "frechet_pose", "all", "truth") < 1e-3);
@@ -60,7 +60,7 @@ fn folders_are_measured_with_all_that_defends_the_figures() {
         let [low, high] = ["low", "high"].map(|key| vote["gain"][key].as_f64().unwrap());
         assert_eq!(low > 0.0 || high < 0.0, is_called, "{vote}");
     }
-    // the same bytes again, with one thread too
+    // One thread gives the same result.
     let again = std::process::Command::new(env!("CARGO_BIN_EXE_orator"))
         .current_dir(project.dir())
         .env("RAYON_NUM_THREADS", "1")
@@ -72,7 +72,7 @@ fn folders_are_measured_with_all_that_defends_the_figures() {
 }
 
 #[test]
-fn only_values_of_one_hash_are_compared() {
+fn only_values_with_equal_hashes_are_compared() {
     let project = Project::with_clips("compared", 0, 1.0);
     folders(project.dir(), &[8]);
     let save = |name: &str, more: &[&str]| {
@@ -86,21 +86,21 @@ fn only_values_of_one_hash_are_compared() {
     save("c.json", &["--input-fps", "30"]);
     let same = project.answer(&["evaluate", "compare", "a.json", "b.json"]);
     assert_eq!(same.code, 0, "{}", same.errors);
-    let of = |answer: &ProgramAnswer, what: &str| answer.json["compared"][what].as_array().unwrap().clone();
+    let of = |answer: &ProgramAnswer, key: &str| answer.json["compared"][key].as_array().unwrap().clone();
     assert!(!of(&same, "pairs").is_empty() && of(&same, "rejected").is_empty());
     assert!(of(&same, "only_in_a").iter().all(|name| name.as_str().unwrap().contains("at 0.1")));
     let other = project.answer(&["evaluate", "compare", "a.json", "c.json"]);
     assert_eq!(other.code, 1, "{}", other.errors);
-    let refused = of(&other, "rejected");
-    let said = refused.iter().find(|said| said.as_str().unwrap().starts_with("pck_2d (all)")).unwrap();
-    assert!(said.as_str().unwrap().contains("fps is 15.0 in A and 30.0 in B"), "{said}");
+    let rejected = of(&other, "rejected");
+    let reason = rejected.iter().find(|reason| reason.as_str().unwrap().starts_with("pck_2d (all)")).unwrap();
+    assert!(reason.as_str().unwrap().contains("fps is 15.0 in A and 30.0 in B"), "{reason}");
     fs::write(project.dir().join("d.json"), "{}").unwrap();
-    let wrong = project.answer(&["evaluate", "compare", "a.json", "d.json"]);
-    assert!(wrong.code == 1 && wrong.errors.contains("is not an evaluation result"), "{}", wrong.errors);
+    let invalid = project.answer(&["evaluate", "compare", "a.json", "d.json"]);
+    assert!(invalid.code == 1 && invalid.errors.contains("is not an evaluation result"), "{}", invalid.errors);
 }
 
 #[test]
-fn what_stands_still_or_is_out_of_step_is_not_praised() {
+fn static_or_late_motion_is_not_rated_as_better() {
     let project = Project::with_clips("praised", 0, 1.0);
     folders(project.dir(), &[24, 20]);
     for (number, secs) in [(0, 24), (1, 20)] {
@@ -111,11 +111,11 @@ fn what_stands_still_or_is_out_of_step_is_not_praised() {
         let late = Array3::from_shape_fn(real.dim(), |(t, j, k)| real[[(t + n / 3) % n, j, k]]);
         write_npy(&project.dir().join(format!("late/{number}.npy")), &late);
     }
-    for made in ["still", "late"] {
-        let answer = project.answer(&[&["evaluate", "--truth", "truth", "--prediction", made], &SMALL[..]].concat());
+    for kind in ["still", "late"] {
+        let answer = project.answer(&[&["evaluate", "--truth", "truth", "--prediction", kind], &SMALL[..]].concat());
         assert_eq!(answer.code, 0, "{}", answer.errors);
-        assert_ne!(answer.json["better_than_constant_pose"]["word"], "yes", "{made}");
-        assert_ne!(answer.json["depends_on_audio"]["word"], "yes", "{made}: {}", answer.json["depends_on_audio"]);
+        assert_ne!(answer.json["better_than_constant_pose"]["word"], "yes", "{kind}");
+        assert_ne!(answer.json["depends_on_audio"]["word"], "yes", "{kind}: {}", answer.json["depends_on_audio"]);
         assert!(value(&answer, "pck_2d", "all", "late_prediction") > 0.0);
     }
     let args = ["evaluate", "--truth", "truth", "--prediction", "late", "--report", "truth/0.npy"];
@@ -123,11 +123,11 @@ fn what_stands_still_or_is_out_of_step_is_not_praised() {
     assert!(answer.code == 1 && answer.errors.contains("ends in .html"), "{}", answer.errors);
 }
 
-/// A project with a clip of 8 s, and files that are not as they should be.
-fn bad_files() -> Project {
+/// A project with a clip of 8 s, and invalid or unusual files.
+fn unusual_files() -> Project {
     let project = Project::with_clips("bad-motion", 0, 1.0);
     let clip = spoken(0, 8);
-    let (motion, sound, made) = (clip.motion(), clip.sound(), clip.predictable().joints);
+    let (motion, sound, predicted) = (clip.motion(), clip.sound(), clip.predictable().joints);
     let at = |name: &str| project.dir().join(name);
     let joints = &motion.joints;
     write_npy(&at("t.npy"), joints);
@@ -135,15 +135,15 @@ fn bad_files() -> Project {
     write_npy(&at("longer.npy"), &clip_joints(8).slice(s![..114, .., ..]).to_owned());
     write_npy(&at("wrong.npy"), &Array3::zeros((120, 43, 3)));
     write_npy(&at("missing.npy"), &Array3::from_elem((120, 49, 3), f32::NAN));
-    let hole = |n: usize| {
-        let mut holed = made.clone();
+    let with_hole = |n: usize| {
+        let mut holed = predicted.clone();
         holed.slice_mut(s![..n, 20..30, ..]).fill(f32::NAN);
         holed
     };
-    write_npy(&at("few-nan.npy"), &hole(10));
-    write_npy(&at("many-nan.npy"), &hole(110));
-    write_npy(&at("mm.npy"), &(&made * 1000.0));
-    let away = made.mapv(|v| v + 0.5);
+    write_npy(&at("few-nan.npy"), &with_hole(10));
+    write_npy(&at("many-nan.npy"), &with_hole(110));
+    write_npy(&at("mm.npy"), &(&predicted * 1000.0));
+    let away = predicted.mapv(|v| v + 0.5);
     write_npy(&at("away.npy"), &away);
     fs::write(at("empty.npy"), "").unwrap();
     fs::create_dir_all(at("nobody")).unwrap();
@@ -151,9 +151,9 @@ fn bad_files() -> Project {
     write_npy(&at("one/a.npy"), joints);
     fs::create_dir_all(at("other")).unwrap();
     write_npy(&at("other/b.npy"), joints);
-    let slow = FrameRate::new(30, 1);
-    let twice = Array3::from_shape_fn((240, 49, 3), |(t, j, k)| made[[t / 2, j, k]]);
-    joints_npz::write(&at("30.npz"), &Motion::from_joints(slow, twice)).unwrap();
+    let fps = FrameRate::new(30, 1);
+    let doubled = Array3::from_shape_fn((240, 49, 3), |(t, j, k)| predicted[[t / 2, j, k]]);
+    joints_npz::write(&at("30.npz"), &Motion::from_joints(fps, doubled)).unwrap();
     fs::write(at("t.txt"), authors_txt::format(&motion)).unwrap();
     wav::write(&at("t.wav"), &sound).unwrap();
     fs::write(at("none.mp3"), [b"ID3\x03\0\0\0\0\0\x0a".as_slice(), &[0; 10]].concat()).unwrap();
@@ -175,7 +175,7 @@ fn wav(path: &Path, rate: u32, samples: impl Iterator<Item = f32>) {
     wav.finalize().unwrap();
 }
 
-/// Three hours of 44.1 kHz stereo, a hole on the disk.
+/// Writes three silent hours of 44.1 kHz stereo as a sparse file.
 fn silent_hours(path: &Path) {
     let n_bytes = 3 * 3600 * 44_100 * 4u32;
     let head = [
@@ -197,8 +197,8 @@ fn silent_hours(path: &Path) {
 }
 
 #[test]
-fn bad_input_is_refused_in_clear_words() {
-    let project = bad_files();
+fn invalid_input_gives_clear_errors() {
+    let project = unusual_files();
     let cases: [(&[&str], &str); 17] = [
         (&["t.npy", "gone.npy"], "gone.npy does not exist"),
         (&["t.npy", "t.npy"], "give two different motions"),
@@ -218,20 +218,20 @@ fn bad_input_is_refused_in_clear_words() {
         (&["t.npy", "away.npy", "--alpha", "0"], "alpha of PCK"),
         (&["t.npy", "away.npy", "--input-fps", "0"], "expected 1 to 1000 fps"),
     ];
-    for (args, says) in cases {
+    for (args, expected) in cases {
         let (sides, more) = args.split_at(2);
         let args = [&["evaluate", "--truth", sides[0], "--prediction", sides[1]], &SMALL[..], more].concat();
         let answer = project.answer(&args);
         assert_eq!(answer.code, 1, "{args:?}");
-        assert!(answer.errors.contains(says) && !answer.errors.contains("panicked"), "{args:?}: {}", answer.errors);
+        assert!(answer.errors.contains(expected) && !answer.errors.contains("panicked"), "{args:?}: {}", answer.errors);
     }
-    let nothing = project.answer(&["evaluate"]);
-    assert!(nothing.code == 1 && nothing.errors.contains("give --truth and --prediction"), "{}", nothing.errors);
+    let empty = project.answer(&["evaluate"]);
+    assert!(empty.code == 1 && empty.errors.contains("give --truth and --prediction"), "{}", empty.errors);
 }
 
 #[test]
-fn what_can_be_mended_is_measured_with_a_note() {
-    let project = bad_files();
+fn correctable_input_is_evaluated_with_a_note() {
+    let project = unusual_files();
     let noted = |truth: &str, prediction: &str, more: &[&str], note: &str| {
         let more = if more.is_empty() { &SMALL[..] } else { more };
         let answer = project.answer(&[&["evaluate", "--truth", truth, "--prediction", prediction], more].concat());
@@ -246,7 +246,7 @@ fn what_can_be_mended_is_measured_with_a_note() {
     noted("t.npy", "30.npz", &[], "at 30 fps was resampled to 15 fps");
     let exact = noted("t.txt", "t.npy", &[], "has no frame rate");
     assert_eq!(value(&exact, "pck_2d", "all", "prediction"), 1.0);
-    // telephone sound has onsets, and three hours of sound beside eight seconds of motion are no matter
+    // Audio of telephone quality has onsets, and three hours of audio for eight seconds of motion are accepted.
     let phone = noted("t.npy", "few-nan.npy", &["--audio", "phone.wav", "--convention", "aist"], "NaN");
     assert!(phone.json["metrics"][0]["values"]["truth"]["value"].as_f64().unwrap() > 0.0);
     let hours = noted("t.npy", "few-nan.npy", &["--audio", "hours.wav", "--convention", "aist"], "NaN");
@@ -254,25 +254,25 @@ fn what_can_be_mended_is_measured_with_a_note() {
 }
 
 #[test]
-fn the_released_clips_have_the_published_baselines() {
+fn released_clips_have_the_published_baselines() {
     let Some(clips) = real_data("data/released_clips") else { return };
     let project = Project::with_clips("released", 0, 1.0);
     let path = |name: &str| clips.join(name).to_string_lossy().into_owned();
-    // PCK@0.2 in the plane: of the prediction, and of the median of the clip itself
+    // PCK@0.2 in the image plane: of the prediction, and of the median pose of the clip.
     for (clip, prediction, median) in [("1845", 0.3690, 0.1543), ("3821", 0.2553, 0.5201), ("3838", 0.1136, 0.4998)] {
-        let [truth, made] = ["gt", "prediction"].map(|side| path(&format!("{side}_interval_{clip}.txt")));
+        let [truth, predicted] = ["gt", "prediction"].map(|side| path(&format!("{side}_interval_{clip}.txt")));
         let sound = path(&format!("{clip}.wav"));
-        let args = ["evaluate", "--truth", &truth, "--prediction", &made, "--audio", &sound];
+        let args = ["evaluate", "--truth", &truth, "--prediction", &predicted, "--audio", &sound];
         let answer = project.answer(&[&args, &SMALL[..]].concat());
         assert_eq!(answer.code, 0, "{}", answer.errors);
-        for (who, expected, within) in [("prediction", prediction, 1e-4), ("median_pose", median, 1e-3)] {
-            let found = value(&answer, "pck_2d", "all", who);
-            assert!((found - expected).abs() < within, "{clip} {who}: {found}, expected {expected}");
+        for (row, expected, tolerance) in [("prediction", prediction, 1e-4), ("median_pose", median, 1e-3)] {
+            let found = value(&answer, "pck_2d", "all", row);
+            assert!((found - expected).abs() < tolerance, "{clip} {row}: {found}, expected {expected}");
         }
         let sentence = answer.json["better_than_constant_pose"]["sentence"].as_str().unwrap();
         assert!(sentence.contains("too few for a conclusion"), "{sentence}");
     }
-    // the three of one speaker: the mean of the other two
+    // The three clips of one speaker: the mean pose is that of the other two.
     let folder = project.dir().join("gruber");
     fs::create_dir_all(&folder).unwrap();
     let links: Vec<PathBuf> = ["1845", "3821", "3838"]
@@ -289,7 +289,7 @@ fn the_released_clips_have_the_published_baselines() {
     let answer = project.answer(&[&args, &SMALL[..]].concat());
     assert_eq!(answer.code, 0, "{}", answer.errors);
     let found = value(&answer, "pck_2d", "all", "mean_pose");
-    // 17.2, 14.6 and 34.0 % of 254, 242 and 284 frames
+    // 17.2, 14.6 and 34.0 % of 254, 242 and 284 frames.
     let expected = (17.2 * 254.0 + 14.6 * 242.0 + 34.0 * 284.0) / 78_000.0;
     assert!((found - expected).abs() < 0.001, "{found}, expected {expected}");
     assert_eq!(answer.json["predictors"][3]["name"], "nearest_neighbour");

@@ -1,5 +1,5 @@
-//! A trained speaker measured on held-out sound, and the page of its training, as the program makes them; and the
-//! predictor that copies, on a dataset where the right copy is known.
+//! Evaluation of a trained speaker on held-out audio, and the page of its training, by the program; and the
+//! nearest-neighbour baseline, on a dataset with a known match.
 
 use crate::fixtures::browser::Browser;
 use crate::fixtures::gesture_dataset::{dataset, sample};
@@ -18,7 +18,7 @@ use orator_test_support::project::Project;
 use std::path::Path;
 
 #[test]
-fn a_training_ends_with_its_page_and_its_speaker_is_measured() {
+fn a_training_writes_a_page_and_its_speaker_is_evaluated() {
     let project = Project::with_clips("measured", 0, 1.0);
     let (data, out) = (project.dir().join("data"), project.dir().join("gan"));
     dataset(&data);
@@ -30,10 +30,10 @@ fn a_training_ends_with_its_page_and_its_speaker_is_measured() {
     let page = project.dir().join("gan/training.html");
     assert_eq!(answer.json["page"], page.to_string_lossy().as_ref());
     let bytes = std::fs::read(&page).unwrap();
-    look(&page);
-    // the same again: nothing is left to train, and the page is the same
+    check_page(&page);
+    // A second call has no steps to train and writes the same page.
     assert_eq!(project.answer(&train).code, 0);
-    assert!(bytes == std::fs::read(&page).unwrap(), "another page of the same training");
+    assert!(bytes == std::fs::read(&page).unwrap(), "the page differs");
 
     let answer = project.answer(&["evaluate", "--dataset", &data, "--checkpoint", &out]);
     assert_eq!(answer.code, 0, "{}", answer.errors);
@@ -56,20 +56,24 @@ fn a_training_ends_with_its_page_and_its_speaker_is_measured() {
     assert_eq!(names, expected);
     let metrics = result["metrics"].as_array().unwrap();
     let metric = |name: &str| metrics.iter().find(|metric| metric["name"] == name).unwrap();
-    let value = |name: &str, who: &str| metric(name)["values"][who]["value"].as_f64().unwrap();
-    for who in expected.iter().filter(|who| **who != "truth_halves") {
-        assert!((0.0..=1.0).contains(&value("pck_3d", who)) && value("mpjpe", who) >= 0.0, "{who}");
+    let value = |name: &str, row: &str| metric(name)["values"][row]["value"].as_f64().unwrap();
+    for row in expected.iter().filter(|row| **row != "truth_halves") {
+        assert!((0.0..=1.0).contains(&value("pck_3d", row)) && value("mpjpe", row) >= 0.0, "{row}");
     }
     assert_eq!((value("pck_3d", "truth"), value("mpjpe", "truth")), (1.0, 0.0));
     let sentence = result["better_than_constant_pose"]["sentence"].as_str().unwrap();
     assert!(sentence.contains(&format!("{n_blocks} block")), "{sentence}");
     assert!(sentence.contains("too few for a conclusion (at least 7 are needed)"), "{sentence}");
-    let wrong = project.answer(&["evaluate", "--dataset", &data, "--checkpoint", &out, "--split", "test"]);
-    assert!(wrong.code == 1 && wrong.errors.contains("splits with intervals: train, validation"), "{}", wrong.errors);
+    let invalid = project.answer(&["evaluate", "--dataset", &data, "--checkpoint", &out, "--split", "test"]);
+    assert!(
+        invalid.code == 1 && invalid.errors.contains("splits with intervals: train, validation"),
+        "{}",
+        invalid.errors
+    );
 }
 
-/// What a browser sees of the page.
-fn look(page: &Path) {
+/// Checks the page in a browser.
+fn check_page(page: &Path) {
     let Some(mut browser) = Browser::open(page, [1200, 900]) else { return };
     let mut count = |selector: &str| browser.value(&format!("document.querySelectorAll('{selector}').length"));
     assert_eq!((count(".chart svg"), count("#best tbody tr"), count("img.strip")), (5.into(), 6.into(), 1.into()));
@@ -86,11 +90,11 @@ fn look(page: &Path) {
 }
 
 #[test]
-fn the_neighbour_by_sound_is_found_where_it_was_taken_from() {
+fn the_nearest_neighbour_by_audio_is_the_copied_interval() {
     let folder = tempfile::tempdir().unwrap();
     let fps = FrameRate::new(15, 1);
     let source = sample("b-00000000-000000", 200, 2.0);
-    // frames 40 to 140 of a training interval, held out as well
+    // Frames 40 to 140 of a training interval are held out as well.
     let mut copy = sample("c-00000000-000000", 100, 0.0);
     copy.motion.joints = source.motion.joints.slice(s![40..140, .., ..]).to_owned();
     copy.motion.mask.fill(true);
@@ -116,7 +120,7 @@ fn the_neighbour_by_sound_is_found_where_it_was_taken_from() {
     let clips = EvalClips { fps, clips: vec![clip], notes: Vec::new(), trained_on: false, channels: Vec::new() };
     let found =
         nearest_neighbours(&dataset, &normal, &clips, Split::Validation, &MotionStore::in_memory()).unwrap().unwrap();
-    let ClipMotion::Motion(found) = &found[0] else { panic!("it stands still") };
-    let apart = found.view().iter().zip(&ground_truth.joints).filter(|(a, b)| (*a - *b).abs() > 1e-3).count();
-    assert!(apart < found.view().len() / 20, "{apart} of {} numbers are others", found.view().len());
+    let ClipMotion::Motion(found) = &found[0] else { panic!("a motion") };
+    let n_different = found.view().iter().zip(&ground_truth.joints).filter(|(a, b)| (*a - *b).abs() > 1e-3).count();
+    assert!(n_different < found.view().len() / 20, "{n_different} of {} numbers differ", found.view().len());
 }

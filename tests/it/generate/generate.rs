@@ -1,5 +1,5 @@
-//! `orator generate` from the command line with an untrained speaker: every kind of file, from every kind of sound;
-//! and what it is given wrong it says clearly, with exit code 1, and writes nothing.
+//! `orator generate` from the command line with an untrained speaker: every output format, from every kind of audio;
+//! invalid input gives a clear error, exit code 1 and no output.
 
 use crate::fixtures::animation::bvh::{Bvh, worst_mm};
 use crate::fixtures::clips;
@@ -24,7 +24,7 @@ use orator_nn::gan::generator::{Config, Generator, Preset};
 use orator_nn::params::Params;
 
 #[test]
-fn one_sound_becomes_every_kind_of_file() {
+fn one_audio_file_gives_every_output_format() {
     let folder = tempfile::tempdir().unwrap();
     let dir = folder.path();
     std::fs::create_dir(dir.join("training")).unwrap();
@@ -39,22 +39,22 @@ fn one_sound_becomes_every_kind_of_file() {
     assert_eq!(facts["checkpoint"], "training/step-0000020.safetensors");
     assert_eq!(facts["outputs"].as_array().unwrap().len(), 4);
 
-    let made = dir.join("made");
-    let motion = npy::read(&made.join("a.npy"), FPS).unwrap();
-    assert_eq!(authors_txt::read(&made.join("a.txt"), FPS).unwrap(), motion);
-    let bvh = Bvh::parse(&std::fs::read_to_string(made.join("a.bvh")).unwrap());
-    let performed = perform(&motion, None, &AnimationOptions::default()).motion();
-    let worst = worst_mm(&performed, &bvh, |frame| bvh.places(frame));
+    let out = dir.join("made");
+    let motion = npy::read(&out.join("a.npy"), FPS).unwrap();
+    assert_eq!(authors_txt::read(&out.join("a.txt"), FPS).unwrap(), motion);
+    let bvh = Bvh::parse(&std::fs::read_to_string(out.join("a.bvh")).unwrap());
+    let animated = perform(&motion, None, &AnimationOptions::default()).motion();
+    let worst = worst_mm(&animated, &bvh, |frame| bvh.places(frame));
     assert!(worst < 0.1, "{worst} mm");
-    let film = probe::probe(&made.join("a.mp4")).unwrap();
+    let film = probe::probe(&out.join("a.mp4")).unwrap();
     assert!((film.duration_secs.unwrap() - 2.05).abs() < 0.1);
-    assert_eq!(std::fs::read_dir(&made).unwrap().count(), 6, "no attempt is left behind");
+    assert_eq!(std::fs::read_dir(&out).unwrap().count(), 6, "no temporary file remains");
     for name in ["a.npy", "a.txt"] {
-        let read = motion_file::read(&made.join(name), None).unwrap();
+        let read = motion_file::read(&out.join(name), None).unwrap();
         assert!(read.has_rate && read.motion.fps == FPS, "{name}");
     }
 
-    // Another kind of sound: a telephone's mp3, a video's track.
+    // Other kinds of audio: an mp3 of telephone quality, the track of a video.
     for command in ["-i speech.wav -ar 8000 phone.mp3", "-i made/a.mp4 -c copy talk.mov"] {
         if clips::ffmpeg(dir, command) {
             let sound = command.rsplit(' ').next().unwrap();
@@ -68,7 +68,7 @@ fn one_sound_becomes_every_kind_of_file() {
 }
 
 #[test]
-fn wrong_input_is_named_and_nothing_is_written() {
+fn errors_name_the_invalid_input_and_leave_no_output() {
     let folder = tempfile::tempdir().unwrap();
     let dir = folder.path();
     write_untrained_speaker(&dir.join("host.safetensors"));
@@ -102,20 +102,20 @@ fn wrong_input_is_named_and_nothing_is_written() {
     ];
     for (args, expected) in cases {
         let output = generate(dir, args);
-        let said = String::from_utf8_lossy(&output.stderr).into_owned();
-        assert_eq!(output.status.code(), Some(1), "{args}: {said}");
-        assert!(said.contains(expected), "{args}: {said}");
-        assert!(!said.contains("panicked"), "{args}: {said}");
+        let errors = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(1), "{args}: {errors}");
+        assert!(errors.contains(expected), "{args}: {errors}");
+        assert!(!errors.contains("panicked"), "{args}: {errors}");
     }
     assert!(!dir.join("a.bvh").exists() && !dir.join("a.mov").exists());
 
     let output = generate(dir, "--json --checkpoint host.safetensors --audio gone.wav --out a.bvh");
-    let said: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
-    assert!(said["error"].as_str().unwrap().contains("gone.wav"));
+    let answer: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert!(answer["error"].as_str().unwrap().contains("gone.wav"));
 }
 
 #[test]
-fn a_checkpoint_alone_generates_wherever_it_lies() {
+fn a_checkpoint_generates_from_any_folder() {
     let folder = tempfile::tempdir().unwrap();
     let (training, elsewhere) = (folder.path().join("training"), folder.path().join("elsewhere"));
     std::fs::create_dir(&training).unwrap();
@@ -124,17 +124,17 @@ fn a_checkpoint_alone_generates_wherever_it_lies() {
     orator_formats::wav::write(&training.join("speech.wav"), &clips::tone(16_000, 1.0, 220.0)).unwrap();
     let output = generate(&training, "--checkpoint step-0000020.safetensors --audio speech.wav --out made.npy");
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-    let made = std::fs::read(training.join("made.npy")).unwrap();
+    let expected = std::fs::read(training.join("made.npy")).unwrap();
 
     std::fs::rename(checkpoint::path(&training, 20), elsewhere.join("host.safetensors")).unwrap();
     std::fs::rename(training.join("speech.wav"), elsewhere.join("speech.wav")).unwrap();
     std::fs::remove_dir_all(&training).unwrap();
     let output = generate(&elsewhere, "--checkpoint host.safetensors --audio speech.wav --out again.npy");
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-    assert_eq!(std::fs::read(elsewhere.join("again.npy")).unwrap(), made);
+    assert_eq!(std::fs::read(elsewhere.join("again.npy")).unwrap(), expected);
 }
 
-/// A speaker of a preset's full size, its weights and running statistics as good as random.
+/// A speaker with the full size of a preset and pseudo-random weights and running statistics.
 fn random_speaker(preset: Preset) -> anyhow::Result<GestureGenerator> {
     let network = Config::from_preset(preset, N_FEATURES);
     let mut params = Params::frozen();
@@ -150,13 +150,13 @@ fn random_speaker(preset: Preset) -> anyhow::Result<GestureGenerator> {
     })
 }
 
-/// What the network makes of a whole sound at once, [144, T].
+/// Features [144, T] of a complete sound in one forward pass.
 fn one_pass(speaker: &GestureGenerator, sound: &Sound, n_frames: usize) -> anyhow::Result<ndarray::Array2<f32>> {
     let padded = (n_frames / 32 + 1) * 32;
     let n_samples = mel::n_samples(mel_frames(FPS, padded));
-    // Continued by its mirror image, back and forth.
-    let there_and_back = sound.samples.iter().chain(sound.samples.iter().rev().skip(1).take(sound.samples.len() - 2));
-    let samples: Vec<f32> = there_and_back.cycle().take(n_samples).copied().collect();
+    // Padded with its reflections.
+    let reflected = sound.samples.iter().chain(sound.samples.iter().rev().skip(1).take(sound.samples.len() - 2));
+    let samples: Vec<f32> = reflected.cycle().take(n_samples).copied().collect();
     let mels = mel::log_mel(&samples);
     let (n, bands) = mels.dim();
     let mels = Tensor::from_vec(mels.iter().copied().collect(), (1, n, bands), &Device::Cpu)?.t()?.contiguous()?;
@@ -164,37 +164,37 @@ fn one_pass(speaker: &GestureGenerator, sound: &Sound, n_frames: usize) -> anyho
     Ok(ndarray::Array2::from_shape_vec((N_FEATURES, padded), poses)?.slice_move(s![.., ..n_frames]))
 }
 
-/// Sounds of so many seconds in chunks of 64 frames are the same as in one pass.
-fn chunks_are_one_pass(preset: Preset, lengths: &[f64]) -> anyhow::Result<()> {
+/// Asserts that sounds of the given lengths (seconds) give the same features in chunks of 64 frames as in one pass.
+fn assert_chunks_equal_one_pass(preset: Preset, lengths: &[f64]) -> anyhow::Result<()> {
     let speaker = random_speaker(preset)?;
     let sounds = lengths.iter().map(|secs| clips::tone(16_000, *secs, 220.0)).collect::<Vec<_>>();
     let n_frames = |sound: &Sound| (sound.secs() * 15.0 + 1e-6) as usize;
-    let wholes = sounds.iter().map(|sound| one_pass(&speaker, sound, n_frames(sound)));
-    let wholes = wholes.collect::<anyhow::Result<Vec<_>>>()?;
-    let pieces = |sound: &Sound| std::iter::once(Ok(sound.samples.clone()));
-    for (sound, whole) in sounds.iter().zip(wholes) {
-        let most = whole.iter().fold(0.0f32, |most, v| most.max(v.abs()));
+    let references = sounds.iter().map(|sound| one_pass(&speaker, sound, n_frames(sound)));
+    let references = references.collect::<anyhow::Result<Vec<_>>>()?;
+    let parts = |sound: &Sound| std::iter::once(Ok(sound.samples.clone()));
+    for (sound, reference) in sounds.iter().zip(references) {
+        let max = reference.iter().fold(0.0f32, |max, v| max.max(v.abs()));
         let mut first = 0;
-        for part in speaker.features(pieces(sound), sound.samples.len(), 64)? {
+        for part in speaker.features(parts(sound), sound.samples.len(), 64)? {
             let part = part?;
-            let off = &part - &whole.slice(s![.., first..first + part.ncols()]);
-            let off = off.iter().fold(0.0f32, |most, v| most.max(v.abs()));
-            assert!(off < 1e-5 * most.max(1.0), "{:.1} s, from frame {first}: {off:e} of {most}", sound.secs());
+            let error = &part - &reference.slice(s![.., first..first + part.ncols()]);
+            let error = error.iter().fold(0.0f32, |max, v| max.max(v.abs()));
+            assert!(error < 1e-5 * max.max(1.0), "{:.1} s, from frame {first}: {error:e} of {max}", sound.secs());
             first += part.ncols();
         }
         assert_eq!(first, n_frames(sound));
     }
     assert_eq!(speaker.motion(&sounds[0])?.n_frames(), n_frames(&sounds[0]));
-    assert!(speaker.features(pieces(&sounds[0]), sounds[0].samples.len(), 33).is_err());
+    assert!(speaker.features(parts(&sounds[0]), sounds[0].samples.len(), 33).is_err());
     Ok(())
 }
 
 #[test]
-fn long_and_short_sound_in_chunks_is_one_pass_with_the_light_network() -> anyhow::Result<()> {
-    chunks_are_one_pass(Preset::Light, &[0.2, 5.03, 21.7])
+fn chunks_equal_one_pass_with_the_light_network() -> anyhow::Result<()> {
+    assert_chunks_equal_one_pass(Preset::Light, &[0.2, 5.03, 21.7])
 }
 
 #[test]
-fn long_and_short_sound_in_chunks_is_one_pass_with_the_published_network() -> anyhow::Result<()> {
-    chunks_are_one_pass(Preset::Paper, &[0.1, 9.1])
+fn chunks_equal_one_pass_with_the_published_network() -> anyhow::Result<()> {
+    assert_chunks_equal_one_pass(Preset::Paper, &[0.1, 9.1])
 }

@@ -1,5 +1,5 @@
-//! Many sounds in one call of `orator generate`: what fails does not stop the others, what was made is not made again, and
-//! every motion is that of its sound alone.
+//! Several audio files in one call of `orator generate`: a failure does not stop the others, existing motions are not
+//! generated again, and each motion depends on its own audio only.
 
 use crate::fixtures::clips;
 use crate::fixtures::untrained::{generate, write_untrained_speaker};
@@ -7,7 +7,7 @@ use orator_formats::wav;
 use serde_json::Value;
 use std::path::Path;
 
-/// A folder with two sounds, one that is none, and a speaker.
+/// A folder with two valid audio files, an invalid one, and a speaker.
 fn folder() -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
     let dir = folder.path();
@@ -30,7 +30,7 @@ fn run(dir: &Path, args: &str) -> ([u64; 3], Value) {
 }
 
 #[test]
-fn a_folder_is_made_once_and_goes_on_after_a_bad_file() {
+fn a_folder_is_generated_once_and_continues_after_an_invalid_file() {
     let folder = folder();
     let dir = folder.path();
     let args = "--checkpoint host.safetensors --audio-folder talks --out-folder made --format npy,bvh";
@@ -65,27 +65,30 @@ fn a_table_names_its_motions_and_speakers() {
     std::fs::write(dir.join("talks/list.csv"), table).unwrap();
     let args = "--batch talks/list.csv --out-folder made --format npy";
     let output = generate(dir, args);
-    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    let errors = String::from_utf8_lossy(&output.stderr).into_owned();
     assert!(
-        output.status.code() == Some(1) && said.contains("b.wav: add one to the table, or give --checkpoint"),
-        "{said}"
+        output.status.code() == Some(1) && errors.contains("b.wav: add one to the table, or give --checkpoint"),
+        "{errors}"
     );
     let (counts, facts) = run(dir, &format!("{args} --checkpoint host.safetensors"));
     assert_eq!(counts, [2, 0, 1], "{facts}");
     assert!(facts["sounds"][1]["error"].as_str().unwrap().contains("gone.safetensors"));
     assert!(dir.join("made/first.npy").is_file() && dir.join("made/third.npy").is_file());
 
-    for (table, words) in [
+    for (table, expected) in [
         ("audio,out\na.wav,x\nsub/b.wav,X\n", "would both be written to `X`"),
         ("audio,out\na.wav,../x\n", "line 2"),
         ("sound\na.wav\n", "unknown column `sound`"),
     ] {
         std::fs::write(dir.join("talks/list.csv"), table).unwrap();
         let output = generate(dir, &format!("{args} --checkpoint host.safetensors"));
-        let said = String::from_utf8_lossy(&output.stderr).into_owned();
-        assert!(output.status.code() == Some(1) && said.contains("list.csv") && said.contains(words), "{said}");
+        let errors = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert!(
+            output.status.code() == Some(1) && errors.contains("list.csv") && errors.contains(expected),
+            "{errors}"
+        );
     }
-    for (args, words) in [
+    for (args, expected) in [
         ("--audio-folder talks --out-folder made", "--checkpoint"),
         ("--checkpoint host.safetensors --audio-folder talks", "--out-folder"),
         ("--checkpoint host.safetensors --audio-folder talks --out-folder made --format mov", ".npy (joints)"),
@@ -93,7 +96,7 @@ fn a_table_names_its_motions_and_speakers() {
         ("--checkpoint host.safetensors", "--audio"),
     ] {
         let output = generate(dir, args);
-        let said = String::from_utf8_lossy(&output.stderr).into_owned();
-        assert!(output.status.code() == Some(1) && said.contains(words), "{args}: {said}");
+        let errors = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert!(output.status.code() == Some(1) && errors.contains(expected), "{args}: {errors}");
     }
 }

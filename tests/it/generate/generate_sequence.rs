@@ -1,5 +1,5 @@
-//! Sequence-to-sequence networks in `orator generate`: one sound or many, with and without transcripts, and the state over
-//! seams; what is doubtful is said, what is wrong named.
+//! Sequence-to-sequence networks in `orator generate`: one audio file or many, with and without transcripts, and the
+//! state at seams; dubious input is reported, invalid input named.
 
 use crate::fixtures::animation::captures::{tone, write_stereo};
 use crate::fixtures::untrained::{generate, write_untrained_sequence, write_untrained_speaker};
@@ -32,28 +32,28 @@ fn folder() -> tempfile::TempDir {
     folder
 }
 
-/// Answer of a run that ends with 0.
+/// JSON answer of a run with exit code 0.
 fn run(dir: &Path, args: &str) -> Value {
     let output = generate(dir, &format!("--json {args}"));
     assert!(output.status.success(), "{args}: {}", String::from_utf8_lossy(&output.stderr));
     serde_json::from_slice(&output.stdout).unwrap()
 }
 
-/// What a run that ends with 1 says.
-fn refusal(dir: &Path, args: &str) -> String {
+/// Error text of a run with exit code 1.
+fn failure(dir: &Path, args: &str) -> String {
     let output = generate(dir, args);
-    let said = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert_eq!(output.status.code(), Some(1), "{args}: {said}");
-    said
+    let text = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(1), "{args}: {text}");
+    text
 }
 
-/// A word a second, in turn of these.
+/// A transcript with one word per second, cycling through `words`.
 fn tsv(n: usize, words: &[&str]) -> String {
     (0..n).map(|t| format!("{t}.1\t{t}.6\t{}\n", words[t % words.len()])).collect()
 }
 
 #[test]
-fn the_state_is_renewed_or_carried_and_both_jumps_are_told() {
+fn the_state_is_renewed_or_carried_and_both_jumps_are_reported() {
     let folder = folder();
     let dir = folder.path();
     let motion = |file: &str| Bvh::read(&dir.join(file)).unwrap().frames().map(<[f64]>::to_vec).collect::<Vec<_>>();
@@ -68,16 +68,16 @@ fn the_state_is_renewed_or_carried_and_both_jumps_are_told() {
         assert_ne!(of(&renewed, "seam_jump"), of(&carried, "seam_jump"));
         assert_eq!((renewed["n_frames"].as_u64(), renewed["next"].as_str()), (Some(66), None));
         let (renewed, carried) = (motion("r.bvh"), motion("c.bvh"));
-        // The filter of nine frames reaches four back over the first seam.
+        // The filter of nine frames extends four frames back over the first seam.
         assert!(renewed.len() == 66 && renewed[..16] == carried[..16] && renewed[20..] != carried[20..], "{network}");
     }
     let output = generate(dir, "--checkpoint words.safetensors --audio talks/a.wav --out r.bvh");
-    let said = String::from_utf8_lossy(&output.stdout).into_owned() + &String::from_utf8_lossy(&output.stderr);
-    assert!(said.contains("mean step at segment boundaries") && said.contains("(with --carry-state "), "{said}");
+    let text = String::from_utf8_lossy(&output.stdout).into_owned() + &String::from_utf8_lossy(&output.stderr);
+    assert!(text.contains("mean step at segment boundaries") && text.contains("(with --carry-state "), "{text}");
 }
 
 #[test]
-fn words_are_heard_and_none_is_as_no_transcript() {
+fn words_change_the_motion_only_of_networks_that_read_words() {
     let folder = folder();
     let words = |n: usize| -> Vec<Word> {
         let word = |t: usize| Word {
@@ -94,34 +94,35 @@ fn words_are_heard_and_none_is_as_no_transcript() {
         let (sound, silence) = (tone(4.37, 0.0), Sound { rate: 16_000, samples: vec![0.0; 16_000 * 437 / 100] });
         let none = speaker.poses(&sound, &[]).unwrap().features;
         assert_eq!(none.nrows(), 87);
-        // Words after the end, in any order, change nothing; those within it do.
+        // Words after the end have no effect, in any order; words before the end do.
         let mut late = words(40).split_off(8);
         late.reverse();
         assert_eq!(speaker.poses(&sound, &late).unwrap().features, none);
-        let said = words(4);
-        let backwards: Vec<Word> = said.iter().rev().cloned().collect();
-        let spoken = speaker.poses(&sound, &said).unwrap().features;
+        let four = words(4);
+        let backwards: Vec<Word> = four.iter().rev().cloned().collect();
+        let spoken = speaker.poses(&sound, &four).unwrap().features;
         assert_eq!(
             (spoken != none, &speaker.poses(&sound, &backwards).unwrap().features),
             (speaker.reads_words(), &spoken)
         );
-        // What is said later changes nothing before a segment may read it.
+        // A later word has no effect before the segments that may read it.
         let more = speaker.poses(&sound, &words(5)).unwrap().features;
         assert!(more.rows().into_iter().zip(spoken.rows()).take(30).all(|(a, b)| a == b), "{network}");
-        // Silence is spoken too; the shortest sound has one frame, a shorter one none.
-        let still = speaker.poses(&silence, &[]).unwrap();
-        assert!(still.features.iter().all(|v| v.is_finite()) && still.features != none && still.features.nrows() == 87);
+        // Silence is valid audio; the shortest audio has one frame, and shorter audio is an error.
+        let mute = speaker.poses(&silence, &[]).unwrap();
+        assert!(mute.features.iter().all(|v| v.is_finite()) && mute.features != none && mute.features.nrows() == 87);
         assert_eq!(speaker.poses(&tone(0.05, 0.0), &[]).unwrap().features.nrows(), 1);
         let error = speaker.poses(&tone(0.049, 0.0), &[]).unwrap_err().to_string();
         assert!(error.contains("too short for one frame"), "{error}");
-        let heard = speaker.prepare(&tone(0.9, 0.0), &[]).unwrap();
-        let ways = [StateAtSeams::Renewed, StateAtSeams::Carried].map(|way| speaker.generate(&heard, way).unwrap());
-        assert_eq!((&ways[0].features, ways[0].seam_jump), (&ways[1].features, [1.0, 1.0]), "one segment has no seam");
+        let prepared = speaker.prepare(&tone(0.9, 0.0), &[]).unwrap();
+        let runs =
+            [StateAtSeams::Renewed, StateAtSeams::Carried].map(|state| speaker.generate(&prepared, state).unwrap());
+        assert_eq!((&runs[0].features, runs[0].seam_jump), (&runs[1].features, [1.0, 1.0]), "one segment has no seam");
     }
 }
 
 #[test]
-fn what_is_doubtful_about_a_transcript_is_said() {
+fn dubious_transcripts_are_reported() {
     let folder = folder();
     let dir = folder.path();
     let write = |file: &str, text: &str| std::fs::write(dir.join(file), text).unwrap();
@@ -152,9 +153,9 @@ fn what_is_doubtful_about_a_transcript_is_said() {
         assert!(answer["note"].as_str().unwrap_or_default().contains(note), "{file}: {answer}");
         assert_eq!(answer["note"].is_null(), note.is_empty(), "{file}: {answer}");
     }
-    let said = String::from_utf8_lossy(&generate(dir, &args("good.tsv")).stderr).into_owned();
-    let printed = String::from_utf8_lossy(&generate(dir, &args("good.tsv")).stdout).into_owned() + &said;
-    assert!(printed.contains("2 of 3 words of the transcript were trained with"), "{printed}");
+    let text = String::from_utf8_lossy(&generate(dir, &args("good.tsv")).stderr).into_owned();
+    let text = String::from_utf8_lossy(&generate(dir, &args("good.tsv")).stdout).into_owned() + &text;
+    assert!(text.contains("2 of 3 words of the transcript were trained with"), "{text}");
     let answer = run(dir, &args("good.tsv").replace("words.saf", "adversarial.saf"));
     assert!(answer["note"].as_str().unwrap().contains("does not use words: good.tsv was ignored"), "{answer}");
 
@@ -165,20 +166,20 @@ fn what_is_doubtful_about_a_transcript_is_said() {
         ("times.tsv", "line 2: invalid times 2.00 to 1.00 s of `world`"),
         ("gone.tsv", "gone.tsv"),
     ] {
-        let said = refusal(dir, &args(file));
-        assert!(said.contains(words), "{file}: {said}");
+        let text = failure(dir, &args(file));
+        assert!(text.contains(words), "{file}: {text}");
     }
     write_untrained_speaker(&dir.join("host.safetensors"));
     for (more, words) in
         [("--transcript good.tsv", "leave out --transcript"), ("--carry-state", "leave out --carry-state")]
     {
-        let said = refusal(dir, &format!("--checkpoint host.safetensors --audio talks/a.wav {more} --out a.npy"));
-        assert!(said.contains(words), "{said}");
+        let text = failure(dir, &format!("--checkpoint host.safetensors --audio talks/a.wav {more} --out a.npy"));
+        assert!(text.contains(words), "{text}");
     }
 }
 
 #[test]
-fn a_hundred_thousand_words_of_a_long_sound_take_no_longer_than_their_poses() {
+fn a_hundred_thousand_words_are_assigned_to_segments_quickly() {
     let folder = folder();
     for network in ["contextual", "words"] {
         let speaker = SequenceGenerator::open(&folder.path().join(format!("{network}.safetensors"))).unwrap();
@@ -189,15 +190,15 @@ fn a_hundred_thousand_words_of_a_long_sound_take_no_longer_than_their_poses() {
             source: WordSource::Given,
             confidence: None,
         };
-        let said = speaker.metadata.vocabulary.numbered(&(0..100_000).map(word).collect::<Vec<_>>());
-        // 30,000 s of segments: words looked for among all others would take minutes here
-        let read: usize = (0..30_000).map(|i| speaker.metadata.words_of_segment(&said, 20 * i).concat().len()).sum();
+        let ids = speaker.metadata.vocabulary.numbered(&(0..100_000).map(word).collect::<Vec<_>>());
+        // 30,000 s of segments: a linear search for the words of each would take minutes.
+        let read: usize = (0..30_000).map(|i| speaker.metadata.words_of_segment(&ids, 20 * i).concat().len()).sum();
         assert!(read > 300_000, "{network}: {read} words read");
     }
 }
 
 #[test]
-fn many_sounds_find_their_transcripts_and_are_made_once() {
+fn batches_find_their_transcripts_and_are_generated_once() {
     let folder = folder();
     let dir = folder.path();
     std::fs::write(dir.join("talks/a.tsv"), tsv(3, &WORDS)).unwrap();
@@ -221,7 +222,7 @@ fn many_sounds_find_their_transcripts_and_are_made_once() {
     assert_eq!(bytes("made/a.bvh"), bytes("one.bvh"));
 
     assert_eq!(batch("--audio-folder talks").0, [0, 2, 1]);
-    // A transcript that is new or changed makes its sound again, one that is none fails it.
+    // A new or changed transcript regenerates its audio; an invalid transcript is a failure.
     std::fs::write(dir.join("talks/sub/b.srt"), "1\n00:00:00,500 --> 00:00:01,000\nhello\n").unwrap();
     assert_eq!(batch("--audio-folder talks").0, [1, 1, 1]);
     std::fs::write(dir.join("talks/a.tsv"), tsv(3, &["world"])).unwrap();
@@ -245,36 +246,36 @@ fn many_sounds_find_their_transcripts_and_are_made_once() {
     let words = ["x", "y"].map(|name| of(&facts, name)["segments"]["words"].to_string());
     assert_eq!(words, ["[2,2]", "[1,1]"]);
 
-    // A GAN hears sound alone, and does not read what lies beside it.
+    // A GAN uses audio only and ignores transcripts next to the audio.
     write_untrained_speaker(&dir.join("host.safetensors"));
     let args = "--checkpoint host.safetensors --audio-folder talks/sub --out-folder others";
     assert!(run(dir, args)["sounds"][0]["segments"].is_null());
-    assert!(refusal(dir, &format!("{args} --transcript said")).contains("remove --transcript"));
+    assert!(failure(dir, &format!("{args} --transcript said")).contains("remove --transcript"));
     let args = "--checkpoint words.safetensors --audio-folder talks/sub --out-folder others";
-    assert!(refusal(dir, &format!("{args} --transcript talks/sub/b.srt")).contains("b.srt is not a folder"));
-    let (code, said) = {
+    assert!(failure(dir, &format!("{args} --transcript talks/sub/b.srt")).contains("b.srt is not a folder"));
+    let (code, text) = {
         let output = generate(dir, &format!("{args} --format npy"));
         (output.status.code(), String::from_utf8_lossy(&output.stdout).into_owned())
     };
-    assert!(code == Some(2) && said.contains("expected a .bvh file"), "{said}");
+    assert!(code == Some(2) && text.contains("expected a .bvh file"), "{text}");
 }
 
 #[test]
-fn sounds_of_other_rates_are_heard_and_joints_written_in_every_format() {
+fn audio_of_other_rates_is_resampled_and_joints_have_all_formats() {
     let folder = folder();
     let dir = folder.path();
     write_stereo(&dir.join("stereo.wav"), 3.3, 0.0);
-    let made = run(dir, "--checkpoint contextual.safetensors --audio stereo.wav --out stereo.bvh");
-    assert_eq!(made["n_frames"], 66);
+    let answer = run(dir, "--checkpoint contextual.safetensors --audio stereo.wav --out stereo.bvh");
+    assert_eq!(answer["n_frames"], 66);
     write_untrained_sequence(&dir.join("joints.safetensors"), Architecture::Words, false, &WORDS);
-    let made = run(dir, "--checkpoint joints.safetensors --audio stereo.wav --carry-state --out a.npy a.bvh a.glb");
-    assert_eq!((made["speaker"].as_str(), made["outputs"].as_array().map(Vec::len)), (Some("talker"), Some(3)));
-    assert!(made["next"].as_str().unwrap().contains(" --carry-state --out a.mp4"), "{made}");
+    let answer = run(dir, "--checkpoint joints.safetensors --audio stereo.wav --carry-state --out a.npy a.bvh a.glb");
+    assert_eq!((answer["speaker"].as_str(), answer["outputs"].as_array().map(Vec::len)), (Some("talker"), Some(3)));
+    assert!(answer["next"].as_str().unwrap().contains(" --carry-state --out a.mp4"), "{answer}");
     for (file, words) in [("gone.wav", "gone.wav does not exist"), ("words.safetensors", "words.safetensors")] {
-        let said = refusal(dir, &format!("--checkpoint words.safetensors --audio {file} --out x.bvh"));
-        assert!(said.contains(words), "{said}");
+        let text = failure(dir, &format!("--checkpoint words.safetensors --audio {file} --out x.bvh"));
+        assert!(text.contains(words), "{text}");
     }
     wav::write(&dir.join("short.wav"), &tone(0.01, 0.0)).unwrap();
-    let said = refusal(dir, "--checkpoint words.safetensors --audio short.wav --out x.bvh");
-    assert!(said.contains("short.wav") && said.contains("too short"), "{said}");
+    let text = failure(dir, "--checkpoint words.safetensors --audio short.wav --out x.bvh");
+    assert!(text.contains("short.wav") && text.contains("too short"), "{text}");
 }

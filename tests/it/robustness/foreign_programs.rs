@@ -121,7 +121,7 @@ fn python_of_an_environment_in_the_working_directory_has_its_packages() {
     let mut command = Command::new(env!("CARGO_BIN_EXE_orator"));
     let output = command.arg("doctor").current_dir(dir.path()).env("ORATOR_PYTHON", "aligner/bin/python").output();
     let output = output.unwrap();
-    assert!(text_of(&output).contains("pocketsphinx 5.1.1 of aligner/bin/python"), "{}", text_of(&output));
+    assert!(text_of(&output).contains("pocketsphinx 5.1.1 (aligner/bin/python)"), "{}", text_of(&output));
     expect_none_ran(dir.path(), &output);
 }
 

@@ -162,7 +162,7 @@ fn an_unusual_name_in_a_tar_does_not_stop_an_import() {
     }
     tar.finish().unwrap();
     let (code, text) = run(dir.path(), &["import", "in", "--out", "out", "--speaker", "host"]);
-    assert!(code == 2 && text.contains("Foo Bar") && text.contains("2 kept"), "{code} {text}");
+    assert!(code == 2 && text.contains("Foo Bar") && text.contains("2 takes imported"), "{code} {text}");
     assert!(!text.contains('\u{1b}'), "{text:?}");
 }
 
@@ -210,7 +210,7 @@ fn a_failed_video_reserves_no_name_and_prints_no_control_characters() {
     assert_eq!(code, 2, "{text}");
     assert!(text.contains("one.json is not a valid file of a dataset"), "{text}");
     assert!(text.contains("empty.tar: import: it contains no files"), "{text}");
-    assert!(text.contains("`\u{fffd}[2J\u{fffd}` where `HIERARCHY`"), "{text:?}");
+    assert!(text.contains("found `\u{fffd}[2J\u{fffd}`, expected `HIERARCHY`"), "{text:?}");
     let keys: Vec<String> = Split::ALL
         .iter()
         .flat_map(|split| Dataset::open(dir.path().join("out")).unwrap().samples(*split))
@@ -272,8 +272,8 @@ fn implausible_numbers_in_a_dataset_are_rejected_by_field() {
     for (file, pointer, value, expected) in [
         ("info.json", "/fps/den", serde_json::json!(0), "invalid frame rate 15/0"),
         ("info.json", "/bone_lengths_metres/3", serde_json::json!(-0.2), "`bone_lengths_metres` has the length -0.2"),
-        ("stats.json", "/std/5/1", serde_json::json!(-1.0), "`std` holds -1.0"),
-        ("stats.json", "/mean/5/1", serde_json::json!(1e300), "`mean` holds 1e300"),
+        ("stats.json", "/std/5/1", serde_json::json!(-1.0), "`std` contains -1.0"),
+        ("stats.json", "/mean/5/1", serde_json::json!(1e300), "`mean` contains 1e300"),
     ] {
         let data = dir.path().join("data");
         fs::create_dir(&data).unwrap();

@@ -270,7 +270,7 @@ fn the_stage_reads_and_writes_its_files() {
         "{}",
         report.line
     );
-    assert!(report.line.ends_with("refused: hands 2.0 s"), "{}", report.line);
+    assert!(report.line.ends_with("rejected: hand not visible 2.0 s"), "{}", report.line);
     let ledger = Ledger::read(&out.join("ledger.json")).unwrap();
     assert_eq!((ledger.kept.len(), ledger.refused.len()), (2, 1));
     let (again, out_again) = run("again");

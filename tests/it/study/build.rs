@@ -185,7 +185,7 @@ fn errors_name_the_missing_input() {
     let cases: [(&str, String); 5] = [
         ("clips per speaker are needed", error_of(&|file| file.task[0].trials = 400)),
         ("shorter clips", error_of(&|file| file.clips.seconds = 30.0)),
-        ("no dataset", error_of(&|file| file.speaker[0].dataset = Some(dir.join("nowhere")))),
+        ("is not a dataset", error_of(&|file| file.speaker[0].dataset = Some(dir.join("nowhere")))),
         (
             "condition model",
             error_of(&|file| fs::rename(dir.join("models"), dir.join("moved")).map(|()| file.seed = 9).unwrap()),

@@ -1,4 +1,4 @@
-//! Several people in the videos of one speaker: a warning with a picture, until the user says that they are one.
+//! Several persons in the videos of one speaker give a warning with a picture, unless `same_person` is set.
 
 use crate::fixtures::media::lifted_videos::{settings, shard_as, video};
 use orator_base::stage::Unit;
@@ -10,10 +10,10 @@ use orator_media::opencv::png;
 use serde_json::json;
 use std::path::Path;
 
-/// Portrait of a face that is as much longer than wide as `long` says.
-fn paint(work: &Path, unit: &Unit, long: f64) {
-    let place = |k: u32| [f64::from(k % 5), long * f64::from(k / 5), f64::from(k % 3)];
-    let face: Vec<[f64; 3]> = (0..40).map(place).collect();
+/// Writes the portrait of a face, stretched vertically by `height`.
+fn write_portrait(work: &Path, unit: &Unit, height: f64) {
+    let point = |k: u32| [f64::from(k % 5), height * f64::from(k / 5), f64::from(k % 3)];
+    let face: Vec<[f64; 3]> = (0..40).map(point).collect();
     let colours = vec![0.5; 48];
     let portrait = json!({ "face": face, "skin": colours, "hair": colours, "n_frames": 20 });
     std::fs::write(Artifact::Portrait.path(work, unit), portrait.to_string()).unwrap();
@@ -21,7 +21,7 @@ fn paint(work: &Path, unit: &Unit, long: f64) {
 }
 
 #[test]
-fn a_second_person_is_told_until_the_user_knows_better() {
+fn a_second_person_gives_a_warning_unless_same_person_is_set() {
     let dir = tempfile::tempdir().unwrap();
     let root = dir.path();
     let units = [("one", 4), ("two", 5), ("other", 6)].map(|(name, seed)| video(root, name, 300, seed));
@@ -36,13 +36,13 @@ fn a_second_person_is_told_until_the_user_knows_better() {
     };
     std::fs::create_dir_all(artifacts::dir(&work, Artifact::Portrait.stage(), &units[0])).unwrap();
     assert!(facts(&settings, "nothing is known").is_null());
-    for (unit, long) in units.iter().zip([1.0, 1.001, 1.002]) {
-        paint(&work, unit, long);
+    for (unit, height) in units.iter().zip([1.0, 1.001, 1.002]) {
+        write_portrait(&work, unit, height);
     }
     assert!(facts(&settings, "one person").is_null());
-    paint(&work, &units[2], 2.0);
-    let told = facts(&settings, "two people");
-    assert_eq!(told["videos"][1], json!(["other.mp4"]), "{told}");
+    write_portrait(&work, &units[2], 2.0);
+    let warning = facts(&settings, "two people");
+    assert_eq!(warning["videos"][1], json!(["other.mp4"]), "{warning}");
     let sheet = png::read(&picture).unwrap();
     assert_eq!((sheet.width, sheet.height), (8 * 144, 2 * 160));
     assert_eq!(sheet.pixel(8, 8), [200, 150, 120]);

@@ -1,5 +1,5 @@
-//! Sound that two videos share, through real encoders: found after cutting, re-encoding and a change of level; another
-//! speech of the same voice is not taken for it.
+//! Audio shared by two videos, with real encoders: detected after cutting, re-encoding and a change of level; another
+//! speech by the same speaker is not matched.
 
 use crate::fixtures::clips::ffmpeg;
 use orator_base::audio::fingerprint::Fingerprinter;
@@ -15,7 +15,7 @@ fn codes(path: &Path) -> Vec<u32> {
     fingerprinter.finish()
 }
 
-/// A re-upload of `source`: its first `cut` seconds gone, quieter, badly encoded, behind an intro of `intro` seconds.
+/// A re-upload of `source` after an intro of `intro` seconds: without its first `cut` seconds, quieter, at 40 kbit/s.
 fn reupload(source: &Path, dir: &Path, cut: f64, intro: f64) -> PathBuf {
     let out = dir.join("again.mp4");
     let filter = format!(
@@ -27,7 +27,7 @@ fn reupload(source: &Path, dir: &Path, cut: f64, intro: f64) -> PathBuf {
     out
 }
 
-fn found_again(source: &Path, other: &Path) {
+fn assert_reupload_is_matched(source: &Path, other: &Path) {
     let dir = tempfile::tempdir().unwrap();
     let videos = [codes(source), codes(other), codes(&reupload(source, dir.path(), 2.013, 4.0))];
     let names: Vec<String> = ["a", "b", "c"].map(str::to_owned).to_vec();
@@ -42,13 +42,13 @@ fn found_again(source: &Path, other: &Path) {
 }
 
 #[test]
-fn a_reupload_is_found_and_another_speech_is_not() {
+fn a_reupload_is_matched_and_another_speech_is_not() {
     let (one, two) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
-    found_again(&speaker_clip(one.path(), 14.0, 1), &speaker_clip(two.path(), 14.0, 2));
+    assert_reupload_is_matched(&speaker_clip(one.path(), 14.0, 1), &speaker_clip(two.path(), 14.0, 2));
 }
 
 #[test]
-fn real_speech_is_known_again() {
+fn reuploads_of_real_speech_are_matched() {
     let (Some(jfk), Some(scott), Some(other)) = (
         real_data("data/audio/jfk_whisper_11s.flac"),
         real_data("data/audio/beat2_2_scott_0_2_2_16k.wav"),
@@ -56,6 +56,6 @@ fn real_speech_is_known_again() {
     ) else {
         return;
     };
-    found_again(&scott, &other);
-    found_again(&jfk, &scott);
+    assert_reupload_is_matched(&scott, &other);
+    assert_reupload_is_matched(&jfk, &scott);
 }

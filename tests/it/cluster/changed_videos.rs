@@ -1,5 +1,5 @@
-//! A plan covers the content of its videos: one that changed is not worked on, none is missing silently, and a forgotten one
-//! takes the plan with it.
+//! A plan is bound to the content of its videos: a changed video is not processed, a missing one is reported, and
+//! forgetting a video removes the plan.
 
 use orator_test_support::project::{Project, files_under};
 use std::fs;
@@ -12,7 +12,7 @@ fn file_name(path: &Path) -> &str {
 }
 
 #[test]
-fn a_video_that_changed_since_the_plan_is_not_worked_on_and_never_left_out_silently() {
+fn a_video_changed_since_the_plan_is_not_processed_and_is_reported() {
     let project = Project::with_clips("sealed", 2, 4.6);
     let clips = project.clips();
     let (name, original) = (file_name(&clips[0]), fs::read(&clips[0]).unwrap());
@@ -24,29 +24,29 @@ fn a_video_that_changed_since_the_plan_is_not_worked_on_and_never_left_out_silen
     let failed = worked.json["failed"].to_string();
     assert!(failed.contains(&format!("{name} changed since the plan")) && failed.contains("`orator plan`"), "{failed}");
     let stem = clips[0].file_stem().unwrap().to_str().unwrap().replace('_', "-");
-    let is_of = |name: &str| name.contains(&format!("/{stem}-"));
-    assert!(!files_under(&project.work().join("extract")).iter().any(|(name, _)| is_of(name)), "it was worked on");
+    let is_changed = |name: &str| name.contains(&format!("/{stem}-"));
+    assert!(!files_under(&project.work().join("extract")).iter().any(|(name, _)| is_changed(name)), "it was processed");
 
-    // Changed back, with another time: the dataset without it is no success, and a retry works on it.
+    // Restored with another modification time: a dataset without the video fails, and a retry processes it.
     fs::write(&clips[0], original).unwrap();
-    let left_out = project.run(&["--only", "dataset"]);
-    let failures = left_out.json["failures"].to_string();
-    assert!(left_out.code == 2 && failures.contains(&format!("host/{stem}-")), "{failures} {}", left_out.errors);
+    let incomplete = project.run(&["--only", "dataset"]);
+    let failures = incomplete.json["failures"].to_string();
+    assert!(incomplete.code == 2 && failures.contains(&format!("host/{stem}-")), "{failures} {}", incomplete.errors);
     let retried = project.answer(&[&WORK[..], &["--retry"]].concat());
     assert_eq!((retried.code, retried.json["done"].as_u64()), (0, Some(1)), "{}", retried.errors);
     assert_eq!(project.run(&["--only", "dataset"]).code, 0);
 
     fs::remove_file(&clips[1]).unwrap();
-    let gone = project.run(&["--only", "dataset"]);
-    let failures = gone.json["failures"].to_string();
+    let missing = project.run(&["--only", "dataset"]);
+    let failures = missing.json["failures"].to_string();
     assert!(
-        gone.code == 2 && failures.contains(file_name(&clips[1])) && failures.contains("does not exist"),
+        missing.code == 2 && failures.contains(file_name(&clips[1])) && failures.contains("does not exist"),
         "{failures}"
     );
 }
 
 #[test]
-fn a_plan_goes_with_a_forgotten_video() {
+fn forgetting_a_video_removes_its_plan() {
     let project = Project::with_clips("planned", 2, 1.0);
     assert_eq!(project.answer(&["plan", "--no-timing"]).code, 0);
     let clips = project.clips();
@@ -58,8 +58,8 @@ fn a_plan_goes_with_a_forgotten_video() {
     assert_eq!(forgotten.code, 0, "{} {}", forgotten.json, forgotten.errors);
     assert!(forgotten.json["found"].as_array().unwrap().is_empty());
     assert!(forgotten.json["advice"].to_string().contains("run `orator plan` again"), "{}", forgotten.json);
-    let left = files_under(&project.work()).into_iter().filter(|(name, _)| name.starts_with("plan"));
-    assert_eq!(left.count(), 0);
-    let refused = project.answer(&WORK);
-    assert!(refused.code == 1 && refused.errors.contains("create one with `orator plan`"), "{}", refused.errors);
+    let remaining = files_under(&project.work()).into_iter().filter(|(name, _)| name.starts_with("plan"));
+    assert_eq!(remaining.count(), 0);
+    let rejected = project.answer(&WORK);
+    assert!(rejected.code == 1 && rejected.errors.contains("create one with `orator plan`"), "{}", rejected.errors);
 }
