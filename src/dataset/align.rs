@@ -18,7 +18,7 @@ pub struct Alignment {
     /// All words of the text in order: aligned, or interpolated with confidence 0 if alignment failed.
     pub words: Vec<Word>,
     /// Indices of the words that could not be aligned; tokens without letters or digits are not counted.
-    pub unfit: Vec<usize>,
+    pub unaligned: Vec<usize>,
     /// Length of the sound, seconds.
     pub sound_secs: f64,
 }
@@ -58,15 +58,15 @@ pub fn align(
             _ => Ok(()),
         }
     })?;
-    let unfit: Vec<usize> = (0..texts.len()).filter(|&n| found[n].is_none() && has_letters(texts[n])).collect();
-    let n_aligned = n_words - unfit.len();
+    let unaligned: Vec<usize> = (0..texts.len()).filter(|&n| found[n].is_none() && has_letters(texts[n])).collect();
+    let n_aligned = n_words - unaligned.len();
     let sound_secs = n_samples as f64 / f64::from(SAMPLE_RATE);
     ensure!(
         n_aligned as f64 >= MIN_ALIGNED * n_words as f64,
         "only {n_aligned} of {n_words} words match the {} of audio: expected the English transcript of audible speech",
         length(sound_secs)
     );
-    Ok(Alignment { words: with_times(&texts, &found, sound_secs), unfit, sound_secs })
+    Ok(Alignment { words: with_times(&texts, &found, sound_secs), unaligned, sound_secs })
 }
 
 fn has_letters(text: &str) -> bool {
@@ -107,8 +107,8 @@ mod tests {
         let words = with_times(&["a", "b", "c", "d", "e", "f"], &found, 3.0);
         let times: Vec<_> = words.iter().map(|word| (word.start_secs, word.end_secs)).collect();
         assert_eq!(times, [(0.0, 1.0), (1.0, 1.5), (1.5, 2.0), (2.0, 2.5), (2.5, 3.0), (3.0, 3.0)]);
-        let unfit: Vec<usize> = (0..6).filter(|&n| words[n].confidence == Some(0.0)).collect();
-        assert_eq!(unfit, [0, 2, 3, 5]);
-        assert!(unfit.iter().all(|&n| words[n].source == WordSource::Interpolated));
+        let unaligned: Vec<usize> = (0..6).filter(|&n| words[n].confidence == Some(0.0)).collect();
+        assert_eq!(unaligned, [0, 2, 3, 5]);
+        assert!(unaligned.iter().all(|&n| words[n].source == WordSource::Interpolated));
     }
 }

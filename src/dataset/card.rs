@@ -39,7 +39,7 @@ pub fn text(info: &DatasetInfo, stats: &DatasetStats, leakage: &Leakage) -> Stri
         "# Speech and gestures of {speaker}\n\n\
          3D upper-body and finger motion with its speech: one speaker, {} of motion from {} of video, at {}.\n\n\
          | split | videos | intervals | length |\n|---|---|---|---|\n",
-        length(stats.footage.kept_secs),
+        length(stats.footage.accepted_secs),
         length(stats.footage.secs),
         info.fps
     );
@@ -75,19 +75,19 @@ pub fn text(info: &DatasetInfo, stats: &DatasetStats, leakage: &Leakage) -> Stri
          motion = webdataset.WebDataset(sorted(glob.glob(\"train-*.tar\")), shardshuffle=False).decode()\n```\n\n\
          `orator dataset verify --deep .` checks all files; `b3sum --check checksums.b3` checks their hashes.\n\n\
          ## Use of the footage\n\n| | length |\n|---|---|\n| accepted | {} |\n",
-        length(stats.footage.kept_secs)
+        length(stats.footage.accepted_secs)
     );
-    for (reason, secs) in &stats.footage.refused_secs {
+    for (reason, secs) in &stats.footage.rejected_secs {
         let _ = writeln!(text, "| rejected: {reason} | {} |", length(*secs));
     }
     let _ = writeln!(text, "| failed | {} |", length(stats.footage.failed_secs));
-    if let Some(WordCount { n_words, n_kept, .. }) = stats.footage.words {
-        let _ = writeln!(text, "\nThe samples contain {n_kept} of the {n_words} words of the transcripts.");
+    if let Some(WordCount { n_words, n_accepted, .. }) = stats.footage.words {
+        let _ = writeln!(text, "\nThe samples contain {n_accepted} of the {n_words} words of the transcripts.");
     }
     if let Some(posture) = &stats.posture {
         let n_frames = info.splits.get(Split::Train.name()).map_or(0, |split| split.frames).max(1) as f64;
         let shares =
-            posture.iter().map(|(channel, angles)| (channel.name(), percent(angles.n_seen[0] as f64, n_frames)));
+            posture.iter().map(|(channel, angles)| (channel.name(), percent(angles.n_visible[0] as f64, n_frames)));
         let shares: Vec<String> = shares.map(|(name, share)| format!("the {name} in {share}")).collect();
         let _ = writeln!(text, "\nVisible in the training split: {} of the frames.", shares.join(", "));
     }

@@ -12,7 +12,8 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct JointMoments {
     /// Number of frames in which each row is visible.
-    pub n_seen: Vec<u64>,
+    #[serde(rename = "n_seen")]
+    pub n_visible: Vec<u64>,
     pub mean: Vec<[f64; 3]>,
     /// Sum of squared differences from the mean.
     pub squares: Vec<[f64; 3]>,
@@ -31,7 +32,7 @@ impl Default for JointMoments {
 impl JointMoments {
     fn with_rows(n: usize) -> Self {
         let rows = || vec![[0.0; 3]; n];
-        Self { n_seen: vec![0; n], mean: rows(), squares: rows(), min: rows(), max: rows() }
+        Self { n_visible: vec![0; n], mean: rows(), squares: rows(), min: rows(), max: rows() }
     }
 
     /// Empty moments of postures; the rows are yaw, pitch and roll of the head, then of the trunk.
@@ -61,12 +62,12 @@ impl JointMoments {
         if row.iter().any(|v| !v.is_finite()) {
             return;
         }
-        let first = self.n_seen[joint] == 0;
-        self.n_seen[joint] += 1;
+        let first = self.n_visible[joint] == 0;
+        self.n_visible[joint] += 1;
         for (k, &value) in row.iter().enumerate() {
             let (value, mean) = (f64::from(value), &mut self.mean[joint][k]);
             let delta = value - *mean;
-            *mean += delta / self.n_seen[joint] as f64;
+            *mean += delta / self.n_visible[joint] as f64;
             self.squares[joint][k] += delta * (value - *mean);
             let (min, max) = (&mut self.min[joint][k], &mut self.max[joint][k]);
             *min = if first { value } else { min.min(value) };
@@ -77,8 +78,8 @@ impl JointMoments {
     /// Adds the moments of other frames. Rows that `other` lacks count as never visible.
     pub fn merge(&mut self, other: &JointMoments) {
         let rows = other.mean.iter().zip(&other.squares).zip(other.min.iter().zip(&other.max));
-        for (joint, ((mean, squares), (min, max))) in rows.enumerate().take(self.n_seen.len()) {
-            let (n, m) = (self.n_seen[joint] as f64, other.n_seen.get(joint).copied().unwrap_or(0) as f64);
+        for (joint, ((mean, squares), (min, max))) in rows.enumerate().take(self.n_visible.len()) {
+            let (n, m) = (self.n_visible[joint] as f64, other.n_visible.get(joint).copied().unwrap_or(0) as f64);
             if m == 0.0 {
                 continue;
             }
@@ -89,14 +90,14 @@ impl JointMoments {
                 self.min[joint][k] = if n == 0.0 { min[k] } else { self.min[joint][k].min(min[k]) };
                 self.max[joint][k] = if n == 0.0 { max[k] } else { self.max[joint][k].max(max[k]) };
             }
-            self.n_seen[joint] += m as u64;
+            self.n_visible[joint] += m as u64;
         }
     }
 
     /// Population standard deviations.
     pub fn std(&self) -> Vec<[f64; 3]> {
         let of = |(squares, n): (&[f64; 3], &u64)| squares.map(|square| (square / (*n).max(1) as f64).sqrt());
-        self.squares.iter().zip(&self.n_seen).map(of).collect()
+        self.squares.iter().zip(&self.n_visible).map(of).collect()
     }
 }
 
@@ -119,7 +120,7 @@ mod tests {
     fn masked_and_missing_joints_are_ignored() {
         let mut moments = JointMoments::default();
         moments.add_motion(&motion(&[1.0, 2.0, 6.0, 1000.0], &[3]));
-        assert_eq!((moments.n_seen[1], moments.n_seen[2], moments.n_seen[0]), (3, 0, 4));
+        assert_eq!((moments.n_visible[1], moments.n_visible[2], moments.n_visible[0]), (3, 0, 4));
         assert!((moments.mean[1][0] - 3.0).abs() < 1e-12);
         assert!((moments.std()[1][0] - (14.0f64 / 3.0).sqrt()).abs() < 1e-12);
         assert_eq!((moments.min[1][0], moments.max[1][0]), (1.0, 6.0));
@@ -137,7 +138,10 @@ mod tests {
             moments.add_motion(&motion(part, &[]));
             merged.merge(&moments);
         }
-        assert_eq!((&merged.n_seen, &merged.min, &merged.max), (&all_frames.n_seen, &all_frames.min, &all_frames.max));
+        assert_eq!(
+            (&merged.n_visible, &merged.min, &merged.max),
+            (&all_frames.n_visible, &all_frames.min, &all_frames.max)
+        );
         assert!((merged.mean[1][0] - all_frames.mean[1][0]).abs() < 1e-12);
         assert!((merged.std()[1][0] - all_frames.std()[1][0]).abs() < 1e-12);
     }

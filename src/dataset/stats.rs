@@ -21,7 +21,8 @@ const MAX_MAGNITUDE: f64 = 1000.0;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct DatasetStats {
     /// Number of frames of the training split in which each joint is visible.
-    pub n_seen: Vec<u64>,
+    #[serde(rename = "n_seen")]
+    pub n_visible: Vec<u64>,
     pub mean: Vec<[f64; 3]>,
     /// Population standard deviation.
     pub std: Vec<[f64; 3]>,
@@ -38,7 +39,8 @@ pub struct DatasetStats {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct AngleStats {
     /// Number of frames in which each angle is visible.
-    pub n_seen: [u64; 3],
+    #[serde(rename = "n_seen")]
+    pub n_visible: [u64; 3],
     pub mean: [f64; 3],
     /// Population standard deviation.
     pub std: [f64; 3],
@@ -57,15 +59,17 @@ pub struct WindowCount {
     pub apart: BTreeMap<String, usize>,
 }
 
-/// Seconds of the speaker's footage; `kept_secs`, `refused_secs` and `failed_secs` add up to `secs`.
+/// Seconds of the speaker's footage; `accepted_secs`, `rejected_secs` and `failed_secs` add up to `secs`.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct FootageCount {
     pub n_videos: usize,
     pub n_intervals: usize,
     pub secs: f64,
-    pub kept_secs: f64,
-    /// Refused seconds by reason.
-    pub refused_secs: BTreeMap<String, f64>,
+    #[serde(rename = "kept_secs")]
+    pub accepted_secs: f64,
+    /// Rejected seconds by reason.
+    #[serde(rename = "refused_secs")]
+    pub rejected_secs: BTreeMap<String, f64>,
     pub failed_secs: f64,
     /// Number of videos that failed before their length was known.
     pub n_of_unknown_length: usize,
@@ -93,7 +97,7 @@ impl DatasetStats {
     /// # Errors
     /// A table without one row per joint, values out of range, negative standard deviations.
     pub(crate) fn check(&self) -> Result<()> {
-        ensure!(self.n_seen.len() == N_JOINTS, "`n_seen` has {} rows, expected {N_JOINTS}", self.n_seen.len());
+        ensure!(self.n_visible.len() == N_JOINTS, "`n_seen` has {} rows, expected {N_JOINTS}", self.n_visible.len());
         let tables = [("mean", &self.mean), ("std", &self.std), ("min", &self.min), ("max", &self.max)];
         for (name, rows) in tables {
             ensure!(rows.len() == N_JOINTS, "`{name}` has {} rows, expected {N_JOINTS}", rows.len());
@@ -168,32 +172,32 @@ impl StatsCollector {
         footage.n_videos += 1;
         footage.n_intervals += entry.samples.len();
         footage.secs += entry.ledger.duration_secs;
-        footage.kept_secs += entry.ledger.kept_secs();
+        footage.accepted_secs += entry.ledger.accepted_secs();
         footage.failed_secs += entry.ledger.failed_secs();
         footage.n_of_unknown_length += usize::from(entry.ledger.duration_secs == 0.0 && entry.failure.is_some());
         footage.padded_sound_secs += entry.padded_sound_secs;
         if let Some(words) = &entry.ledger.words {
             *footage.words.get_or_insert_default() += words.count;
         }
-        for (reason, secs) in entry.ledger.refused_secs() {
-            *footage.refused_secs.entry(reason).or_default() += secs;
+        for (reason, secs) in entry.ledger.rejected_secs() {
+            *footage.rejected_secs.entry(reason).or_default() += secs;
         }
     }
 
     /// Returns the statistics.
     pub fn finish(self) -> DatasetStats {
         let std = self.moments.std();
-        let JointMoments { n_seen, mean, min, max, .. } = self.moments;
+        let JointMoments { n_visible, mean, min, max, .. } = self.moments;
         let posture = self.posture.map(|moments| {
             let std = moments.std();
             let of = |(channel, first): (PostureChannel, usize)| {
                 let angles = |rows: &[[f64; 3]]| std::array::from_fn(|k| rows[first + k][0]);
                 let (mean, std) = (angles(&moments.mean), angles(&std));
-                let n_seen = std::array::from_fn(|k| moments.n_seen[first + k]);
-                (channel, AngleStats { n_seen, mean, std, min: angles(&moments.min), max: angles(&moments.max) })
+                let n_visible = std::array::from_fn(|k| moments.n_visible[first + k]);
+                (channel, AngleStats { n_visible, mean, std, min: angles(&moments.min), max: angles(&moments.max) })
             };
             PostureChannel::ALL.into_iter().zip([0, 3]).map(of).collect()
         });
-        DatasetStats { n_seen, mean, std, min, max, windows: self.windows, footage: self.footage, posture }
+        DatasetStats { n_visible, mean, std, min, max, windows: self.windows, footage: self.footage, posture }
     }
 }

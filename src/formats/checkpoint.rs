@@ -62,10 +62,10 @@ pub fn list(folder: &Path) -> anyhow::Result<Vec<(usize, PathBuf)>> {
     Ok(found)
 }
 
-/// Removes all but the newest `n_kept` checkpoints; the newest one always remains.
-pub fn prune(folder: &Path, n_kept: usize) -> anyhow::Result<()> {
+/// Removes all but the newest `n_accepted` checkpoints; the newest one always remains.
+pub fn prune(folder: &Path, n_accepted: usize) -> anyhow::Result<()> {
     let found = list(folder)?;
-    let n_old = found.len().saturating_sub(n_kept.max(1));
+    let n_old = found.len().saturating_sub(n_accepted.max(1));
     for (_, path) in &found[..n_old] {
         std::fs::remove_file(path).with_context(|| format!("cannot remove the old checkpoint {}", path.display()))?;
     }

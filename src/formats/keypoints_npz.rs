@@ -1,7 +1,7 @@
 //! `keypoints.npz`: the 2D keypoints of a video at the dataset rate. Arrays: `body` f32 [T,17,3] (COCO-17; x px, y
 //! px, score), `left_hand`, `right_hand` f32 [T,21,3], `image_size` i64 [2] (width, height), `fps` f64 [2]
 //! (numerator, denominator; one number is also accepted), `time_secs` f64 [T], `person` f32 [T,5] (x, y, width,
-//! height, score), `n_people` i64 [T], `identity` i64 [T], `other_hand` i64 [T,2] (1: this hand was a duplicate of
+//! height, score), `n_persons` i64 [T], `identity` i64 [T], `other_hand` i64 [T,2] (1: this hand was a duplicate of
 //! the other one); with a face model also `mouth_opening`, `face_score` f32 [T].
 
 use super::keypoints::range;
@@ -20,7 +20,7 @@ pub struct Extras {
     /// Bounding box of the tracked person: x, y, width, height in px, score; [T, 5].
     pub person: Array2<f32>,
     /// Number of persons detected in each frame, [T].
-    pub n_people: Array1<i64>,
+    pub n_persons: Array1<i64>,
     /// Identity of the tracked person in each frame, [T]; incremented when another person is selected or tracking
     /// restarts.
     pub identity: Array1<i64>,
@@ -146,7 +146,7 @@ pub fn read_extras(path: &Path) -> Result<Extras> {
     let time_secs = npz.numbers("time_secs", &[None])?.into_dimensionality::<Ix1>()?;
     let n_frames = Some(time_secs.len());
     let person = npz.floats("person", &[n_frames, Some(5)])?.into_dimensionality::<Ix2>()?;
-    let n_people = npz.numbers("n_people", &[n_frames])?.mapv(|v| v as i64).into_dimensionality::<Ix1>()?;
+    let n_persons = npz.numbers("n_people", &[n_frames])?.mapv(|v| v as i64).into_dimensionality::<Ix1>()?;
     let identity = npz.numbers("identity", &[n_frames])?.mapv(|v| v as i64).into_dimensionality::<Ix1>()?;
     // Files of earlier versions lack this array.
     let other_hand = match npz.has("other_hand") {
@@ -159,7 +159,7 @@ pub fn read_extras(path: &Path) -> Result<Extras> {
         Ok(FaceFrames { opening: face_array("mouth_opening")?, score: face_array("face_score")? })
     });
     let face = face.transpose()?;
-    Ok(Extras { time_secs, person, n_people, identity, other_hand, face })
+    Ok(Extras { time_secs, person, n_persons, identity, other_hand, face })
 }
 
 /// Writes the file at `path`. The bytes are deterministic.
@@ -172,7 +172,7 @@ pub fn write(path: &Path, keypoints: &Keypoints, extras: &Extras) -> Result<()> 
         npz.add_array("fps", &npz::rate(keypoints.fps))?;
         npz.add_array("time_secs", &extras.time_secs)?;
         npz.add_array("person", &extras.person)?;
-        npz.add_array("n_people", &extras.n_people)?;
+        npz.add_array("n_people", &extras.n_persons)?;
         npz.add_array("identity", &extras.identity)?;
         if extras.other_hand.iter().any(|other| *other) {
             npz.add_array("other_hand", &extras.other_hand.mapv(i64::from))?;
@@ -244,7 +244,7 @@ mod tests {
             let extras = Extras {
                 time_secs: Array1::from_shape_fn(n_frames, |t| f64::from(numbers[t])),
                 person: Array2::from_shape_fn((n_frames, 5), |(t, k)| numbers[5 * t + k]),
-                n_people: Array1::from_shape_fn(n_frames, |t| t as i64),
+                n_persons: Array1::from_shape_fn(n_frames, |t| t as i64),
                 identity: Array1::from_shape_fn(n_frames, |t| 3 * t as i64),
                 other_hand: Array2::from_shape_fn((n_frames, 2), |(t, side)| numbers[2 * t + side] > 0.0),
                 face: has_face.then(|| FaceFrames {

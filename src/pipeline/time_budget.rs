@@ -103,7 +103,7 @@ impl TimeBudget {
         let ledger = ledger.unwrap_or_else(unreadable);
         // Adding 0.0 turns the -0.0 of an empty sum into 0.0.
         let (accepted, rejected, failed) =
-            (ledger.kept_secs() + 0.0, ledger.refused_secs(), ledger.failed_secs() + 0.0);
+            (ledger.accepted_secs() + 0.0, ledger.rejected_secs(), ledger.failed_secs() + 0.0);
         let mut budget = Self { accepted, rejected, failed, waiting, duration, ..budget };
         budget.sum = budget.total();
         let frame_secs = media.as_ref().map_or(UNKNOWN_FRAME_SECS, |media| 1.0 / media.fps.per_sec());

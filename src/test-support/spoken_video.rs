@@ -3,7 +3,7 @@
 use anyhow::Result;
 use ndarray::Array3;
 use orator_base::motion::bones;
-use orator_base::stage::ledger::{Kept, Ledger, TranscriptReport, WordCount};
+use orator_base::stage::ledger::{AcceptedInterval, Ledger, TranscriptReport, WordCount};
 use orator_base::types::pose3d::Motion;
 use orator_base::types::posture::Posture;
 use orator_base::types::sound::Sound;
@@ -49,7 +49,7 @@ impl SpokenVideo {
     fn source(&self) -> VideoSource {
         let (secs, n_frames) = (self.secs(), self.motion.n_frames());
         let words = self.words.as_ref().map(|words| TranscriptReport {
-            count: WordCount { n_words: words.len(), n_kept: words.len(), ..WordCount::default() },
+            count: WordCount { n_words: words.len(), n_accepted: words.len(), ..WordCount::default() },
             ..TranscriptReport::default()
         });
         VideoSource {
@@ -58,7 +58,7 @@ impl SpokenVideo {
             content: self.content.clone(),
             ledger: Ledger {
                 duration_secs: secs,
-                kept: vec![Kept { start_secs: 0.0, end_secs: secs }],
+                accepted: vec![AcceptedInterval { start_secs: 0.0, end_secs: secs }],
                 words,
                 ..Ledger::default()
             },

@@ -6,7 +6,7 @@ use ndarray::{ArrayView1, Axis};
 use orator_base::math::order::Ordered;
 use orator_base::stage::progress::Progress;
 use orator_base::types::image::Image;
-use orator_base::types::pose2d::{SEEN_SCORE, coco};
+use orator_base::types::pose2d::{VISIBLE_SCORE, coco};
 use orator_base::types::time::FrameRate;
 use orator_dataset::config::Settings;
 use orator_formats::keypoints_npz;
@@ -119,7 +119,7 @@ fn compare(one: &Path, other: &Path) -> Result<Report> {
         let width = distance(body.row(coco::L_SHOULDER), body.row(coco::R_SHOULDER)).max(1.0);
         for joint in coco::L_SHOULDER..=coco::R_WRIST {
             let [a, b] = [body.row(joint), other_body.row(joint)];
-            if a[2].min(b[2]) >= SEEN_SCORE {
+            if a[2].min(b[2]) >= VISIBLE_SCORE {
                 arms.push(100.0 * distance(a, b) / width);
             }
         }

@@ -26,8 +26,8 @@ pub(crate) fn lift(keypoints: &Path, out: &Path) -> Result<String> {
 
     // Joints are metres about the neck; a joint that is filled over a gap is masked, a missing one is NaN.
     let motion = &lifted.motion;
-    let n_seen = motion.mask.iter().filter(|seen| **seen).count();
-    let share = 100.0 * n_seen as f64 / motion.mask.len().max(1) as f64;
+    let n_visible = motion.mask.iter().filter(|seen| **seen).count();
+    let share = 100.0 * n_visible as f64 / motion.mask.len().max(1) as f64;
 
     // A performance is the motion on a rig: smoothed, and within what a body can do.
     let performance = perform(motion, None, &AnimationOptions::default());

@@ -2,7 +2,7 @@
 //! files and types are divided. The layers themselves are the dependencies in the manifests of the crates.
 
 use crate::fixtures::sources::{rust_files, scan, tokens, without_comments, without_tests};
-use orator_base::stage::refusal::Refusal;
+use orator_base::stage::rejection::Rejection;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -187,7 +187,7 @@ fn names_of_stages_and_their_files_are_defined_in_one_file() {
 fn rejection_reasons_are_defined_in_one_file() {
     // Single words of everyday use ("arms", "face") are also names of body parts and of measures.
     let common = ["quiet", "still", "face", "arms", "bones", "hands", "cut", "open", "jump", "no sound"];
-    let reasons = Refusal::JUDGED.map(Refusal::reason);
+    let reasons = Rejection::JUDGED.map(Rejection::reason);
     let is_reason = |string: &str| reasons.contains(&string) && !common.contains(&string);
     assert_none(&strings_outside("base/stage/refusal.rs", |string, _| is_reason(string)));
 }

@@ -6,7 +6,7 @@
 use crate::math::order::upper_median;
 use crate::math::rotation::Rotation;
 use crate::math::vec3::Vec3;
-use crate::types::pose2d::{SEEN_SCORE, coco};
+use crate::types::pose2d::{VISIBLE_SCORE, coco};
 use ndarray::{ArrayView2, ArrayView3, Axis};
 
 /// Nose, left and right eye, left and right ear at the positions that pose models detect, in metres from the middle
@@ -69,7 +69,7 @@ struct FacePoints {
 impl FacePoints {
     fn from_keypoints(body: ArrayView2<f32>) -> Option<Self> {
         let at = |point: usize| [f64::from(body[[point, 0]]), -f64::from(body[[point, 1]])];
-        let seen = |point: usize| (0..3).all(|k| body[[point, k]].is_finite()) && body[[point, 2]] >= SEEN_SCORE;
+        let seen = |point: usize| (0..3).all(|k| body[[point, k]].is_finite()) && body[[point, 2]] >= VISIBLE_SCORE;
         let weights: [f64; 5] =
             std::array::from_fn(
                 |point| if seen(point) { f64::from(body[[point, 2]]).min(1.0).powi(SCORE_POWER) } else { 0.0 },

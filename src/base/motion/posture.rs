@@ -7,7 +7,7 @@ use super::face;
 use crate::math::order::{median, upper_median};
 use crate::math::rotation::Rotation;
 use crate::math::vec3::{Vec3, add, scale, sub, unit};
-use crate::types::pose2d::{SEEN_SCORE, coco};
+use crate::types::pose2d::{VISIBLE_SCORE, coco};
 use crate::types::posture::Posture;
 use crate::types::skeleton::{L_SHOULDER, R_SHOULDER};
 use ndarray::{ArrayView2, ArrayView3};
@@ -92,8 +92,8 @@ pub fn is_seated(body: ArrayView3<f32>) -> Option<bool> {
             (trunk > 1.0).then(|| (knee[1] - hip[1]) / trunk)
         })
         .collect();
-    let n_seen = drops.iter().flatten().count();
-    if (n_seen as f64) < KNEES_SHARE * drops.len() as f64 {
+    let n_visible = drops.iter().flatten().count();
+    if (n_visible as f64) < KNEES_SHARE * drops.len() as f64 {
         return None;
     }
     Some(median(drops.into_iter().flatten())? < SEATED_BELOW)
@@ -129,12 +129,12 @@ fn middle(frame: &ArrayView2<f32>, points: [usize; 2]) -> Option<[f64; 2]> {
 
 fn seen(frame: &ArrayView2<f32>, point: usize) -> Option<[f64; 2]> {
     let [x, y, score] = [0, 1, 2].map(|k| frame[[point, k]]);
-    (x.is_finite() && y.is_finite() && score >= SEEN_SCORE).then_some([f64::from(x), f64::from(y)])
+    (x.is_finite() && y.is_finite() && score >= VISIBLE_SCORE).then_some([f64::from(x), f64::from(y)])
 }
 
 fn is_mostly_visible(directions: &[Option<Vec3>]) -> bool {
-    let n_seen = directions.iter().flatten().count();
-    n_seen > 0 && n_seen as f64 >= HIPS_SHARE * directions.len() as f64
+    let n_visible = directions.iter().flatten().count();
+    n_visible > 0 && n_visible as f64 >= HIPS_SHARE * directions.len() as f64
 }
 
 fn median_direction(directions: &[Option<Vec3>]) -> Option<Vec3> {

@@ -35,7 +35,7 @@ pub const MIRROR: [usize; N_POINTS] = [NOSE, L_SHOULDER, L_ELBOW, L_WRIST, R_SHO
 pub type Pose = [Vec3; N_POINTS];
 
 /// Nine keypoints of a picture, x and y in px; `None`: not visible.
-pub type SeenBody = [Option<[f32; 2]>; N_POINTS];
+pub type BodyPoints = [Option<[f32; 2]>; N_POINTS];
 
 /// Size in metres, in the sense of `size`, to which every body is scaled, because a picture does not show a person's
 /// size.

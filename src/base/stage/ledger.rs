@@ -1,8 +1,8 @@
-//! The ledger of a video's seconds: every second is either retained, refused (with a reason and a measured value), or
-//! belongs to a stage that failed. `segment` writes it and `lift` moves seconds from retained to refused; later stages
+//! The ledger of a video's seconds: every second is either accepted, rejected (with a reason and a measured value), or
+//! belongs to a stage that failed. `segment` writes it and `lift` moves seconds from accepted to rejected; later stages
 //! only sum them.
 
-use super::refusal::{FrameRefusal, Refusal};
+use super::rejection::{FrameRejection, Rejection};
 use crate::input;
 use anyhow::{Context, Result, ensure};
 use serde::{Deserialize, Serialize};
@@ -13,11 +13,13 @@ use std::path::Path;
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Ledger {
     pub duration_secs: f64,
-    pub kept: Vec<Kept>,
-    /// Parts of the retained intervals in which the hands rest on each other.
+    #[serde(rename = "kept")]
+    pub accepted: Vec<AcceptedInterval>,
+    /// Parts of the accepted intervals in which the hands rest on each other.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub resting: Vec<Kept>,
-    pub refused: Vec<Refused>,
+    pub resting: Vec<AcceptedInterval>,
+    #[serde(rename = "refused")]
+    pub rejected: Vec<RejectedInterval>,
     #[serde(default)]
     pub failed: Vec<Failed>,
     /// Account of the words; `None`: no transcript was requested.
@@ -36,44 +38,46 @@ pub struct TranscriptReport {
     pub notes: Vec<String>,
 }
 
-/// Numbers of words by outcome: `n_kept`, `n_refused` and `n_outside` add up to `n_words`.
+/// Numbers of words by outcome: `n_accepted`, `n_rejected` and `n_outside` add up to `n_words`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct WordCount {
     pub n_words: usize,
     /// Words inside samples.
-    pub n_kept: usize,
-    /// Words in intervals that were refused.
-    pub n_refused: usize,
+    #[serde(rename = "n_kept")]
+    pub n_accepted: usize,
+    /// Words in intervals that were rejected.
+    #[serde(rename = "n_refused")]
+    pub n_rejected: usize,
     /// Words after the end of the audio.
     pub n_outside: usize,
 }
 
 impl WordCount {
     /// Returns whether every word is accounted for.
-    pub fn is_whole(&self) -> bool {
-        self.n_kept + self.n_refused + self.n_outside == self.n_words
+    pub fn is_complete(&self) -> bool {
+        self.n_accepted + self.n_rejected + self.n_outside == self.n_words
     }
 }
 
 impl std::ops::AddAssign for WordCount {
     fn add_assign(&mut self, other: Self) {
         self.n_words += other.n_words;
-        self.n_kept += other.n_kept;
-        self.n_refused += other.n_refused;
+        self.n_accepted += other.n_accepted;
+        self.n_rejected += other.n_rejected;
         self.n_outside += other.n_outside;
     }
 }
 
-/// A retained interval.
+/// A accepted interval.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Kept {
+pub struct AcceptedInterval {
     pub start_secs: f64,
     pub end_secs: f64,
 }
 
-/// A refused interval.
+/// A rejected interval.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Refused {
+pub struct RejectedInterval {
     pub start_secs: f64,
     pub end_secs: f64,
     /// Short machine-readable reason.
@@ -88,17 +92,17 @@ pub struct Refused {
     pub message: String,
 }
 
-impl Refused {
-    /// Creates an interval refused for `why`, with the standard message of its reason.
-    pub fn new(start_secs: f64, end_secs: f64, why: FrameRefusal) -> Self {
-        let message = why.refusal.message(why.measured, why.threshold);
+impl RejectedInterval {
+    /// Creates an interval rejected for `why`, with the standard message of its reason.
+    pub fn new(start_secs: f64, end_secs: f64, why: FrameRejection) -> Self {
+        let message = why.rejection.message(why.measured, why.threshold);
         Self::with_message(start_secs, end_secs, why, message)
     }
 
-    /// Creates an interval refused for `why`, with a custom message.
-    pub fn with_message(start_secs: f64, end_secs: f64, why: FrameRefusal, message: String) -> Self {
-        let FrameRefusal { refusal, measured, threshold } = why;
-        let (reason, unit) = (refusal.reason().to_owned(), refusal.unit().to_owned());
+    /// Creates an interval rejected for `why`, with a custom message.
+    pub fn with_message(start_secs: f64, end_secs: f64, why: FrameRejection, message: String) -> Self {
+        let FrameRejection { rejection, measured, threshold } = why;
+        let (reason, unit) = (rejection.reason().to_owned(), rejection.unit().to_owned());
         Self { start_secs, end_secs, reason, measured, threshold, unit, message }
     }
 }
@@ -128,7 +132,7 @@ impl Ledger {
         let ledger: Self =
             serde_json::from_slice(&bytes).with_context(|| format!("{} is not a ledger", path.display()))?;
         ensure!(
-            ledger.is_whole(),
+            ledger.is_complete(),
             "{}: expected adjacent intervals from 0 to {:.2} s, without gaps or overlaps",
             path.display(),
             ledger.duration_secs
@@ -136,12 +140,12 @@ impl Ledger {
         Ok(ledger)
     }
 
-    /// Retained seconds.
-    pub fn kept_secs(&self) -> f64 {
-        self.kept.iter().map(|kept| kept.end_secs - kept.start_secs).sum()
+    /// Accepted seconds.
+    pub fn accepted_secs(&self) -> f64 {
+        self.accepted.iter().map(|accepted| accepted.end_secs - accepted.start_secs).sum()
     }
 
-    /// Retained seconds in which the hands rest.
+    /// Accepted seconds in which the hands rest.
     pub fn resting_secs(&self) -> f64 {
         self.resting.iter().map(|rest| rest.end_secs - rest.start_secs).sum()
     }
@@ -151,16 +155,17 @@ impl Ledger {
     #[must_use]
     pub fn with_resting(mut self, stretches: impl Iterator<Item = (f64, f64)>) -> Self {
         let until = self.duration_secs;
-        let kept = |(start, end): (f64, f64)| Kept { start_secs: start.min(until), end_secs: end.min(until) };
-        self.resting = stretches.map(kept).filter(|rest| rest.start_secs < rest.end_secs).collect();
+        let accepted =
+            |(start, end): (f64, f64)| AcceptedInterval { start_secs: start.min(until), end_secs: end.min(until) };
+        self.resting = stretches.map(accepted).filter(|rest| rest.start_secs < rest.end_secs).collect();
         self
     }
 
-    /// Refused seconds by reason.
-    pub fn refused_secs(&self) -> BTreeMap<String, f64> {
+    /// Rejected seconds by reason.
+    pub fn rejected_secs(&self) -> BTreeMap<String, f64> {
         let mut secs = BTreeMap::new();
-        for refused in &self.refused {
-            *secs.entry(refused.reason.clone()).or_default() += refused.end_secs - refused.start_secs;
+        for rejected in &self.rejected {
+            *secs.entry(rejected.reason.clone()).or_default() += rejected.end_secs - rejected.start_secs;
         }
         secs
     }
@@ -171,11 +176,11 @@ impl Ledger {
     }
 
     /// Returns whether every second from 0 to the end belongs to exactly one interval.
-    pub fn is_whole(&self) -> bool {
-        let kept = self.kept.iter().map(|kept| (kept.start_secs, kept.end_secs));
-        let refused = self.refused.iter().map(|refused| (refused.start_secs, refused.end_secs));
+    pub fn is_complete(&self) -> bool {
+        let accepted = self.accepted.iter().map(|accepted| (accepted.start_secs, accepted.end_secs));
+        let rejected = self.rejected.iter().map(|rejected| (rejected.start_secs, rejected.end_secs));
         let failed = self.failed.iter().map(|failed| (failed.start_secs, failed.end_secs));
-        let mut stretches: Vec<_> = kept.chain(refused).chain(failed).collect();
+        let mut stretches: Vec<_> = accepted.chain(rejected).chain(failed).collect();
         stretches.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1)));
         let mut at = 0.0;
         for (start, end) in stretches {
@@ -194,7 +199,7 @@ pub fn longest_first(secs: &BTreeMap<String, f64>) -> String {
     reasons.sort_by(|a, b| b.1.total_cmp(a.1).then(a.0.cmp(b.0)));
     reasons
         .iter()
-        .map(|(reason, secs)| format!("{} {secs:.1} s", Refusal::label(reason)))
+        .map(|(reason, secs)| format!("{} {secs:.1} s", Rejection::label(reason)))
         .collect::<Vec<_>>()
         .join(", ")
 }

@@ -9,7 +9,7 @@ pub mod overall;
 pub mod parts;
 pub mod progress;
 pub mod record;
-pub mod refusal;
+pub mod rejection;
 pub mod runner;
 pub mod unit;
 pub mod workdir;

@@ -1,4 +1,4 @@
-//! Retained runs of frames.
+//! Accepted runs of frames.
 
 use super::time::FrameRate;
 use serde::{Deserialize, Serialize};
@@ -51,7 +51,7 @@ impl Intervals {
         Self { fps, n_frames, intervals, windows_64, resting: Vec::new() }
     }
 
-    /// Sets `resting` to the parts of the given intervals that overlap the retained ones.
+    /// Sets `resting` to the parts of the given intervals that overlap the accepted ones.
     #[must_use]
     pub fn with_resting(mut self, resting: &[Interval]) -> Self {
         let part = |interval: &Interval, rest: &Interval| Interval {

@@ -11,7 +11,7 @@ pub const N_BODY: usize = 17;
 pub const N_HAND: usize = 21;
 
 /// Minimum score of a visible keypoint.
-pub const SEEN_SCORE: f32 = 0.3;
+pub const VISIBLE_SCORE: f32 = 0.3;
 /// Minimum score of a visible hand keypoint for the hand lifter.
 pub const HAND_VISIBLE_SCORE: f32 = 0.2;
 
@@ -57,7 +57,7 @@ pub struct Pose2d {
     /// Bounding box of the tracked person.
     pub person: PersonBox,
     /// Number of persons in the picture.
-    pub n_people: u8,
+    pub n_persons: u8,
     /// Track id of the tracked person.
     pub identity: i64,
     /// Body keypoints, COCO-17.

@@ -17,7 +17,7 @@ pub(super) struct BodyArgs {
     shoulder_yaw: ShoulderYaw,
     /// Lower body: `seated` and `standing` plant the feet under hips that follow the trunk, `none` keeps legs and
     /// hips at rest. Defaults to `seated` if hips and knees were detected and the thighs extend downwards by less
-    /// than 0.55 of the height from hips to shoulders, else to `standing`.
+    /// than 0.4 of the height from hips to shoulders, else to `standing`.
     #[arg(long, value_enum, value_name = "POSE")]
     legs: Option<LegsName>,
     /// Do not animate breathing, which moves the neck by 3 mm and no joint relative to it.

@@ -76,22 +76,22 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     let mut text = serde_json::to_string_pretty(&aligned.words)?;
     text.push('\n');
     workdir::write_file(&args.out, text.as_bytes())?;
-    let Alignment { words, unfit, sound_secs } = &aligned;
+    let Alignment { words, unaligned, sound_secs } = &aligned;
     let n_aligned = words.len() - words.iter().filter(|word| word.confidence == Some(0.0)).count();
     let mut lines =
         vec![format!("{n_aligned} of {} aligned in {} of audio", counted(words.len(), "word"), length(*sound_secs))];
-    if !unfit.is_empty() {
-        let shown = unfit
+    if !unaligned.is_empty() {
+        let shown = unaligned
             .iter()
             .take(SHOWN)
             .map(|&n| format!("word {} `{}` near {:.1} s", n + 1, words[n].word, words[n].start_secs));
-        let more = if unfit.len() > SHOWN { ", ..." } else { "" };
+        let more = if unaligned.len() > SHOWN { ", ..." } else { "" };
         let shown = shown.collect::<Vec<_>>().join(", ");
-        lines.push(format!("{} not aligned, with confidence 0: {shown}{more}", counted(unfit.len(), "word")));
+        lines.push(format!("{} not aligned, with confidence 0: {shown}{more}", counted(unaligned.len(), "word")));
     }
     lines.push(format!("wrote {}", args.out.display()));
     let next = format!("orator words check {}", args.out.display());
-    let marked = unfit.iter().map(|&n| {
+    let marked = unaligned.iter().map(|&n| {
         json!({ "number": n + 1, "word": words[n].word, "start_secs": words[n].start_secs, "end_secs": words[n].end_secs })
     });
     let facts = json!({

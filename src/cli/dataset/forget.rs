@@ -61,7 +61,7 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
         None => of_project(&args, &mut locks)?,
     };
     let lines: Vec<String> = task.removals.iter().flat_map(|removal| removal.lines(args.keep_models)).collect();
-    let kept: Vec<&PathBuf> = task.removals.iter().filter(|_| args.keep_models).flat_map(|r| &r.models).collect();
+    let accepted: Vec<&PathBuf> = task.removals.iter().filter(|_| args.keep_models).flat_map(|r| &r.models).collect();
     let names = task.titles.join(", ");
     if args.dry_run {
         let text = match lines.is_empty() {
@@ -77,13 +77,13 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     }
     let terms: Vec<_> = task.removals.iter().flat_map(|removal| removal.terms.clone()).collect();
     let mut searched = search(&task.folders, &terms).context("cannot verify the removal")?;
-    // A retained model lists its training videos; it is reported as retained instead.
-    searched.hits.retain(|hit| !kept.iter().any(|model| Path::new(&hit.file).starts_with(model)));
+    // A accepted model lists its training videos; it is reported as accepted instead.
+    searched.hits.retain(|hit| !accepted.iter().any(|model| Path::new(&hit.file).starts_with(model)));
     let mut text = match lines.is_empty() {
         true => vec![format!("found nothing to remove for {names}")],
         false => vec![format!("removed {names}:"), format!("  {}", lines.join("\n  "))],
     };
-    text.extend(kept.iter().map(|model| format!("retained, although trained on it: {}", model.display())));
+    text.extend(accepted.iter().map(|model| format!("retained, although trained on it: {}", model.display())));
     text.extend(task.advice.iter().cloned());
     text.extend(searched.hits.iter().map(|found| match found.at {
         Some(at) => format!("FOUND   {} at byte {at}: {}", found.file, found.what),
@@ -102,7 +102,7 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
         None => format!("orator status{}", args.config.flags()),
     };
     let facts = json!({
-        "videos": task.titles, "removed": lines, "retained_models": kept, "advice": task.advice, "found": found,
+        "videos": task.titles, "removed": lines, "retained_models": accepted, "advice": task.advice, "found": found,
         "next": next,
         "searched": { "files": n_files, "bytes": bytes, "inside_bytes": inside_bytes, "marks": terms.len() },
     });

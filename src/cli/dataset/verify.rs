@@ -112,8 +112,8 @@ fn info(dir: &std::path::Path, ui: &Ui) -> Result<Outcome> {
         ));
     }
     let footage = &stats.footage;
-    lines.push(format!("accepted {} of {} of video", length(footage.kept_secs), length(footage.secs)));
-    lines.extend(footage.refused_secs.iter().map(|(reason, secs)| format!("  rejected, {reason}: {}", length(*secs))));
+    lines.push(format!("accepted {} of {} of video", length(footage.accepted_secs), length(footage.secs)));
+    lines.extend(footage.rejected_secs.iter().map(|(reason, secs)| format!("  rejected, {reason}: {}", length(*secs))));
     lines.push(format!(
         "  failed: {}, and {} of unknown duration",
         length(footage.failed_secs),
@@ -124,7 +124,7 @@ fn info(dir: &std::path::Path, ui: &Ui) -> Result<Outcome> {
             "  {:40} {:10} accepted {:7.1} of {:7.1} s{}",
             account.name,
             account.split.map_or(if account.blocks.is_empty() { "-" } else { "by time" }, Split::name),
-            account.ledger.kept_secs(),
+            account.ledger.accepted_secs(),
             account.ledger.duration_secs,
             account.failure.map(|failure| format!("; {failure}")).unwrap_or_default()
         ));

@@ -196,7 +196,7 @@ const ROWS: [Row; 8] = [
     ("frames without wrist position, %", "missing_percent", |a| 100.0 * a.missing),
     ("frames without detected wrist, %", "masked_percent", |a| 100.0 * a.masked),
     ("hand joints with position, %", "hand_present_percent", |a| 100.0 * a.hand_there),
-    ("hand joints detected, %", "hand_detected_percent", |a| 100.0 * a.hand_seen),
+    ("hand joints detected, %", "hand_detected_percent", |a| 100.0 * a.hand_visible),
 ];
 
 fn table(metrics: &ClipStatistics) -> String {

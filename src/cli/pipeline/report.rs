@@ -46,9 +46,9 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     let (sums, mut facts) = (page.sums, page.facts);
     let text = format!(
         "accepted {} of {} ({}), rejected {}, failed {}\nwrote {} ({:.1} MB)",
-        length(sums.kept),
+        length(sums.accepted),
         length(sums.total),
-        percent(sums.kept, sums.total),
+        percent(sums.accepted, sums.total),
         length(sums.rejected_secs()),
         length(sums.failed),
         out.display(),

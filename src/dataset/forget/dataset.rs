@@ -109,8 +109,8 @@ fn redacted(entry: &VideoEntry, names: &BTreeSet<String>) -> VideoEntry {
         // The video stays in its split; only the reason changes.
         entry.split_by = SplitBy::Share;
     }
-    for refused in &mut entry.ledger.refused {
-        names.iter().for_each(|name| refused.message = refused.message.replace(name.as_str(), FORGOTTEN));
+    for rejected in &mut entry.ledger.rejected {
+        names.iter().for_each(|name| rejected.message = rejected.message.replace(name.as_str(), FORGOTTEN));
     }
     entry
 }

@@ -2,7 +2,7 @@
 //! sound, and WebDataset shards written by orator.
 //!
 //! Steps for a take: `find` (files) -> `mocap` (joints at the source's rate) -> `motion::resample` (the dataset's rate)
-//! -> `take` (bones, sound, trimming; a sample or a refusal) -> `write` (the dataset). `shards` imports tar members
+//! -> `take` (bones, sound, trimming; a sample or a rejection) -> `write` (the dataset). `shards` imports tar members
 //! unchanged.
 
 pub mod find;

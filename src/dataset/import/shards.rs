@@ -6,8 +6,8 @@ use crate::{Split, file_name};
 use anyhow::{Context, Result, bail, ensure};
 use ndarray::{Array2, Array3};
 use orator_base::input;
-use orator_base::stage::ledger::{Kept, Ledger, Refused};
-use orator_base::stage::refusal::{FrameRefusal, Refusal};
+use orator_base::stage::ledger::{AcceptedInterval, Ledger, RejectedInterval};
+use orator_base::stage::rejection::{FrameRejection, Rejection};
 use orator_base::text::counted;
 use orator_base::types::pose3d::Motion;
 use orator_base::types::posture::Posture;
@@ -238,18 +238,18 @@ fn read_wav(bytes: &[u8]) -> Result<Sound> {
 }
 
 /// Ledger of a video that is known from its samples alone, each as (start, duration) in seconds; the gaps between them
-/// are refused as not imported.
+/// are rejected as not imported.
 pub fn ledger(samples: &[(f64, f64)]) -> Ledger {
     let mut ledger = Ledger::default();
     for &(start, secs) in samples {
         let at = ledger.duration_secs;
         let start_secs = if start.is_finite() && start > at { start } else { at };
         if start_secs > at {
-            let why = FrameRefusal::new(Refusal::NotImported, 0.0, 0.0);
-            ledger.refused.push(Refused::new(at, start_secs, why));
+            let why = FrameRejection::new(Rejection::NotImported, 0.0, 0.0);
+            ledger.rejected.push(RejectedInterval::new(at, start_secs, why));
         }
         ledger.duration_secs = start_secs + secs;
-        ledger.kept.push(Kept { start_secs, end_secs: ledger.duration_secs });
+        ledger.accepted.push(AcceptedInterval { start_secs, end_secs: ledger.duration_secs });
     }
     ledger
 }

@@ -17,8 +17,8 @@ use anyhow::{Result, ensure};
 use orator_base::audio::fingerprint::Fingerprinter;
 use orator_base::motion::bones;
 use orator_base::stage::fingerprint::hash_file;
-use orator_base::stage::ledger::{Kept, Ledger, Refused, TranscriptReport, WordCount};
-use orator_base::stage::refusal::{FrameRefusal, Refusal};
+use orator_base::stage::ledger::{AcceptedInterval, Ledger, RejectedInterval, TranscriptReport, WordCount};
+use orator_base::stage::rejection::{FrameRejection, Rejection};
 use orator_base::text::number;
 use orator_formats::joints_description::path_of;
 use orator_formats::mocap::bvh;
@@ -152,10 +152,10 @@ impl ImportItem {
         };
         match self {
             Self::Take(found) => {
-                let TakeOutcome::Accepted(kept) = ImportedTake::read(found, &plan.limits)?.outcome else {
+                let TakeOutcome::Accepted(accepted) = ImportedTake::read(found, &plan.limits)?.outcome else {
                     anyhow::bail!("{} changed while it was imported", found.motion.display());
                 };
-                entry.push(&kept.sample, 0.0)?;
+                entry.push(&accepted.sample, 0.0)?;
             }
             Self::ShardVideo(video) => {
                 for shard_sample in &video.samples {
@@ -183,32 +183,37 @@ fn inspect_take(found: &TakeFiles, plan: &ImportPlan) -> Result<InspectedItem> {
         ..VideoSource::default()
     };
     match take.outcome {
-        TakeOutcome::Rejected(refusal) => {
-            source.ledger.refused.push(Refused::with_message(0.0, duration_secs, refusal.why, refusal.message));
+        TakeOutcome::Rejected(rejection) => {
+            source.ledger.rejected.push(RejectedInterval::with_message(
+                0.0,
+                duration_secs,
+                rejection.why,
+                rejection.message,
+            ));
             Ok(InspectedItem { source, ..InspectedItem::default() })
         }
-        TakeOutcome::Accepted(kept) => {
-            let n_frames = kept.sample.n_frames();
+        TakeOutcome::Accepted(accepted) => {
+            let n_frames = accepted.sample.n_frames();
             let end_secs = plan.limits.fps.secs(n_frames);
-            source.ledger.kept.push(Kept { start_secs: 0.0, end_secs });
+            source.ledger.accepted.push(AcceptedInterval { start_secs: 0.0, end_secs });
             if end_secs < duration_secs {
-                let why = FrameRefusal::new(Refusal::NoSoundFile, 0.0, 0.0);
-                source.ledger.refused.push(Refused::new(end_secs, duration_secs, why));
+                let why = FrameRejection::new(Rejection::NoSoundFile, 0.0, 0.0);
+                source.ledger.rejected.push(RejectedInterval::new(end_secs, duration_secs, why));
             }
-            source.bones = VideoBones { lengths_metres: kept.lengths.map(f64::from).to_vec(), n_frames };
-            let bones = match kept.moved_mm {
+            source.bones = VideoBones { lengths_metres: accepted.lengths.map(f64::from).to_vec(), n_frames };
+            let bones = match accepted.moved_mm {
                 moved_mm if moved_mm > NOTABLE_SHIFT_MM => Some(format!(
                     "bone lengths vary: making them constant moved the joints by {} mm (median)",
                     number(moved_mm)
                 )),
                 _ => None,
             };
-            source.ledger.words = kept.words;
+            source.ledger.words = accepted.words;
             let notes = source.ledger.words.iter().flat_map(|words| words.notes.iter().cloned());
-            let unit = kept.sample.meta["imported"].as_object().and_then(bvh::unit_note);
+            let unit = accepted.sample.meta["imported"].as_object().and_then(bvh::unit_note);
             let note = unit.into_iter().chain(bones).chain(notes).collect::<Vec<_>>().join("; ");
             let mut fingerprinter = Fingerprinter::default();
-            fingerprinter.push(&kept.sample.sound.samples);
+            fingerprinter.push(&accepted.sample.sound.samples);
             let codes = (!plan.limits.no_sound).then(|| fingerprinter.finish());
             Ok(InspectedItem { source, codes, note, ..InspectedItem::default() })
         }
@@ -281,7 +286,8 @@ fn inspect_shard_video(video: &ShardVideo, plan: &ImportPlan) -> Result<Inspecte
         bone_sets.push(VideoBones { lengths_metres: bones::measure(&sample.motion).map(f64::from).to_vec(), n_frames });
         fingerprinter.push(&sample.sound.samples);
         if let Some(sample_words) = &sample.words {
-            let count = WordCount { n_words: sample_words.len(), n_kept: sample_words.len(), ..WordCount::default() };
+            let count =
+                WordCount { n_words: sample_words.len(), n_accepted: sample_words.len(), ..WordCount::default() };
             words.get_or_insert_default().count += count;
         }
         if let Some(hash) = sample.meta["content"].as_str() {
@@ -313,13 +319,13 @@ fn inspect_shard_video(video: &ShardVideo, plan: &ImportPlan) -> Result<Inspecte
 impl InspectedItem {
     /// Whether the item has a sample to write.
     pub fn is_accepted(&self) -> bool {
-        !self.source.ledger.kept.is_empty() && self.source.failure.is_none()
+        !self.source.ledger.accepted.is_empty() && self.source.failure.is_none()
     }
 
-    /// Refuses an item whose name another item already has.
+    /// Rejects an item whose name another item already has.
     pub fn reject_duplicate_name(mut self) -> Self {
         let message = format!("{} is there already", self.source.name);
-        self.refuse(self.source.ledger.kept_secs(), 0.0, &message);
+        self.reject(self.source.ledger.accepted_secs(), 0.0, &message);
         self
     }
 
@@ -331,35 +337,43 @@ impl InspectedItem {
         self.source.name = format!("{stem}-{}", &mark[..8]);
     }
 
-    /// Refuses an item that shares sound with videos in different splits.
+    /// Rejects an item that shares sound with videos in different splits.
     pub fn reject_shared(&mut self, with: &[SharedSound], threshold: f64) {
         let name = self.source.name.clone();
         let others: Vec<&str> = with.iter().filter_map(|shared| shared.other(&name)).collect();
         let secs = with.first().map_or(0.0, |shared| shared.secs);
         let message =
             format!("the same {secs:.1} s of sound are in {}, which are in different splits", others.join(" and "));
-        self.refuse(secs, threshold, &message);
+        self.reject(secs, threshold, &message);
         (self.sound, self.split) = (None, None);
     }
 
-    fn refuse(&mut self, measured: f64, threshold: f64, message: &str) {
+    fn reject(&mut self, measured: f64, threshold: f64, message: &str) {
         let ledger = &mut self.source.ledger;
-        let why = FrameRefusal::new(Refusal::Duplicate, measured, threshold);
-        let to_refused = |kept: Kept| Refused::with_message(kept.start_secs, kept.end_secs, why, message.to_owned());
-        let all_refused: Vec<Refused> = ledger.kept.drain(..).map(to_refused).collect();
-        ledger.refused.extend(all_refused);
-        ledger.refused.sort_by(|a, b| a.start_secs.total_cmp(&b.start_secs));
+        let why = FrameRejection::new(Rejection::Duplicate, measured, threshold);
+        let to_refused = |accepted: AcceptedInterval| {
+            RejectedInterval::with_message(accepted.start_secs, accepted.end_secs, why, message.to_owned())
+        };
+        let all_refused: Vec<RejectedInterval> = ledger.accepted.drain(..).map(to_refused).collect();
+        ledger.rejected.extend(all_refused);
+        ledger.rejected.sort_by(|a, b| a.start_secs.total_cmp(&b.start_secs));
         self.codes = None;
     }
 
     /// Outcome of the item.
     pub fn line(&self, file: &str) -> ImportOutcome {
-        let (outcome, reason, message) = match (&self.source.failure, self.source.ledger.refused.first()) {
+        let (outcome, reason, message) = match (&self.source.failure, self.source.ledger.rejected.first()) {
             (Some(error), _) => ("failed", "error".to_owned(), error.clone()),
             (None, _) if self.is_accepted() => ("kept", String::new(), self.note.clone()),
-            (None, Some(refused)) => ("refused", refused.reason.clone(), refused.message.clone()),
+            (None, Some(rejected)) => ("refused", rejected.reason.clone(), rejected.message.clone()),
             (None, None) => ("refused", "empty".to_owned(), "it is empty".to_owned()),
         };
-        ImportOutcome { file: file.to_owned(), outcome, accepted_secs: self.source.ledger.kept_secs(), reason, message }
+        ImportOutcome {
+            file: file.to_owned(),
+            outcome,
+            accepted_secs: self.source.ledger.accepted_secs(),
+            reason,
+            message,
+        }
     }
 }

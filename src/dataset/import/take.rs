@@ -1,5 +1,5 @@
 //! Conversion of one mocap take to a sample (motion at the dataset's rate with constant bone lengths, and sound, both
-//! trimmed to their common length), or the reason for refusing it. A take is one continuous interval.
+//! trimmed to their common length), or the reason for rejecting it. A take is one continuous interval.
 
 use super::find::TakeFiles;
 use crate::config::videos::slug;
@@ -12,7 +12,7 @@ use orator_base::math::order::Ordered;
 use orator_base::motion::{bones, resample};
 use orator_base::stage::fingerprint::hash_file;
 use orator_base::stage::ledger::TranscriptReport;
-use orator_base::stage::refusal::{FrameRefusal, Refusal};
+use orator_base::stage::rejection::{FrameRejection, Rejection};
 use orator_base::types::pose3d::Motion;
 use orator_base::types::skeleton::{L_HAND, N_BONES, N_HAND_JOINTS, N_JOINTS, R_HAND};
 use orator_base::types::sound::{SAMPLE_RATE, Sound, sample_at};
@@ -66,24 +66,24 @@ pub struct AcceptedTake {
     pub lengths: [f32; N_BONES],
 }
 
-/// Reason for refusing a take.
+/// Reason for rejecting a take.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TakeRejection {
-    pub why: FrameRefusal,
+    pub why: FrameRejection,
     /// Sentence shown to the user.
     pub message: String,
 }
 
 impl TakeRejection {
-    /// Refusal with the standard message of `refusal`.
-    pub fn new(refusal: Refusal, measured: f64, threshold: f64) -> Self {
-        let message = refusal.message(measured, threshold);
-        Self { why: FrameRefusal::new(refusal, measured, threshold), message }
+    /// Rejection with the standard message of `rejection`.
+    pub fn new(rejection: Rejection, measured: f64, threshold: f64) -> Self {
+        let message = rejection.message(measured, threshold);
+        Self { why: FrameRejection::new(rejection, measured, threshold), message }
     }
 }
 
 impl ImportedTake {
-    /// Reads the files of a take and converts or refuses it.
+    /// Reads the files of a take and converts or rejects it.
     ///
     /// # Errors
     /// An unreadable file; the message names it.
@@ -102,27 +102,27 @@ impl ImportedTake {
             Some(path) => audio::read_mono(path, SAMPLE_RATE)?.filter(|sound| !sound.samples.is_empty()),
             None => None,
         };
-        let outcome = match (refusal(n_frames, sound.as_ref(), found, limits), sound) {
+        let outcome = match (rejection(n_frames, sound.as_ref(), found, limits), sound) {
             (None, Some(sound)) => {
                 TakeOutcome::Accepted(Box::new(to_accepted(&name, found, &captured, motion, sound)?))
             }
-            (refusal, _) => TakeOutcome::Rejected(refusal.unwrap_or_else(|| no_sound(found))),
+            (rejection, _) => TakeOutcome::Rejected(rejection.unwrap_or_else(|| no_sound(found))),
         };
         Ok(Self { name, content, n_frames, outcome })
     }
 }
 
-fn refusal(n_frames: usize, sound: Option<&Sound>, found: &TakeFiles, limits: &TakeLimits) -> Option<TakeRejection> {
+fn rejection(n_frames: usize, sound: Option<&Sound>, found: &TakeFiles, limits: &TakeLimits) -> Option<TakeRejection> {
     let stem = found.motion.file_stem().unwrap_or_default().to_string_lossy();
     if found.kind == MotionKind::Authors && stem.starts_with("prediction") {
-        return Some(TakeRejection::new(Refusal::Prediction, 0.0, 0.0));
+        return Some(TakeRejection::new(Rejection::Prediction, 0.0, 0.0));
     }
     let Some(sound) = sound else { return Some(no_sound(found)) };
     let (motion_secs, sound_secs) = (limits.fps.secs(n_frames), sound.secs());
     let difference_secs = sound_secs - motion_secs;
     if difference_secs.abs() > limits.max_difference_secs {
         return Some(TakeRejection {
-            why: FrameRefusal::new(Refusal::LengthMismatch, difference_secs.abs(), limits.max_difference_secs),
+            why: FrameRejection::new(Rejection::LengthMismatch, difference_secs.abs(), limits.max_difference_secs),
             message: format!(
                 "the sound has {sound_secs:.3} s, the motion {motion_secs:.3} s: {:.3} s apart, at most {} s are believed",
                 difference_secs.abs(),
@@ -132,7 +132,7 @@ fn refusal(n_frames: usize, sound: Option<&Sound>, found: &TakeFiles, limits: &T
     }
     let n_common = n_common(n_frames, sound, limits.fps);
     (n_common < limits.min_frames)
-        .then(|| TakeRejection::new(Refusal::FewFrames, n_common as f64, limits.min_frames as f64))
+        .then(|| TakeRejection::new(Rejection::FewFrames, n_common as f64, limits.min_frames as f64))
 }
 
 fn no_sound(found: &TakeFiles) -> TakeRejection {
@@ -140,7 +140,7 @@ fn no_sound(found: &TakeFiles) -> TakeRejection {
         Some(sound) => format!("{} holds no sound", file_name(sound)),
         None => format!("no sound file has the name of {}", file_name(&found.motion)),
     };
-    TakeRejection { why: FrameRefusal::new(Refusal::NoSoundFile, 0.0, 0.0), message }
+    TakeRejection { why: FrameRejection::new(Rejection::NoSoundFile, 0.0, 0.0), message }
 }
 
 /// Number of frames of the motion that lie completely within the sound.

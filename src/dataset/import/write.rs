@@ -79,10 +79,10 @@ pub fn import(plan: &ImportPlan, out: &Path, progress: &dyn Progress) -> Result<
             one.rename(2 * nth);
         }
     }
-    let kept: Vec<usize> = (0..inspected.len()).filter(|&at| inspected[at].is_accepted()).collect();
-    ensure!(!kept.is_empty(), "nothing can be imported: {}", first_reasons(&items, &inspected));
-    let compared = compare(&inspected, &kept, out, plan.dataset.duplicate_secs)?;
-    for (&at, assigned) in kept.iter().zip(assign(&inspected, &kept, &compared, &plan.dataset)) {
+    let accepted: Vec<usize> = (0..inspected.len()).filter(|&at| inspected[at].is_accepted()).collect();
+    ensure!(!accepted.is_empty(), "nothing can be imported: {}", first_reasons(&items, &inspected));
+    let compared = compare(&inspected, &accepted, out, plan.dataset.duplicate_secs)?;
+    for (&at, assigned) in accepted.iter().zip(assign(&inspected, &accepted, &compared, &plan.dataset)) {
         match assigned {
             Assignment::In(..) | Assignment::Blocks(_) => inspected[at].split = Some(assigned),
             Assignment::Excluded(with) => {
@@ -106,11 +106,16 @@ pub fn import(plan: &ImportPlan, out: &Path, progress: &dyn Progress) -> Result<
     Ok(Imported { lines, notes: left_out, info, stats })
 }
 
-fn compare(inspected: &[InspectedItem], kept: &[usize], out: &Path, duplicate_secs: f64) -> Result<SoundComparison> {
+fn compare(
+    inspected: &[InspectedItem],
+    accepted: &[usize],
+    out: &Path,
+    duplicate_secs: f64,
+) -> Result<SoundComparison> {
     if duplicate_secs <= 0.0 {
         return Ok(SoundComparison::default());
     }
-    let audible = kept.iter().filter(|&&at| inspected[at].sound.is_some());
+    let audible = accepted.iter().filter(|&&at| inspected[at].sound.is_some());
     let mut names: Vec<String> = audible.map(|&at| inspected[at].source.name.clone()).collect();
     names.sort();
     let shared = shared_sound::find(&names, |n| entry::read_sound(out, &names[n]), duplicate_secs)?;
@@ -120,12 +125,12 @@ fn compare(inspected: &[InspectedItem], kept: &[usize], out: &Path, duplicate_se
 /// Assigns each accepted video to a split; a video of another dataset keeps its split or its blocks.
 fn assign(
     inspected: &[InspectedItem],
-    kept: &[usize],
+    accepted: &[usize],
     compared: &SoundComparison,
     settings: &config::DatasetConfig,
 ) -> Vec<Assignment> {
-    let recorded: Vec<Option<RecordedSplit>> = kept.iter().map(|&at| recorded(&inspected[at])).collect();
-    let unassigned = kept.iter().zip(&recorded).map(|(&at, recorded)| {
+    let recorded: Vec<Option<RecordedSplit>> = accepted.iter().map(|&at| recorded(&inspected[at])).collect();
+    let unassigned = accepted.iter().zip(&recorded).map(|(&at, recorded)| {
         let InspectedItem { source, split, .. } = &inspected[at];
         // Without a content hash, the name breaks ties.
         let content = if source.content.is_empty() { &source.name } else { &source.content };
@@ -133,14 +138,14 @@ fn assign(
             Some(Assignment::In(split, _)) => Some(*split),
             Some(Assignment::Blocks(_) | Assignment::Excluded(_)) | None => None,
         };
-        let (duration_secs, kept) = (source.ledger.duration_secs, spans(&source.ledger));
-        Unassigned { name: &source.name, content, duration_secs, kept, named, recorded: recorded.as_ref() }
+        let (duration_secs, accepted) = (source.ledger.duration_secs, spans(&source.ledger));
+        Unassigned { name: &source.name, content, duration_secs, accepted, named, recorded: recorded.as_ref() }
     });
     let config::DatasetConfig { validation, test, .. } = *settings;
     let plan = SplitPlan { unit: SplitUnit::Video, validation, test, guard_secs: 0.0, min_block_secs: 0.0 };
     let assigned = split::assign(&unassigned.collect::<Vec<_>>(), &compared.shared, &plan);
     let stated_or_assigned = |(at, assigned): (&usize, Assignment)| inspected[*at].split.clone().unwrap_or(assigned);
-    kept.iter().zip(assigned).map(stated_or_assigned).collect()
+    accepted.iter().zip(assigned).map(stated_or_assigned).collect()
 }
 
 /// Recorded blocks of an item whose source states several splits.
@@ -155,7 +160,7 @@ fn recorded(item: &InspectedItem) -> Option<RecordedSplit> {
 }
 
 fn spans(ledger: &Ledger) -> Vec<(f64, f64)> {
-    ledger.kept.iter().map(|kept| (kept.start_secs, kept.end_secs)).collect()
+    ledger.accepted.iter().map(|accepted| (accepted.start_secs, accepted.end_secs)).collect()
 }
 
 /// Split rule of the imported dataset: by time if any source dataset was divided by time, otherwise by whole videos.
@@ -237,7 +242,7 @@ pub struct ImportPlan {
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ImportOutcome {
     pub file: String,
-    /// One of `kept`, `refused`, `failed`.
+    /// One of `accepted`, `rejected`, `failed`.
     pub outcome: &'static str,
     /// Seconds in the dataset.
     pub accepted_secs: f64,

@@ -32,7 +32,7 @@ pub struct Unassigned<'a> {
     pub content: &'a str,
     pub duration_secs: f64,
     /// Accepted spans, in order.
-    pub kept: Vec<Span>,
+    pub accepted: Vec<Span>,
     /// Split named in the configuration.
     pub named: Option<Split>,
     /// Recorded split; `None`: a new video.
@@ -51,7 +51,7 @@ pub enum Assignment {
 
 impl Unassigned<'_> {
     fn secs(&self) -> f64 {
-        self.kept.iter().map(|(start, end)| end - start).sum()
+        self.accepted.iter().map(|(start, end)| end - start).sum()
     }
 
     /// Order of assignment: the longest first, ties by content hash, then by name.
@@ -110,7 +110,9 @@ impl<'a> Assigner<'a> {
             Assignment::Blocks(blocks) => blocks.clone(),
             Assignment::Excluded(_) => Vec::new(),
         };
-        for (block, (start, end)) in blocks.iter().flat_map(|block| video.kept.iter().map(move |kept| (block, kept))) {
+        for (block, (start, end)) in
+            blocks.iter().flat_map(|block| video.accepted.iter().map(move |accepted| (block, accepted)))
+        {
             let secs = end.min(block.end_secs) - start.max(block.start_secs);
             block.split.into_iter().for_each(|split| self.fill.add(split, secs.max(0.0)));
         }
@@ -204,9 +206,9 @@ impl<'a> Assigner<'a> {
                 let lengths = (2..=n_splits)
                     .rev()
                     .find_map(|n| blocks::lengths(secs, &empty[..n], guard_secs, min_block_secs, true))?;
-                Some(blocks::consecutive(&video.kept, duration_secs, &lengths, guard_secs))
+                Some(blocks::consecutive(&video.accepted, duration_secs, &lengths, guard_secs))
             };
-            let cut = blocks::cut(&video.kept, duration_secs, &self.fill.shares(), guard_secs, min_block_secs)
+            let cut = blocks::cut(&video.accepted, duration_secs, &self.fill.shares(), guard_secs, min_block_secs)
                 .or_else(forced);
             let partners = self.partners(at);
             let whole = || match partners.first() {

@@ -39,46 +39,46 @@ pub fn lengths(
     (!raised.iter().any(is_short)).then_some(raised)
 }
 
-/// Divides a video with the accepted spans `kept` into blocks of all `splits` in turn, each split about once per
+/// Divides a video with the accepted spans `accepted` into blocks of all `splits` in turn, each split about once per
 /// `CYCLE_SECS`. `None`: the video is too short for blocks of `min_secs`.
 pub fn cut(
-    kept: &[Span],
+    accepted: &[Span],
     duration_secs: f64,
     splits: &[(Split, f64)],
     guard_secs: f64,
     min_secs: f64,
 ) -> Option<Vec<TimeBlock>> {
-    let secs: f64 = kept.iter().map(|(start, end)| end - start).sum();
+    let secs: f64 = accepted.iter().map(|(start, end)| end - start).sum();
     let n_cycles = ((secs / CYCLE_SECS) as usize).max(1);
     // Each cycle except the last also contains the gap before the next one.
     let cycle_secs = (secs + guard_secs) / n_cycles as f64 - guard_secs;
     let lengths = lengths(cycle_secs, splits, guard_secs, min_secs, false)?;
-    Some(consecutive(kept, duration_secs, &lengths.repeat(n_cycles), guard_secs))
+    Some(consecutive(accepted, duration_secs, &lengths.repeat(n_cycles), guard_secs))
 }
 
 /// Consecutive blocks with the given lengths in accepted seconds, plus half a gap on either side of each boundary.
-pub fn consecutive(kept: &[Span], duration_secs: f64, lengths: &[(Split, f64)], guard_secs: f64) -> Vec<TimeBlock> {
+pub fn consecutive(accepted: &[Span], duration_secs: f64, lengths: &[(Split, f64)], guard_secs: f64) -> Vec<TimeBlock> {
     let mut blocks: Vec<TimeBlock> = Vec::new();
     let mut until = 0.0;
     for (n, (split, secs)) in lengths.iter().enumerate() {
         until += secs + if n == 0 { guard_secs / 2.0 } else { guard_secs };
         let start_secs = blocks.last().map_or(0.0, |block| block.end_secs);
-        let end_secs = if n + 1 == lengths.len() { duration_secs } else { time_at_kept(kept, until) };
+        let end_secs = if n + 1 == lengths.len() { duration_secs } else { time_at_kept(accepted, until) };
         blocks.push(TimeBlock { split: Some(*split), start_secs, end_secs });
     }
     blocks
 }
 
 /// Time at which `secs` accepted seconds have passed.
-fn time_at_kept(kept: &[Span], secs: f64) -> f64 {
+fn time_at_kept(accepted: &[Span], secs: f64) -> f64 {
     let mut left = secs;
-    for (start, end) in kept {
+    for (start, end) in accepted {
         if left <= end - start {
             return start + left;
         }
         left -= end - start;
     }
-    kept.last().map_or(0.0, |(_, end)| *end)
+    accepted.last().map_or(0.0, |(_, end)| *end)
 }
 
 /// Split at the time `secs`; `None` outside all blocks or in an excluded one.
@@ -87,9 +87,9 @@ fn split_at(blocks: &[TimeBlock], secs: f64) -> Option<Split> {
 }
 
 /// Smallest gap between consecutive accepted spans in different splits, seconds; `None`: there is no such pair.
-pub fn min_gap(blocks: &[TimeBlock], kept: &[Span]) -> Option<f64> {
+pub fn min_gap(blocks: &[TimeBlock], accepted: &[Span]) -> Option<f64> {
     let placed = |(start, end): &Span| Some((*start, *end, split_at(blocks, f64::midpoint(*start, *end))?));
-    let placed: Vec<(f64, f64, Split)> = kept.iter().filter_map(placed).collect();
+    let placed: Vec<(f64, f64, Split)> = accepted.iter().filter_map(placed).collect();
     let apart = placed.windows(2).filter(|pair| pair[0].2 != pair[1].2).map(|pair| pair[1].0 - pair[0].1);
     apart.min_by(f64::total_cmp)
 }
@@ -160,8 +160,8 @@ mod tests {
 
     #[test]
     fn a_long_video_is_cut_in_turn_and_a_short_one_is_not() {
-        let kept = [(10.0, 310.0), (400.0, 700.0)];
-        let blocks = cut(&kept, 720.0, &SHARES, 8.0, 8.0).unwrap();
+        let accepted = [(10.0, 310.0), (400.0, 700.0)];
+        let blocks = cut(&accepted, 720.0, &SHARES, 8.0, 8.0).unwrap();
         let splits: Vec<_> = blocks.iter().filter_map(|block| block.split).collect();
         assert_eq!(splits, [Split::Train, Split::Validation, Split::Test]);
         let fps = FrameRate::new(10, 1);
@@ -169,7 +169,7 @@ mod tests {
             .into_iter()
             .map(|(_, part)| {
                 let overlap = |(start, end): &Span| end.min(fps.secs(part.end)) - start.max(fps.secs(part.start));
-                kept.iter().map(|span| overlap(span).max(0.0)).sum()
+                accepted.iter().map(|span| overlap(span).max(0.0)).sum()
             })
             .collect();
         for (secs, (_, share)) in secs.iter().zip(SHARES) {

@@ -107,9 +107,9 @@ impl SplitRecord {
     /// shared with one of them keep their split. Returns the number of removed videos.
     pub fn forget(&mut self, is_gone: impl Fn(&str, &RecordedSplit) -> bool) -> usize {
         let n_before = self.videos.len();
-        let (gone, kept): (BTreeMap<_, _>, BTreeMap<_, _>) =
+        let (gone, accepted): (BTreeMap<_, _>, BTreeMap<_, _>) =
             std::mem::take(&mut self.videos).into_iter().partition(|(content, video)| is_gone(content, video));
-        self.videos = kept;
+        self.videos = accepted;
         for video in self.videos.values_mut() {
             if matches!(&video.by, SplitBy::SoundOf(other) if gone.values().any(|gone: &RecordedSplit| gone.name == *other))
             {

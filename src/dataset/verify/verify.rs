@@ -213,15 +213,15 @@ fn check_videos(dir: &Path, found: &mut Verified) -> Result<()> {
 fn check_ledger(entry: &VideoEntry, fps: FrameRate) -> Result<()> {
     let ledger = &entry.ledger;
     let unknown = ledger.duration_secs == 0.0 && entry.failure.is_some();
-    ensure!(ledger.is_whole() || unknown, "its ledger does not cover {:.3} s without gaps", ledger.duration_secs);
+    ensure!(ledger.is_complete() || unknown, "its ledger does not cover {:.3} s without gaps", ledger.duration_secs);
     let frames: usize = entry.samples.iter().map(|sample| sample.n_frames).sum();
-    let deviation = (ledger.kept_secs() - fps.secs(frames)).abs();
+    let deviation = (ledger.accepted_secs() - fps.secs(frames)).abs();
     let allowed = fps.secs(1) * entry.samples.len().max(1) as f64 + 1e-6;
     ensure!(
-        deviation <= allowed && ledger.kept.len() == entry.samples.len(),
+        deviation <= allowed && ledger.accepted.len() == entry.samples.len(),
         "its ledger accepts {:.3} s in {}, its samples have {:.3} s in {}",
-        ledger.kept_secs(),
-        counted(ledger.kept.len(), "interval"),
+        ledger.accepted_secs(),
+        counted(ledger.accepted.len(), "interval"),
         fps.secs(frames),
         counted(entry.samples.len(), "sample")
     );
@@ -232,8 +232,8 @@ fn check_ledger(entry: &VideoEntry, fps: FrameRate) -> Result<()> {
 fn check_word_counts(entry: &VideoEntry) -> Result<()> {
     let has_words = entry.samples.iter().any(|sample| sample.words.is_some());
     ensure!(entry.ledger.words.is_some() || !has_words, "its samples have words, its ledger has none");
-    let is_whole = entry.ledger.words.as_ref().is_none_or(|words| words.count.is_whole());
-    ensure!(is_whole, "its ledger does not account for every word of the transcript");
+    let is_complete = entry.ledger.words.as_ref().is_none_or(|words| words.count.is_complete());
+    ensure!(is_complete, "its ledger does not account for every word of the transcript");
     Ok(())
 }
 
@@ -279,12 +279,12 @@ fn check_samples(dir: &Path, found: &mut Verified, progress: &dyn Progress) {
             found.add_error(&sample.shard, checked.with_context(|| sample.key.clone()));
             task.advance(1);
         }
-        let n_kept = entry.ledger.words.as_ref().map_or(0, |words| words.count.n_kept);
-        if n_words != n_kept {
+        let n_accepted = entry.ledger.words.as_ref().map_or(0, |words| words.count.n_accepted);
+        if n_words != n_accepted {
             let file = format!("{}/{name}.json", entry::FOLDER);
             found.add_problem(
                 &file,
-                format!("its ledger counts {n_kept} words in samples, the samples contain {n_words}"),
+                format!("its ledger counts {n_accepted} words in samples, the samples contain {n_words}"),
             );
         }
     }

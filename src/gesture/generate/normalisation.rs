@@ -40,9 +40,9 @@ pub struct ChannelNormalisation {
 }
 
 impl ChannelNormalisation {
-    /// Normalisation from mean and standard deviation (radians) of the angles; `n_seen` frames show each angle.
-    pub fn new(channel: PostureChannel, n_seen: [u64; 3], mean: [f64; 3], std: [f64; 3]) -> Self {
-        let std = |k: usize| if n_seen[k] > 0 { (std[k] as f32).max(MIN_STD_RADIANS) } else { 0.0 };
+    /// Normalisation from mean and standard deviation (radians) of the angles; `n_visible` frames show each angle.
+    pub fn new(channel: PostureChannel, n_visible: [u64; 3], mean: [f64; 3], std: [f64; 3]) -> Self {
+        let std = |k: usize| if n_visible[k] > 0 { (std[k] as f32).max(MIN_STD_RADIANS) } else { 0.0 };
         Self { channel, mean: mean.map(|v| v as f32), std: std::array::from_fn(std) }
     }
 }

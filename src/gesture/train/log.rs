@@ -35,8 +35,8 @@ impl MetricsLog {
         let text = text(path)?;
         // A training without a checkpoint starts over, including the validation before its first step.
         let is_kept = |line: &&str| step > 0 && parsed(line).is_some_and(|line| step_of(&line) <= step as u64);
-        let kept: String = text.lines().filter(is_kept).map(|line| format!("{line}\n")).collect();
-        Ok(Self { lines: AppendedFile::open(path, kept.as_bytes())?, events: None })
+        let accepted: String = text.lines().filter(is_kept).map(|line| format!("{line}\n")).collect();
+        Ok(Self { lines: AppendedFile::open(path, accepted.as_bytes())?, events: None })
     }
 
     /// Appends a line to both files.

@@ -198,7 +198,7 @@ fn add_scaled<T: Scalar>(to: &mut [T], scale: T, row: &[T]) {
 pub struct DropMask {
     seed: u32,
     threshold: u32,
-    /// Factor of the retained values.
+    /// Factor of the accepted values.
     pub scale: f64,
 }
 

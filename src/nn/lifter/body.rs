@@ -5,7 +5,7 @@ use super::temporal::{Config, TemporalLifter};
 use crate::Mode;
 use crate::params::Params;
 use candle_core::{Device, Result, Tensor};
-use orator_base::motion::upper_body::{Pose, SeenBody};
+use orator_base::motion::upper_body::{BodyPoints, Pose};
 use orator_base::motion::view::body::{BodyView, N_IN, N_OUT, mirror_mean};
 
 /// Number of windows per forward pass.
@@ -34,7 +34,7 @@ impl BodyLifter {
     /// within half a window. The first and last frame are repeated beyond the ends. The frames of a window are `step`
     /// frames apart, because the network is trained at 15 frames per second. The result is averaged with that of the
     /// mirrored window.
-    pub fn poses(&self, seen: &[SeenBody], step: f64) -> Result<Vec<Option<Pose>>> {
+    pub fn poses(&self, seen: &[BodyPoints], step: f64) -> Result<Vec<Option<Pose>>> {
         let window = self.net.config().receptive_field();
         let view = |t: usize| BodyView::around(seen, t, window, step);
         let mut poses = Vec::with_capacity(seen.len());
@@ -71,7 +71,7 @@ mod tests {
     fn every_frame_has_a_pose_unless_nothing_is_visible() -> anyhow::Result<()> {
         let mut params = Params::new(1);
         let lifter = BodyLifter::new(&mut params, &BodyLifter::config(16, &[3, 3, 3]))?;
-        let seen: SeenBody = std::array::from_fn(|j| Some([j as f32 * 10.0, (j * j) as f32]));
+        let seen: BodyPoints = std::array::from_fn(|j| Some([j as f32 * 10.0, (j * j) as f32]));
         let mut frames = vec![seen; 300];
         frames[100..200].fill([None; 9]);
         let poses = lifter.poses(&frames, 1.0)?;

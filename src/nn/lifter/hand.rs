@@ -6,7 +6,7 @@ use crate::ops::dropout::dropout;
 use crate::params::{Init, Params};
 use candle_core::{Device, Module, Result, Tensor};
 use candle_nn::Linear;
-use orator_base::motion::view::hand::{HandJoints, HandView, SeenHand};
+use orator_base::motion::view::hand::{HandJoints, HandPoints, HandView};
 use orator_base::types::skeleton::Side;
 use serde::{Deserialize, Serialize};
 
@@ -60,7 +60,7 @@ impl HandLifter {
 
     /// Lifts hands of the given side to px in the axes of the picture, with the wrist at 0; `None` where too few
     /// points are visible.
-    pub fn lift(&self, seen: &[SeenHand], side: Side) -> Result<Vec<Option<HandJoints>>> {
+    pub fn lift(&self, seen: &[HandPoints], side: Side) -> Result<Vec<Option<HandJoints>>> {
         let views: Vec<Option<HandView>> = seen.iter().map(|s| HandView::new(s, side)).collect();
         let x: Vec<f32> = views.iter().flatten().flat_map(|view| view.numbers).collect();
         if x.is_empty() {

@@ -6,8 +6,8 @@ use super::video::LiftedVideo;
 use anyhow::{Result, ensure};
 use orator_base::stage::Unit;
 use orator_base::stage::artifacts::{self, StageName, dir};
-use orator_base::stage::ledger::{Kept, Ledger, Refused};
-use orator_base::stage::refusal::{FrameRefusal, Refusal};
+use orator_base::stage::ledger::{AcceptedInterval, Ledger, RejectedInterval};
+use orator_base::stage::rejection::{FrameRejection, Rejection};
 use orator_base::text::counted;
 use orator_base::types::interval::{Interval, Intervals};
 use orator_base::types::time::FrameRate;
@@ -120,7 +120,7 @@ impl Division {
             name: &video.name,
             content: &video.content,
             duration_secs: video.ledger.duration_secs,
-            kept: video.ledger.kept.iter().map(|kept| (kept.start_secs, kept.end_secs)).collect(),
+            accepted: video.ledger.accepted.iter().map(|accepted| (accepted.start_secs, accepted.end_secs)).collect(),
             named: named.get(video.unit.video.as_str()).copied(),
             recorded: self.record.videos.get(&video.content),
         });
@@ -134,7 +134,7 @@ impl Division {
         let assigned = assign(&unassigned.collect::<Vec<_>>(), shared, &plan);
         for (video, assignment) in videos.iter().zip(&assigned) {
             let (split, by, blocks) = match assignment {
-                _ if video.ledger.kept.is_empty() => continue,
+                _ if video.ledger.accepted.is_empty() => continue,
                 Assignment::In(split, by) => (Some(*split), by.clone(), Vec::new()),
                 Assignment::Blocks(blocks) => (None, SplitBy::Time, blocks.clone()),
                 Assignment::Excluded(_) => continue,
@@ -152,50 +152,58 @@ impl Division {
     pub fn divide(&self, intervals: &Intervals, ledger: &Ledger, blocks: &[TimeBlock]) -> Result<DividedVideo> {
         let fps = intervals.fps;
         ensure!(
-            intervals.intervals.len() == ledger.kept.len(),
+            intervals.intervals.len() == ledger.accepted.len(),
             "a video has {}, but {} accepted in its ledger: run the stage lift again",
             counted(intervals.intervals.len(), "interval"),
-            ledger.kept.len()
+            ledger.accepted.len()
         );
         let usable = blocks::usable(blocks, fps, intervals.n_frames, self.guard_frames);
-        let mut divided = DividedVideo { pieces: Vec::new(), ledger: Ledger { kept: Vec::new(), ..ledger.clone() } };
-        for (interval, kept) in intervals.intervals.iter().zip(&ledger.kept) {
-            let mut at = kept.start_secs;
+        let mut divided =
+            DividedVideo { pieces: Vec::new(), ledger: Ledger { accepted: Vec::new(), ..ledger.clone() } };
+        for (interval, accepted) in intervals.intervals.iter().zip(&ledger.accepted) {
+            let mut at = accepted.start_secs;
             for (split, block) in &usable {
                 let piece = Interval { start: interval.start.max(block.start), end: interval.end.min(block.end) };
                 if piece.n_frames() < self.min_frames.min(interval.n_frames()) {
                     continue;
                 }
                 // The ends of an interval are those of its ledger entry, where a partial last frame counts.
-                let start_secs = if piece.start == interval.start { kept.start_secs } else { fps.secs(piece.start) };
-                let end_secs = if piece.end == interval.end { kept.end_secs } else { fps.secs(piece.end) };
-                divided.ledger.refused.extend(self.left_out(at, start_secs, blocks, fps));
-                divided.ledger.kept.push(Kept { start_secs, end_secs });
+                let start_secs =
+                    if piece.start == interval.start { accepted.start_secs } else { fps.secs(piece.start) };
+                let end_secs = if piece.end == interval.end { accepted.end_secs } else { fps.secs(piece.end) };
+                divided.ledger.rejected.extend(self.left_out(at, start_secs, blocks, fps));
+                divided.ledger.accepted.push(AcceptedInterval { start_secs, end_secs });
                 divided.pieces.push((*split, piece));
                 at = end_secs;
             }
-            divided.ledger.refused.extend(self.left_out(at, kept.end_secs, blocks, fps));
+            divided.ledger.rejected.extend(self.left_out(at, accepted.end_secs, blocks, fps));
         }
         let pieces = divided.pieces.iter().map(|(_, piece)| *piece).collect();
         let resting = Intervals::new(fps, intervals.n_frames, pieces).with_resting(&intervals.resting);
         divided.ledger = divided.ledger.with_resting(resting.resting_intervals());
-        divided.ledger.refused.sort_by(|a, b| a.start_secs.total_cmp(&b.start_secs));
+        divided.ledger.rejected.sort_by(|a, b| a.start_secs.total_cmp(&b.start_secs));
         Ok(divided)
     }
 
     /// Ledger entry for the time between two samples, if there is any.
-    fn left_out(&self, start_secs: f64, end_secs: f64, blocks: &[TimeBlock], fps: FrameRate) -> Option<Refused> {
+    fn left_out(
+        &self,
+        start_secs: f64,
+        end_secs: f64,
+        blocks: &[TimeBlock],
+        fps: FrameRate,
+    ) -> Option<RejectedInterval> {
         if end_secs <= start_secs {
             return None;
         }
         let is_shared =
             |block: &TimeBlock| block.split.is_none() && block.start_secs < end_secs && start_secs < block.end_secs;
         if blocks.iter().any(is_shared) {
-            let why = FrameRefusal::new(Refusal::Duplicate, end_secs - start_secs, 0.0);
+            let why = FrameRejection::new(Rejection::Duplicate, end_secs - start_secs, 0.0);
             let message = "another video has the same sound in another split".to_owned();
-            return Some(Refused::with_message(start_secs, end_secs, why, message));
+            return Some(RejectedInterval::with_message(start_secs, end_secs, why, message));
         }
-        let why = FrameRefusal::new(Refusal::SplitGap, end_secs - start_secs, fps.secs(self.guard_frames));
-        Some(Refused::new(start_secs, end_secs, why))
+        let why = FrameRejection::new(Rejection::SplitGap, end_secs - start_secs, fps.secs(self.guard_frames));
+        Some(RejectedInterval::new(start_secs, end_secs, why))
     }
 }

@@ -86,8 +86,8 @@ impl DatasetOutcome<'_> {
         if self.n_reused > 0 {
             let _ = write!(line, "; {} reused unchanged", counted(self.n_reused, "video"));
         }
-        if let Some(WordCount { n_words, n_kept, .. }) = self.stats.footage.words {
-            let _ = write!(line, "; {n_kept} of {n_words} words in samples");
+        if let Some(WordCount { n_words, n_accepted, .. }) = self.stats.footage.words {
+            let _ = write!(line, "; {n_accepted} of {n_words} words in samples");
         }
         line.extend(warnings.iter().map(|warning| format!("; warning: {warning}")));
         let secs: BTreeMap<_, _> = info.splits.iter().map(|(name, split)| (name, split.secs)).collect();
@@ -102,8 +102,9 @@ impl DatasetOutcome<'_> {
         let Self { videos, stats, n_failed, n_left_out, .. } = *self;
         let mut warnings: Vec<String> = self.several_persons.iter().map(SeveralPersons::warning).collect();
         // The longest video is proposed for training; each of the others is proposed once.
-        let mut by_length: Vec<&LiftedVideo> = videos.iter().filter(|video| video.ledger.kept_secs() > 0.0).collect();
-        by_length.sort_by(|a, b| b.ledger.kept_secs().total_cmp(&a.ledger.kept_secs()));
+        let mut by_length: Vec<&LiftedVideo> =
+            videos.iter().filter(|video| video.ledger.accepted_secs() > 0.0).collect();
+        by_length.sort_by(|a, b| b.ledger.accepted_secs().total_cmp(&a.ledger.accepted_secs()));
         let mut others = by_length.iter().skip(1);
         let shares =
             [(Split::Train, 1.0), (Split::Validation, self.settings.validation), (Split::Test, self.settings.test)];

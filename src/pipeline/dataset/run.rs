@@ -3,9 +3,9 @@
 use super::division::{DividedVideo, Division};
 use super::video::LiftedVideo;
 use anyhow::Result;
-use orator_base::stage::ledger::{Ledger, Refused};
+use orator_base::stage::ledger::{Ledger, RejectedInterval};
 use orator_base::stage::progress::Progress;
-use orator_base::stage::refusal::{FrameRefusal, Refusal};
+use orator_base::stage::rejection::{FrameRejection, Rejection};
 use orator_base::types::interval::Interval;
 use orator_dataset::config;
 use orator_dataset::leakage::SoundComparison;
@@ -135,13 +135,18 @@ impl<'a> DatasetRun<'a> {
         let threshold = self.settings.duplicate_secs;
         let words = video.transcript_stats(std::iter::empty());
         let mut ledger = Ledger { words, ..video.ledger.clone() };
-        let why = FrameRefusal::new(Refusal::Duplicate, secs, threshold);
-        let refused = ledger.kept.drain(..).map(|kept| {
-            Refused::with_message(kept.start_secs, kept.end_secs, why, format!("the same {secs:.1} s are in {of}"))
+        let why = FrameRejection::new(Rejection::Duplicate, secs, threshold);
+        let rejected = ledger.accepted.drain(..).map(|accepted| {
+            RejectedInterval::with_message(
+                accepted.start_secs,
+                accepted.end_secs,
+                why,
+                format!("the same {secs:.1} s are in {of}"),
+            )
         });
-        let refused: Vec<Refused> = refused.collect();
-        ledger.refused.extend(refused);
-        ledger.refused.sort_by(|a, b| a.start_secs.total_cmp(&b.start_secs));
+        let rejected: Vec<RejectedInterval> = rejected.collect();
+        ledger.rejected.extend(rejected);
+        ledger.rejected.sort_by(|a, b| a.start_secs.total_cmp(&b.start_secs));
         let (name, file, content) = (video.unit.video.clone(), video.file.clone(), video.content.clone());
         VideoSource { name, file, content, ledger, ..VideoSource::default() }
     }

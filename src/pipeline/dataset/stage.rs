@@ -275,27 +275,28 @@ impl Stage for DatasetStage {
         let old = dir(&self.work, StageName::Dataset, unit);
         let mut division = self.division(unit)?;
         let mut run = DatasetRun::new(&self.settings, out, &old, progress);
-        let (mut kept, mut left_out): (Vec<&LiftedVideo>, Vec<(&LiftedVideo, VideoSource)>) = (Vec::new(), Vec::new());
+        let (mut accepted, mut left_out): (Vec<&LiftedVideo>, Vec<(&LiftedVideo, VideoSource)>) =
+            (Vec::new(), Vec::new());
         for video in &videos {
-            match kept.iter().find(|first| first.content == video.content) {
+            match accepted.iter().find(|first| first.content == video.content) {
                 Some(first) => left_out.push((video, run.duplicate(video, &first.name, video.ledger.duration_secs))),
-                None => kept.push(video),
+                None => accepted.push(video),
             }
         }
-        let sounds = run.sounds(&kept)?;
-        let compared = run.compare(&kept, &sounds)?;
-        let Some(first) = kept.first() else { anyhow::bail!("no video of {unit} passed the earlier stages") };
+        let sounds = run.sounds(&accepted)?;
+        let compared = run.compare(&accepted, &sounds)?;
+        let Some(first) = accepted.first() else { anyhow::bail!("no video of {unit} passed the earlier stages") };
         let fps = first.intervals.fps;
         let named =
             self.inputs.all.iter().flat_map(|videos| &videos.splits).map(|(video, split)| (video.as_str(), *split));
-        let assigned = division.assign(&kept, &named.collect(), &compared.shared, &self.settings);
+        let assigned = division.assign(&accepted, &named.collect(), &compared.shared, &self.settings);
         // The assignment is fixed from here on, even if the run stops before the dataset is complete.
         division.record.write(&artifacts::splits(&self.work, &unit.speaker))?;
         let rule = division.rule(fps);
         let about = About { split_rule: Some(rule.clone()), ..self.about(unit, first) };
         let writer = DatasetWriter::new(out, about, u64::from(self.settings.max_mb) << 20).with_compared(compared);
-        let task = progress.begin(&format!("dataset {unit}"), kept.len() as u64);
-        for (video, assignment) in kept.iter().zip(assigned) {
+        let task = progress.begin(&format!("dataset {unit}"), accepted.len() as u64);
+        for (video, assignment) in accepted.iter().zip(assigned) {
             task.detail(&video.name);
             match assignment {
                 Assignment::Excluded(with) => {
@@ -346,7 +347,7 @@ fn check(unit: &Unit, work: &Path, videos: &[LiftedVideo]) -> Result<()> {
         unit.speaker
     );
     let mut rejected: BTreeMap<String, f64> = BTreeMap::new();
-    for (reason, secs) in videos.iter().flat_map(|video| video.ledger.refused_secs()) {
+    for (reason, secs) in videos.iter().flat_map(|video| video.ledger.rejected_secs()) {
         *rejected.entry(reason).or_default() += secs;
     }
     if videos.iter().any(|video| !video.intervals.intervals.is_empty()) {

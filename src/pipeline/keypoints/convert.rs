@@ -62,7 +62,7 @@ fn pose(person: Option<FoundPerson>, followed: &FollowedPerson, nearest: usize) 
     let person = person.unwrap_or_default();
     Pose2d {
         person: person.area().unwrap_or_default(),
-        n_people: u8::try_from(followed.n_people[nearest]).unwrap_or(u8::MAX),
+        n_persons: u8::try_from(followed.n_persons[nearest]).unwrap_or(u8::MAX),
         identity: followed.identity[nearest],
         body: person.body,
         left_hand: person.left_hand,
@@ -74,9 +74,9 @@ fn pose(person: Option<FoundPerson>, followed: &FollowedPerson, nearest: usize) 
 
 /// Note on the other persons in view, if there are any.
 fn note_on_others(followed: &FollowedPerson) -> Option<String> {
-    let n_frames = followed.n_people.len();
-    let n_several = followed.n_people.iter().filter(|n| **n > 1).count();
-    let most = followed.n_people.iter().max().filter(|most| **most > 1)?;
+    let n_frames = followed.n_persons.len();
+    let n_several = followed.n_persons.iter().filter(|n| **n > 1).count();
+    let most = followed.n_persons.iter().max().filter(|most| **most > 1)?;
     Some(format!(
         "up to {most} persons in a frame (several in {:.0} % of the frames); one of them is followed",
         100.0 * n_several as f64 / n_frames.max(1) as f64

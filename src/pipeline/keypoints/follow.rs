@@ -21,7 +21,7 @@ pub struct FollowedPerson {
     /// Identity number; incremented when another person is followed.
     pub identity: Vec<i64>,
     /// Number of persons in the frame.
-    pub n_people: Vec<usize>,
+    pub n_persons: Vec<usize>,
 }
 
 /// Detections of one person over several frames.
@@ -61,7 +61,7 @@ pub fn follow(frames: &[Vec<FoundPerson>], image_width: f32, max_gap: usize) -> 
         }
         identity.push(n_changes);
     }
-    FollowedPerson { chosen, identity, n_people: frames.iter().map(Vec::len).collect() }
+    FollowedPerson { chosen, identity, n_persons: frames.iter().map(Vec::len).collect() }
 }
 
 fn tracks(frames: &[Vec<FoundPerson>], image_width: f32, max_gap: usize) -> Vec<BoxTrack> {
@@ -147,7 +147,7 @@ mod tests {
             let expected = if (10..14).contains(&t) { None } else { Some(t % 2) };
             assert_eq!(*chosen, expected, "frame {t}");
         }
-        assert!(followed.identity.iter().all(|number| *number == 0) && followed.n_people[0] == 2);
+        assert!(followed.identity.iter().all(|number| *number == 0) && followed.n_persons[0] == 2);
         // Absent for longer than the gap: the guest is followed in between, and each of the three is another identity.
         let followed = follow(&frames, 400.0, 3);
         assert_eq!((followed.chosen[12], followed.identity[9], followed.identity[29]), (Some(0), 0, 2));

@@ -165,7 +165,7 @@ impl Stage for KeypointPose2dStage {
             n_visible as f64 / keypoints.n_frames().max(1) as f64
         };
         let [body, left, right] = [&keypoints.body, &keypoints.left_hand, &keypoints.right_hand].map(share);
-        let several = extras.n_people.iter().filter(|n| **n > 1).count() as f64 / keypoints.n_frames().max(1) as f64;
+        let several = extras.n_persons.iter().filter(|n| **n > 1).count() as f64 / keypoints.n_frames().max(1) as f64;
         let line = format!(
             "{} frames: person in {:.0} %, left hand {:.0} %, right hand {:.0} % (keypoints of another program)",
             keypoints.n_frames(),

@@ -8,7 +8,7 @@ use anyhow::Result;
 use ndarray::{Array2, s};
 use orator_base::math::order::lower_median;
 use orator_base::motion::upper_body::{
-    ARMS, L_HIP, L_SHOULDER, NOSE, Pose, R_HIP, R_SHOULDER, REFERENCE_SIZE, SeenBody, size,
+    ARMS, BodyPoints, L_HIP, L_SHOULDER, NOSE, Pose, R_HIP, R_SHOULDER, REFERENCE_SIZE, size,
 };
 use orator_base::types::interval::Interval;
 use orator_base::types::pose2d::Keypoints;
@@ -57,7 +57,7 @@ pub fn lift(
         for first in (0..n_frames).step_by(frames(BATCH_FRAMES).max(1)) {
             let end = n_frames.min(first + frames(BATCH_FRAMES).max(1));
             let from = first.saturating_sub(margin);
-            let points: Vec<SeenBody> = (from..n_frames.min(end + margin)).map(|t| observed.frame(t)).collect();
+            let points: Vec<BodyPoints> = (from..n_frames.min(end + margin)).map(|t| observed.frame(t)).collect();
             let poses = lifter.poses(&points, step)?;
             for (t, pose) in poses.iter().enumerate().take(end - from).skip(first - from) {
                 if let Some(pose) = pose {
@@ -86,7 +86,7 @@ pub fn lift(
 }
 
 /// Arm joints whose reprojection is far from their keypoint.
-fn outliers(pose: &Pose, visible: &SeenBody) -> impl Iterator<Item = usize> {
+fn outliers(pose: &Pose, visible: &BodyPoints) -> impl Iterator<Item = usize> {
     let most = MAX_REPROJECTION_ERROR * size(pose) / REFERENCE_SIZE;
     let is_far = move |joint: usize| {
         let (Some(right), Some(left), Some(point)) = (visible[R_SHOULDER], visible[L_SHOULDER], visible[joint]) else {

@@ -6,7 +6,7 @@ use super::observed::MAX_PX;
 use anyhow::Result;
 use ndarray::{ArrayView3, ArrayViewMut2, ArrayViewMut3, Axis, s};
 use orator_base::math::vec3;
-use orator_base::motion::view::hand::{HandJoints, SeenHand, parent};
+use orator_base::motion::view::hand::{HandJoints, HandPoints, parent};
 use orator_base::types::pose2d::{HAND_VISIBLE_SCORE, N_HAND};
 use orator_base::types::skeleton::Side;
 use orator_nn::lifter::hand::HandLifter;
@@ -32,8 +32,8 @@ pub fn lift(
     let n_frames = points.len_of(Axis(0));
     for start in (0..n_frames).step_by(BATCH) {
         let or_empty =
-            |visible: SeenHand| if visible.iter().flatten().count() < MIN_POINTS { [None; N_HAND] } else { visible };
-        let visible: Vec<SeenHand> =
+            |visible: HandPoints| if visible.iter().flatten().count() < MIN_POINTS { [None; N_HAND] } else { visible };
+        let visible: Vec<HandPoints> =
             (start..n_frames.min(start + BATCH)).map(|t| or_empty(visible_points(points, t))).collect();
         for (t, (hand, visible)) in (start..).zip(lifter.lift(&visible, side)?.into_iter().zip(&visible)) {
             let Some(hand) = hand.as_ref().and_then(unit_size) else { continue };
@@ -46,7 +46,7 @@ pub fn lift(
     Ok(())
 }
 
-fn visible_points(points: &ArrayView3<f32>, t: usize) -> SeenHand {
+fn visible_points(points: &ArrayView3<f32>, t: usize) -> HandPoints {
     std::array::from_fn(|j| {
         let [x, y, score] = [0, 1, 2].map(|k| points[[t, j, k]]);
         (score >= HAND_VISIBLE_SCORE && x.abs() <= MAX_PX && y.abs() <= MAX_PX).then_some([x, y])

@@ -8,7 +8,7 @@ use ndarray::{Array2, Array3, ArrayViewMut2, ArrayViewMut3, s};
 use orator_base::math::gaussian;
 use orator_base::motion::bones;
 use orator_base::types::interval::Interval;
-use orator_base::types::pose2d::{Keypoints, N_HAND, SEEN_SCORE, coco};
+use orator_base::types::pose2d::{Keypoints, N_HAND, VISIBLE_SCORE, coco};
 use orator_base::types::pose3d::Motion;
 use orator_base::types::skeleton::{self, L_HAND, N_BONES, N_JOINTS, R_HAND, Side};
 use orator_dataset::config;
@@ -223,7 +223,7 @@ pub fn notes(keypoints: &Keypoints, lifted: &Lifted) -> Option<String> {
     let n_frames = keypoints.n_frames();
     let n_hidden = |j: usize| {
         let scores = keypoints.body.slice(s![.., j, 2]);
-        scores.iter().filter(|score| score.is_nan() || **score < SEEN_SCORE).count()
+        scores.iter().filter(|score| score.is_nan() || **score < VISIBLE_SCORE).count()
     };
     (lifted.n_frames < n_frames).then(|| {
         format!(

@@ -2,7 +2,7 @@
 //! `hands` (the networks, `hand_depth`) -> smoothing; then `lengths` (one set per video) -> `camera` (levelling on
 //! request) -> bone lengths applied, hands attached to the wrists. A joint hidden for up to a second is filled and
 //! masked; one missing for longer is NaN, with its descendants. Size is a convention (`upper_body::REFERENCE_SIZE`).
-//! `refuse` rejects frames in which lifting reveals errors.
+//! `reject` rejects frames in which lifting reveals errors.
 
 pub mod body;
 pub mod camera;
@@ -14,7 +14,7 @@ pub mod lifter;
 pub mod observed;
 pub mod outliers;
 pub mod quality;
-pub mod refuse;
+pub mod reject;
 pub mod rest;
 pub mod stage;
 pub mod weights;

@@ -4,10 +4,10 @@ use super::gaps;
 use ndarray::{Array2, Array3, s};
 use orator_base::math::order::{lower_median, median};
 use orator_base::motion::upper_body::{
-    COCO, L_HIP, L_SHOULDER, L_WRIST, N_POINTS, NOSE, R_HIP, R_SHOULDER, R_WRIST, SeenBody,
+    BodyPoints, COCO, L_HIP, L_SHOULDER, L_WRIST, N_POINTS, NOSE, R_HIP, R_SHOULDER, R_WRIST,
 };
 use orator_base::types::interval::Interval;
-use orator_base::types::pose2d::{Keypoints, SEEN_SCORE, coco};
+use orator_base::types::pose2d::{Keypoints, VISIBLE_SCORE, coco};
 use orator_base::types::skeleton::BODY_BONES;
 
 /// Largest valid coordinate, px.
@@ -67,17 +67,17 @@ impl ObservedBody {
     }
 
     /// One frame as input of the body lifter.
-    pub fn frame(&self, t: usize) -> SeenBody {
+    pub fn frame(&self, t: usize) -> BodyPoints {
         std::array::from_fn(|j| at(&self.points, t, j))
     }
 }
 
 /// Points of a frame. A wrist that the body model misses is taken from the hand model, a missing nose from the eyes or
 /// else the ears.
-fn frame_points(keypoints: &Keypoints, t: usize) -> SeenBody {
+fn frame_points(keypoints: &Keypoints, t: usize) -> BodyPoints {
     let point = |array: &Array3<f32>, j: usize| {
         let [x, y, score] = [0, 1, 2].map(|k| array[[t, j, k]]);
-        (score >= SEEN_SCORE && x.abs() <= MAX_PX && y.abs() <= MAX_PX).then_some([x, y])
+        (score >= VISIBLE_SCORE && x.abs() <= MAX_PX && y.abs() <= MAX_PX).then_some([x, y])
     };
     let body = |j: usize| point(&keypoints.body, j);
     let mut frame_points = COCO.map(body);

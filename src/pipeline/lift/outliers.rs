@@ -1,11 +1,11 @@
 //! Errors revealed by lifting: frames with bone lengths far from those in the rest of the video (a wrong keypoint,
-//! another person's arm), and frames with joints that stay missing. `refuse` removes them from intervals and ledger.
+//! another person's arm), and frames with joints that stay missing. `reject` removes them from intervals and ledger.
 
 use super::lengths::bone;
-use super::refuse::{bone_refusals, exceeds};
+use super::reject::{bone_rejections, exceeds};
 use ndarray::{Array2, s};
 use orator_base::math::order::lower_median;
-use orator_base::stage::refusal::{FrameRefusal, Refusal};
+use orator_base::stage::rejection::{FrameRejection, Rejection};
 use orator_base::types::interval::Interval;
 use orator_base::types::pose2d::{Keypoints, coco};
 use orator_base::types::pose3d::Motion;
@@ -54,9 +54,9 @@ impl BoneChange {
 
     /// Rejects the frames of runs longer than `max_gap` in which a bone deviates by more than `most`. In shorter runs
     /// the ends of such bones are hidden in `keypoints`, so that lifting fills them.
-    pub fn judge(&self, most: f64, max_gap: usize, keypoints: &mut Keypoints) -> Vec<Option<FrameRefusal>> {
-        let refusals = bone_refusals(&self.largest(), most, max_gap);
-        for (changes, t) in self.changes.outer_iter().zip(0..).filter(|(_, t)| refusals[*t].is_none()) {
+    pub fn judge(&self, most: f64, max_gap: usize, keypoints: &mut Keypoints) -> Vec<Option<FrameRejection>> {
+        let rejections = bone_rejections(&self.largest(), most, max_gap);
+        for (changes, t) in self.changes.outer_iter().zip(0..).filter(|(_, t)| rejections[*t].is_none()) {
             for (&change, (from, to)) in changes.iter().zip(POINTS) {
                 if exceeds(change, most) {
                     for point in [from, to] {
@@ -65,7 +65,7 @@ impl BoneChange {
                 }
             }
         }
-        refusals
+        rejections
     }
 
     /// Whether any bone deviates by more than `most`.
@@ -75,12 +75,12 @@ impl BoneChange {
 }
 
 /// Rejects the frames of `intervals` with a joint that is missing for longer than lifting fills.
-pub fn missing_joint_refusals(raw: &Motion, intervals: &[Interval]) -> Vec<Option<FrameRefusal>> {
-    let mut refusals = vec![None; raw.n_frames()];
+pub fn missing_joint_rejections(raw: &Motion, intervals: &[Interval]) -> Vec<Option<FrameRejection>> {
+    let mut rejections = vec![None; raw.n_frames()];
     for t in intervals.iter().flat_map(|interval| interval.start..interval.end) {
         let joints = raw.joints.slice(s![t, .., 0]);
         let n_open = joints.iter().filter(|x| !x.is_finite()).count();
-        refusals[t] = (n_open > 0).then(|| FrameRefusal::new(Refusal::MissingJoints, n_open as f64, 0.0));
+        rejections[t] = (n_open > 0).then(|| FrameRejection::new(Rejection::MissingJoints, n_open as f64, 0.0));
     }
-    refusals
+    rejections
 }

@@ -3,7 +3,7 @@
 
 use anyhow::{Result, ensure};
 use orator_base::math::order;
-use orator_base::types::pose2d::{Keypoints, SEEN_SCORE, coco};
+use orator_base::types::pose2d::{Keypoints, VISIBLE_SCORE, coco};
 use orator_base::types::pose3d::Motion;
 use orator_base::types::skeleton::{self, L_ELBOW, L_HAND, L_SHOULDER, L_WRIST, N_HAND_JOINTS};
 
@@ -24,7 +24,7 @@ pub struct ArmStatistics {
     pub masked: f64,
     /// Share of hand joints that have a position, and that are visible.
     pub hand_there: f64,
-    pub hand_seen: f64,
+    pub hand_visible: f64,
 }
 
 /// Statistics of the left and right arm of a clip.
@@ -96,7 +96,7 @@ fn arm(chain: &ArmChain, motion: &Motion, keypoints: &Keypoints) -> ArmStatistic
         missing: frames(&|t| !position(motion, wrist, t)[0].is_finite()),
         masked: frames(&|t| !motion.mask[[t, wrist]]),
         hand_there: share(hand.len(), n_hand),
-        hand_seen: share(hand.iter().filter(|&&(t, joint)| motion.mask[[t, joint]]).count(), n_hand),
+        hand_visible: share(hand.iter().filter(|&&(t, joint)| motion.mask[[t, joint]]).count(), n_hand),
     }
 }
 
@@ -155,7 +155,7 @@ fn position(motion: &Motion, joint: usize, t: usize) -> [f64; 3] {
 
 fn found(keypoints: &Keypoints, point: usize, t: usize) -> Option<[f64; 2]> {
     let [x, y, score] = [0, 1, 2].map(|k| keypoints.body[[t, point, k]]);
-    (score > SEEN_SCORE).then_some([f64::from(x), f64::from(y)])
+    (score > VISIBLE_SCORE).then_some([f64::from(x), f64::from(y)])
 }
 
 fn distance<const N: usize>(a: &[f64; N], b: &[f64; N]) -> f64 {
@@ -217,7 +217,7 @@ mod tests {
         motion.joints.slice_mut(ndarray::s![..15, .., ..]).fill(f32::NAN);
         motion.mask.slice_mut(ndarray::s![..30, ..]).fill(false);
         let right = measure(&motion, &keypoints).unwrap().right;
-        assert_eq!((right.missing, right.masked, right.hand_seen), (0.25, 0.5, 0.5));
+        assert_eq!((right.missing, right.masked, right.hand_visible), (0.25, 0.5, 0.5));
         motion.joints.fill(f32::NAN);
         assert!(measure(&motion, &keypoints).unwrap().left.jitter_mm.is_nan());
         let (short, _) = clip();

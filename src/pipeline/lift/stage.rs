@@ -3,7 +3,7 @@
 //! `intervals.json` and `ledger.json`.
 
 use super::outliers::{self, BoneChange};
-use super::refuse::{exclude_frames, max_gap_frames};
+use super::reject::{exclude_frames, max_gap_frames};
 use super::{Lifted, Lifter, weights};
 use anyhow::{Context, Result, ensure};
 use ndarray::{Array1, s};
@@ -152,11 +152,11 @@ impl LiftStage {
         let mut raw = self.lifter.raw(keypoints, &intervals.intervals, &intervals.resting)?;
         let change = BoneChange::measure(&raw.motion);
         if change.exceeds(most) {
-            let refusals = change.judge(most, max_gap_frames(&self.rules, keypoints.fps), keypoints);
-            (intervals, ledger) = exclude_frames(&intervals, &ledger, &refusals, min_frames)?;
+            let rejections = change.judge(most, max_gap_frames(&self.rules, keypoints.fps), keypoints);
+            (intervals, ledger) = exclude_frames(&intervals, &ledger, &rejections, min_frames)?;
             raw = self.lifter.raw(keypoints, &intervals.intervals, &intervals.resting)?;
         }
-        let open = outliers::missing_joint_refusals(&raw.motion, &intervals.intervals);
+        let open = outliers::missing_joint_rejections(&raw.motion, &intervals.intervals);
         (intervals, ledger) = exclude_frames(&intervals, &ledger, &open, min_frames)?;
         let largest = Array1::from_vec(change.largest());
         npz::write(&Artifact::BoneChange.within(out), |npz| npz.add_array("bone_change", &largest))?;

@@ -9,7 +9,7 @@ use super::face::model::FaceModel;
 use super::hand::{DetectedHand, HandModel};
 use super::hands::{self, HandTracker, VisibleHands};
 use super::model_input::ModelInput;
-use super::speaker::{SeenPerson, SpeakerTracker};
+use super::speaker::{SpeakerTracker, TrackedPerson};
 use super::talker::TalkerPath;
 use anyhow::{Context, Result, ensure};
 use orator_base::types::image::Image;
@@ -85,7 +85,7 @@ impl Chain {
     }
 
     /// Number of identities so far, the first of them when first recognised, and the person followed now.
-    pub fn identities(&self) -> (i64, [Option<SeenPerson>; 2]) {
+    pub fn identities(&self) -> (i64, [Option<TrackedPerson>; 2]) {
         self.speaker.identities()
     }
 
@@ -132,7 +132,7 @@ impl Chain {
         let followed = &self.speaker.track;
         let mut pose = Pose2d {
             person: followed.person(),
-            n_people: followed.n_people,
+            n_persons: followed.n_persons,
             identity: followed.identity(),
             ..Pose2d::default()
         };

@@ -43,13 +43,13 @@ pub fn is_detection_frame(idx: usize, every: usize, is_crowd: bool) -> bool {
 
 /// Position and colours of a person.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct SeenPerson {
+pub struct TrackedPerson {
     bbox: PersonBox,
     colours: BodyColours,
 }
 
 /// Whether the person tracked before a restart is the one tracked after it.
-pub fn is_same_person(before: &SeenPerson, after: &SeenPerson) -> bool {
+pub fn is_same_person(before: &TrackedPerson, after: &TrackedPerson) -> bool {
     boxes::overlap(&before.bbox, &after.bbox) >= MIN_SAME_OVERLAP
         && before.colours.distance(&after.colours) <= MAX_SAME_COLOUR_DISTANCE
 }
@@ -68,9 +68,9 @@ pub struct SpeakerTracker {
     /// More than one person was visible in this shot.
     several: bool,
     /// Person at the end of the previous shot.
-    before: Option<SeenPerson>,
+    before: Option<TrackedPerson>,
     /// Person of the first shot, when first recognised.
-    first: Option<SeenPerson>,
+    first: Option<TrackedPerson>,
     /// Path of the active speaker in this shot, if known; `idx` is the current frame of the shot.
     talker: Option<TalkerPath>,
     idx: usize,
@@ -118,7 +118,7 @@ impl SpeakerTracker {
         self.idx = idx;
         let every = settings.person_every.max(1);
         let regular = idx.is_multiple_of(every);
-        if !regular && !is_detection_frame(idx, every, self.track.n_people > 1) && self.track.bbox.is_some() {
+        if !regular && !is_detection_frame(idx, every, self.track.n_persons > 1) && self.track.bbox.is_some() {
             return Ok(());
         }
         let Some(mut found) = self.find(image)? else { return Ok(()) };
@@ -128,7 +128,7 @@ impl SpeakerTracker {
         let follow = regular.then_some(settings.box_smoothing);
         let was = self.track.identity();
         self.track.update(&found, TrackerStep { image_width: image.width, follow, body_visible });
-        self.several |= self.track.n_people > 1;
+        self.several |= self.track.n_persons > 1;
         if self.track.identity() != was {
             self.colours = None;
         }
@@ -145,7 +145,7 @@ impl SpeakerTracker {
         settings: &config::Pose2dConfig,
     ) -> Result<bool> {
         let Some(current_colours) = BodyColours::measure(image, points, settings.joint_score) else { return Ok(false) };
-        let current = SeenPerson { bbox: self.track.person(), colours: current_colours.clone() };
+        let current = TrackedPerson { bbox: self.track.person(), colours: current_colours.clone() };
         if self.before.take().is_some_and(|before| is_same_person(&before, &current)) {
             self.track.merge_with_previous();
         }
@@ -178,21 +178,21 @@ impl SpeakerTracker {
     }
 
     /// Number of identities, the first of them when first recognised, and the person followed now.
-    pub fn identities(&self) -> (i64, [Option<SeenPerson>; 2]) {
+    pub fn identities(&self) -> (i64, [Option<TrackedPerson>; 2]) {
         (self.track.n_identities(), [self.first.clone(), self.last()])
     }
 
     /// The person followed now.
-    fn last(&self) -> Option<SeenPerson> {
+    fn last(&self) -> Option<TrackedPerson> {
         let bbox = self.track.bbox.map(|_| self.track.person());
-        bbox.zip(self.colours.clone()).map(|(bbox, colours)| SeenPerson { bbox, colours })
+        bbox.zip(self.colours.clone()).map(|(bbox, colours)| TrackedPerson { bbox, colours })
     }
 
     /// All candidates in the picture; `None` without a detector.
     fn find(&mut self, image: &Image) -> Result<Option<Vec<Candidate>>> {
         let Some(detector) = self.detector.as_mut() else {
             self.track.bbox = Some([0.0, 0.0, image.width as f64, image.height as f64]);
-            (self.track.score, self.track.n_people) = (1.0, 1);
+            (self.track.score, self.track.n_persons) = (1.0, 1);
             return Ok(None);
         };
         let found = detector.find(image)?;

@@ -83,7 +83,7 @@ pub struct PersonTrack {
     pub bbox: Option<[f64; 4]>,
     pub score: f32,
     /// Number of persons of relevant size at the last detection, pictures excluded.
-    pub n_people: u8,
+    pub n_persons: u8,
     n_missed: usize,
     /// Number of identities so far; the current one is the last.
     n_identities: i64,
@@ -99,7 +99,7 @@ impl PersonTrack {
         }
         let least = self.bbox.map_or(0.0, |[_, _, width, height]| MIN_RELATIVE_AREA * (width * height) as f32);
         let is_relevant = |one: &&Candidate| one.person.width * one.person.height >= least && !one.is_picture();
-        self.n_people = u8::try_from(found.iter().filter(is_relevant).count()).unwrap_or(u8::MAX);
+        self.n_persons = u8::try_from(found.iter().filter(is_relevant).count()).unwrap_or(u8::MAX);
     }
 
     fn continue_track(&mut self, found: &[Candidate], bbox: [f64; 4], step: TrackerStep) {
@@ -190,7 +190,7 @@ mod tests {
     fn the_first_choice_is_followed_past_a_better_one() {
         let mut followed = PersonTrack::default();
         followed.update(&[at(0.0, 100.0, 0.9), at(100.0, 110.0, 0.9)], tracker_step(300, false));
-        assert_eq!((followed.person().x, followed.n_people), (100.0, 2));
+        assert_eq!((followed.person().x, followed.n_persons), (100.0, 2));
         followed.update(&[at(0.0, 250.0, 0.9), at(120.0, 110.0, 0.5)], tracker_step(300, true));
         assert!((followed.person().x - 106.0).abs() < 1e-4 && followed.person().score == 0.5);
         followed.update(&[at(130.0, 110.0, 0.5)], TrackerStep { follow: None, ..tracker_step(300, true) });
@@ -213,7 +213,7 @@ mod tests {
         // A new tracker would choose the other person by now.
         let mut fresh = PersonTrack::default();
         fresh.update(&[at(54.5, 101.0, 0.9), at(151.0, 168.0, 0.95)], tracker_step(340, true));
-        assert_eq!((fresh.person().x, fresh.n_people, followed.identity()), (151.0, 2, 0));
+        assert_eq!((fresh.person().x, fresh.n_persons, followed.identity()), (151.0, 2, 0));
     }
 
     #[test]
@@ -223,7 +223,7 @@ mod tests {
         for _ in 0..5 {
             followed.update(&[], tracker_step(300, true));
         }
-        assert_eq!((followed.person().x, followed.n_people, followed.identity()), (100.0, 0, 0));
+        assert_eq!((followed.person().x, followed.n_persons, followed.identity()), (100.0, 0, 0));
         followed.update(&[at(0.0, 30.0, 0.9)], tracker_step(300, true));
         assert_eq!((followed.person().x, followed.identity()), (0.0, 1));
         followed.update(&[], tracker_step(300, false));
@@ -241,7 +241,7 @@ mod tests {
         followed.update(&[moving(large, 5.0), moving(small, 30.0)], tracker_step(300, true));
         assert_eq!((followed.person().x, followed.identity()), (80.0, 0));
         followed.update(&[moving(large, 1.0), moving(small, 30.0)], tracker_step(300, true));
-        assert_eq!((followed.person().x, followed.identity(), followed.n_people), (0.0, 1, 1));
+        assert_eq!((followed.person().x, followed.identity(), followed.n_persons), (0.0, 1, 1));
     }
 
     #[test]
@@ -251,7 +251,7 @@ mod tests {
         let mut followed = PersonTrack::default();
         followed.update(&[large, speaking(small)], tracker_step(300, false));
         followed.update(&[large, speaking(moving(small, 1.0))], tracker_step(300, true));
-        assert_eq!((followed.person().x, followed.identity(), followed.n_people), (0.0, 0, 1));
+        assert_eq!((followed.person().x, followed.identity(), followed.n_persons), (0.0, 0, 1));
         let mut late = PersonTrack::default();
         late.update(&[large, small], tracker_step(300, false));
         late.update(&[large, speaking(small)], tracker_step(300, true));

@@ -4,8 +4,8 @@
 
 use super::measure::Measures;
 use super::table::{FrameRule, Gap, frame_rules, segment_rules};
-use orator_base::stage::ledger::{Kept, Ledger, Refused};
-use orator_base::stage::refusal::{FrameRefusal, Refusal};
+use orator_base::stage::ledger::{AcceptedInterval, Ledger, RejectedInterval};
+use orator_base::stage::rejection::{FrameRejection, Rejection};
 use orator_base::types::interval::{Interval, Intervals};
 use orator_base::types::time::FrameRate;
 use orator_dataset::config;
@@ -20,17 +20,17 @@ pub fn judge(measures: &Measures, video: &MediaInfo, rules: &config::SegmentConf
     };
     let begins_shot: Vec<bool> = (0..n_frames).map(begins_shot).collect();
     let rests: Vec<bool> = measures.rest.iter().map(|&rest| f64::from(rest) < rules.max_rest_move).collect();
-    let mut refusals = vec![None; n_frames];
+    let mut rejections = vec![None; n_frames];
     for rule in frame_rules(rules) {
         let holds = |t: usize| {
             rule.bound.holds(f64::from((rule.values)(measures)[t]))
                 || (rule.compares_frames && begins_shot[t])
                 || (rule.allows_rest && rests[t])
         };
-        apply(&rule, holds, &mut refusals, measures, &begins_shot, video.fps);
+        apply(&rule, holds, &mut rejections, measures, &begins_shot, video.fps);
     }
-    let pieces = pieces(&refusals, measures, &begins_shot, video.fps, rules);
-    let intervals = pieces.iter().filter(|(_, refused)| refused.is_none()).map(|(interval, _)| *interval).collect();
+    let pieces = pieces(&rejections, measures, &begins_shot, video.fps, rules);
+    let intervals = pieces.iter().filter(|(_, rejected)| rejected.is_none()).map(|(interval, _)| *interval).collect();
     let resting = runs(n_frames, |t| rests[t], |_| false);
     let intervals = Intervals::new(video.fps, n_frames, intervals).with_resting(&resting);
     let ledger = ledger(&pieces, n_frames, video).with_resting(intervals.resting_intervals());
@@ -41,12 +41,12 @@ pub fn judge(measures: &Measures, video: &MediaInfo, rules: &config::SegmentConf
 fn apply(
     rule: &FrameRule,
     holds: impl Fn(usize) -> bool,
-    refusals: &mut [Option<FrameRefusal>],
+    rejections: &mut [Option<FrameRejection>],
     measures: &Measures,
     begins_shot: &[bool],
     fps: FrameRate,
 ) {
-    let (values, n_frames) = ((rule.values)(measures), refusals.len());
+    let (values, n_frames) = ((rule.values)(measures), rejections.len());
     for run in runs(n_frames, |t| !holds(t), |t| begins_shot[t]) {
         let is_inside = run.start > 0 && run.end < n_frames && !begins_shot[run.start] && !begins_shot[run.end];
         let (longest, threshold) = match rule.gap {
@@ -57,37 +57,37 @@ fn apply(
             continue;
         }
         for t in run.start..run.end {
-            let refused = if rule.measures_secs {
-                FrameRefusal::new(rule.refusal, fps.secs(run.n_frames()), threshold)
+            let rejected = if rule.measures_secs {
+                FrameRejection::new(rule.rejection, fps.secs(run.n_frames()), threshold)
             } else {
-                FrameRefusal::new(rule.refusal, f64::from(values[t]), rule.bound.threshold())
+                FrameRejection::new(rule.rejection, f64::from(values[t]), rule.bound.threshold())
             };
-            refusals[t] = refusals[t].or(Some(refused));
+            rejections[t] = rejections[t].or(Some(rejected));
         }
     }
 }
 
 /// Consecutive pieces covering all frames, accepted (`None`) or rejected.
 fn pieces(
-    refusals: &[Option<FrameRefusal>],
+    rejections: &[Option<FrameRejection>],
     measures: &Measures,
     begins_shot: &[bool],
     fps: FrameRate,
     rules: &config::SegmentConfig,
-) -> Vec<(Interval, Option<FrameRefusal>)> {
-    let reason = |t: usize| refusals[t].map(|refused| refused.refusal);
+) -> Vec<(Interval, Option<FrameRejection>)> {
+    let reason = |t: usize| rejections[t].map(|rejected| rejected.rejection);
     let begins = |t: usize| begins_shot[t] || measures.identity[t] > 0.0;
     let divides = |t: usize| reason(t) != reason(t - 1) || (reason(t).is_none() && begins(t));
-    let judged = runs(refusals.len(), |_| true, divides).into_iter().map(|piece| {
-        let refused = match refusals[piece.start] {
-            Some(refused) => {
-                let measured = FrameRefusal::mean_measured(&refusals[piece.start..piece.end]);
-                Some(FrameRefusal { measured, ..refused })
+    let judged = runs(rejections.len(), |_| true, divides).into_iter().map(|piece| {
+        let rejected = match rejections[piece.start] {
+            Some(rejected) => {
+                let measured = FrameRejection::mean_measured(&rejections[piece.start..piece.end]);
+                Some(FrameRejection { measured, ..rejected })
             }
             None => too_short(piece, measures, begins_shot, fps, rules)
                 .or_else(|| violated_segment_rule(piece, measures, rules)),
         };
-        (piece, refused)
+        (piece, rejected)
     });
     judged.collect()
 }
@@ -99,41 +99,45 @@ fn too_short(
     begins_shot: &[bool],
     fps: FrameRate,
     rules: &config::SegmentConfig,
-) -> Option<FrameRefusal> {
+) -> Option<FrameRejection> {
     if piece.n_frames() >= rules.min_frames {
         return None;
     }
     let at_end = |begins: &dyn Fn(usize) -> bool| {
         [piece.start, piece.end].into_iter().any(|t| t > 0 && t < begins_shot.len() && begins(t))
     };
-    let refusal = if at_end(&|t| begins_shot[t]) {
-        Refusal::Cut
+    let rejection = if at_end(&|t| begins_shot[t]) {
+        Rejection::Cut
     } else if at_end(&|t| measures.identity[t] > 0.0) {
-        Refusal::Identity
+        Rejection::Identity
     } else {
-        Refusal::TooShort
+        Rejection::TooShort
     };
-    Some(FrameRefusal::new(refusal, fps.secs(piece.n_frames()), fps.secs(rules.min_frames)))
+    Some(FrameRejection::new(rejection, fps.secs(piece.n_frames()), fps.secs(rules.min_frames)))
 }
 
 /// Rejection by the first rule on segments that a piece of good frames violates.
-fn violated_segment_rule(piece: Interval, measures: &Measures, rules: &config::SegmentConfig) -> Option<FrameRefusal> {
+fn violated_segment_rule(
+    piece: Interval,
+    measures: &Measures,
+    rules: &config::SegmentConfig,
+) -> Option<FrameRejection> {
     segment_rules(rules).into_iter().find_map(|rule| {
         let values = (rule.values)(measures);
         let rests = |t: usize| rule.allows_rest && f64::from(measures.rest[t]) < rules.max_rest_move;
         let is_counted = |&t: &usize| rule.counted.holds(f64::from(values[t])) || rests(t);
         let n = (piece.start..piece.end).filter(is_counted).count();
         let share = n as f64 / piece.n_frames().max(1) as f64;
-        (!rule.share.holds(share)).then(|| FrameRefusal::new(rule.refusal, share, rule.share.threshold()))
+        (!rule.share.holds(share)).then(|| FrameRejection::new(rule.rejection, share, rule.share.threshold()))
     })
 }
 
 /// Converts pieces to seconds. The last one ends with the video, so that a partial last frame is counted.
-fn ledger(pieces: &[(Interval, Option<FrameRefusal>)], n_frames: usize, video: &MediaInfo) -> Ledger {
+fn ledger(pieces: &[(Interval, Option<FrameRejection>)], n_frames: usize, video: &MediaInfo) -> Ledger {
     let mut ledger = Ledger { duration_secs: video.duration_secs, ..Ledger::default() };
-    let no_frames = [(Interval { start: 0, end: 0 }, Some(FrameRefusal::new(Refusal::NoPerson, 0.0, 0.0)))];
+    let no_frames = [(Interval { start: 0, end: 0 }, Some(FrameRejection::new(Rejection::NoPerson, 0.0, 0.0)))];
     let pieces = if pieces.is_empty() { &no_frames[..] } else { pieces };
-    for (piece, refused) in pieces {
+    for (piece, rejected) in pieces {
         let start_secs = video.fps.secs(piece.start).min(video.duration_secs);
         let end_secs = if piece.end == n_frames {
             video.duration_secs
@@ -143,9 +147,9 @@ fn ledger(pieces: &[(Interval, Option<FrameRefusal>)], n_frames: usize, video: &
         if end_secs <= start_secs {
             continue;
         }
-        match *refused {
-            None => ledger.kept.push(Kept { start_secs, end_secs }),
-            Some(why) => ledger.refused.push(Refused::new(start_secs, end_secs, why)),
+        match *rejected {
+            None => ledger.accepted.push(AcceptedInterval { start_secs, end_secs }),
+            Some(why) => ledger.rejected.push(RejectedInterval::new(start_secs, end_secs, why)),
         }
     }
     ledger

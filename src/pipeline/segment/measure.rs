@@ -3,7 +3,7 @@
 
 use super::rest;
 use ndarray::{ArrayView2, ArrayView3};
-use orator_base::types::pose2d::{Keypoints, SEEN_SCORE, coco};
+use orator_base::types::pose2d::{Keypoints, VISIBLE_SCORE, coco};
 
 /// Limit of `facing` and `nose_off`, whose denominators may vanish.
 const MAX_RATIO: f32 = 10.0;
@@ -47,7 +47,7 @@ pub struct Measures {
     /// Movement of the wrists in the second around the frame, in shoulder widths, if they are together; 10 otherwise.
     pub rest: Vec<f32>,
     /// Number of persons in view.
-    pub n_people: Vec<f32>,
+    pub n_persons: Vec<f32>,
     /// Movement of the neck since the previous frame, in shoulder widths (the wider of the two frames); 0 in frame 0.
     pub jump: Vec<f32>,
     /// 1 if the followed person differs from the previous frame, 0 otherwise.
@@ -69,7 +69,7 @@ impl Measures {
             measures.face.push(face);
             measures.arms.push(arms.into_iter().fold(f32::INFINITY, f32::min));
             let (neck, width) = shoulders(&body);
-            let known = arms[0].min(arms[1]) >= SEEN_SCORE;
+            let known = arms[0].min(arms[1]) >= VISIBLE_SCORE;
             let [facing, nose_off] = if known { facing_and_nose_off(&body, neck) } else { [f32::NAN; 2] };
             measures.facing.push(facing);
             measures.nose_off.push(nose_off);
@@ -90,7 +90,7 @@ impl Measures {
             left_other: vec![0.0; n_frames],
             right_other: vec![0.0; n_frames],
             rest: rest::movement(keypoints),
-            n_people: vec![1.0; n_frames],
+            n_persons: vec![1.0; n_frames],
             identity: vec![0.0; n_frames],
             shot_score: vec![0.0; n_frames],
             ..measures
@@ -122,7 +122,7 @@ fn shoulders(body: &ArrayView2<f32>) -> ([f32; 2], f32) {
 
 /// `facing` and `nose_off` of a frame with visible shoulders.
 fn facing_and_nose_off(body: &ArrayView2<f32>, neck: [f32; 2]) -> [f32; 2] {
-    if body[[coco::NOSE, 2]] < SEEN_SCORE {
+    if body[[coco::NOSE, 2]] < VISIBLE_SCORE {
         return [f32::NAN; 2];
     }
     let nose = at(body, coco::NOSE);

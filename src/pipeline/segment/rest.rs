@@ -4,7 +4,7 @@
 
 use ndarray::ArrayView2;
 use orator_base::math::order::lower_median;
-use orator_base::types::pose2d::{Keypoints, SEEN_SCORE, coco};
+use orator_base::types::pose2d::{Keypoints, VISIBLE_SCORE, coco};
 
 /// Largest wrist distance, in shoulder widths, of hands that are together. In videos of three resting people it is 0.3
 /// to 0.55.
@@ -30,7 +30,7 @@ fn wrists(body: &ArrayView2<f32>) -> Option<[f32; 4]> {
     let points = [coco::L_SHOULDER, coco::R_SHOULDER, coco::L_WRIST, coco::R_WRIST];
     let [left, right, left_wrist, right_wrist] = points.map(|j| [body[[j, 0]], body[[j, 1]]]);
     let width = (left[0] - right[0]).hypot(left[1] - right[1]);
-    let is_visible = width >= 1.0 && points.iter().all(|&j| body[[j, 2]] >= SEEN_SCORE);
+    let is_visible = width >= 1.0 && points.iter().all(|&j| body[[j, 2]] >= VISIBLE_SCORE);
     let about = |wrist: [f32; 2], k: usize| (wrist[k] - (left[k] + right[k]) / 2.0) / width;
     is_visible.then(|| [about(left_wrist, 0), about(left_wrist, 1), about(right_wrist, 0), about(right_wrist, 1)])
 }

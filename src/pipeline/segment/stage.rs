@@ -136,7 +136,7 @@ impl SegmentStage {
             speech,
             lip_sync,
             frame_difference: timeline.frame_difference,
-            n_people: extras.n_people.iter().map(|&n| n as f32).collect(),
+            n_persons: extras.n_persons.iter().map(|&n| n as f32).collect(),
             identity: measure::identity(&extras.identity.to_vec(), &timeline.restart, &from_keypoints.jump),
             shot_score: timeline.shot_score.iter().map(|&score| score as f32).collect(),
             ..from_keypoints
@@ -146,7 +146,7 @@ impl SegmentStage {
 }
 
 fn report(intervals: &Intervals, ledger: &Ledger) -> Report {
-    let (accepted, rejected) = (ledger.kept_secs(), ledger.refused_secs());
+    let (accepted, rejected) = (ledger.accepted_secs(), ledger.rejected_secs());
     let windows = intervals.windows_64;
     let mut line = if intervals.intervals.is_empty() {
         format!("no interval accepted in {}", length(ledger.duration_secs))
@@ -166,8 +166,8 @@ fn report(intervals: &Intervals, ledger: &Ledger) -> Report {
     if !rejected.is_empty() {
         let _ = write!(line, "; rejected: {}", longest_first(&rejected));
     }
-    let secs = |r: &orator_base::stage::ledger::Refused| r.end_secs - r.start_secs;
-    let longest = ledger.refused.iter().max_by(|a, b| secs(a).total_cmp(&secs(b)));
+    let secs = |r: &orator_base::stage::ledger::RejectedInterval| r.end_secs - r.start_secs;
+    let longest = ledger.rejected.iter().max_by(|a, b| secs(a).total_cmp(&secs(b)));
     if let (true, Some(longest)) = (intervals.intervals.is_empty(), longest) {
         let _ = write!(line, " ({})", longest.message);
     }

@@ -29,7 +29,7 @@ macro_rules! arrays {
             ("left_other", $($borrow)+ $of.left_other),
             ("right_other", $($borrow)+ $of.right_other),
             ("rest", $($borrow)+ $of.rest),
-            ("n_people", $($borrow)+ $of.n_people),
+            ("n_people", $($borrow)+ $of.n_persons),
             ("jump", $($borrow)+ $of.jump),
             ("identity", $($borrow)+ $of.identity),
             ("shot_score", $($borrow)+ $of.shot_score),

@@ -2,7 +2,7 @@
 //! precedence. Thresholds come from `[segment]` of the configuration.
 
 use super::measure::Measures;
-use orator_base::stage::refusal::Refusal;
+use orator_base::stage::rejection::Rejection;
 use orator_dataset::config;
 
 /// Share of duplicate detections in a gap of a hand above which the gap is attributed to the other hand.
@@ -27,7 +27,7 @@ pub enum Gap {
 /// Rule on frames. It rejects runs of failing frames within a shot that are longer than the gap.
 #[derive(Clone, Copy)]
 pub struct FrameRule {
-    pub refusal: Refusal,
+    pub rejection: Rejection,
     pub values: fn(&Measures) -> &[f32],
     pub bound: Bound,
     pub gap: Gap,
@@ -42,7 +42,7 @@ pub struct FrameRule {
 /// Rule on segments, the runs of good frames: bounds the share of frames with a property.
 #[derive(Clone, Copy)]
 pub struct SegmentRule {
-    pub refusal: Refusal,
+    pub rejection: Rejection,
     pub values: fn(&Measures) -> &[f32],
     /// Frames that are counted...
     pub counted: Bound,
@@ -73,8 +73,8 @@ impl Bound {
 pub fn frame_rules(rules: &config::SegmentConfig) -> [FrameRule; 16] {
     use Bound::{AtLeast, AtMost};
     let score = AtLeast(rules.joint_score);
-    let row = |refusal, values: fn(&Measures) -> &[f32], bound, gap| FrameRule {
-        refusal,
+    let row = |rejection, values: fn(&Measures) -> &[f32], bound, gap| FrameRule {
+        rejection,
         values,
         bound,
         gap,
@@ -88,40 +88,40 @@ pub fn frame_rules(rules: &config::SegmentConfig) -> [FrameRule; 16] {
         (Gap::Anywhere(0.0), Gap::Inside(rules.max_body_gap_secs), Gap::Anywhere(rules.max_hand_gap_secs));
     let (quiet, still) = (Gap::Anywhere(rules.max_quiet_secs), Gap::Anywhere(rules.max_static_secs));
     [
-        row(Refusal::NoSound, |m| &m.sound, AtLeast(0.5), none),
-        row(Refusal::Quiet, |m| &m.sound_db, AtLeast(rules.min_sound_db), quiet),
-        row(Refusal::NoSpeech, |m| &m.speech, AtLeast(rules.min_speech), quiet),
-        row(Refusal::OffScreenSpeaker, |m| &m.lip_sync, AtLeast(rules.min_lip_sync), quiet),
-        secs(row(Refusal::Static, |m| &m.frame_difference, AtLeast(rules.min_change), still)),
-        row(Refusal::NoPerson, |m| &m.person, score, body),
-        row(Refusal::Small, |m| &m.shoulder_px, AtLeast(rules.min_shoulder_px), body),
-        row(Refusal::Face, |m| &m.face, score, body),
-        row(Refusal::Turned, |m| &m.facing, AtLeast(rules.min_facing), body),
-        row(Refusal::NoseOff, |m| &m.nose_off, AtMost(rules.max_nose_off), body),
-        row(Refusal::Arms, |m| &m.arms, score, body),
-        hands(row(Refusal::OtherHand, |m| &m.left_other, AtMost(MAX_DUPLICATE_SHARE), hand)),
-        hands(row(Refusal::OtherHand, |m| &m.right_other, AtMost(MAX_DUPLICATE_SHARE), hand)),
-        hands(row(Refusal::HandGap, |m| &m.left_hand, score, hand)),
-        hands(row(Refusal::HandGap, |m| &m.right_hand, score, hand)),
-        FrameRule { compares_frames: true, ..row(Refusal::Jump, |m| &m.jump, AtMost(rules.max_jump), none) },
+        row(Rejection::NoSound, |m| &m.sound, AtLeast(0.5), none),
+        row(Rejection::Quiet, |m| &m.sound_db, AtLeast(rules.min_sound_db), quiet),
+        row(Rejection::NoSpeech, |m| &m.speech, AtLeast(rules.min_speech), quiet),
+        row(Rejection::OffScreenSpeaker, |m| &m.lip_sync, AtLeast(rules.min_lip_sync), quiet),
+        secs(row(Rejection::Static, |m| &m.frame_difference, AtLeast(rules.min_change), still)),
+        row(Rejection::NoPerson, |m| &m.person, score, body),
+        row(Rejection::Small, |m| &m.shoulder_px, AtLeast(rules.min_shoulder_px), body),
+        row(Rejection::Face, |m| &m.face, score, body),
+        row(Rejection::Turned, |m| &m.facing, AtLeast(rules.min_facing), body),
+        row(Rejection::NoseOff, |m| &m.nose_off, AtMost(rules.max_nose_off), body),
+        row(Rejection::Arms, |m| &m.arms, score, body),
+        hands(row(Rejection::OtherHand, |m| &m.left_other, AtMost(MAX_DUPLICATE_SHARE), hand)),
+        hands(row(Rejection::OtherHand, |m| &m.right_other, AtMost(MAX_DUPLICATE_SHARE), hand)),
+        hands(row(Rejection::HandGap, |m| &m.left_hand, score, hand)),
+        hands(row(Rejection::HandGap, |m| &m.right_hand, score, hand)),
+        FrameRule { compares_frames: true, ..row(Rejection::Jump, |m| &m.jump, AtMost(rules.max_jump), none) },
     ]
 }
 
 /// The rules on segments.
 pub fn segment_rules(rules: &config::SegmentConfig) -> [SegmentRule; 3] {
     use Bound::{AtLeast, AtMost};
-    let row = |refusal, values: fn(&Measures) -> &[f32], counted, share| SegmentRule {
-        refusal,
+    let row = |rejection, values: fn(&Measures) -> &[f32], counted, share| SegmentRule {
+        rejection,
         values,
         counted,
         share,
-        allows_rest: matches!(refusal, Refusal::HandShare),
+        allows_rest: matches!(rejection, Rejection::HandShare),
     };
     let (visible, min_share) = (AtLeast(rules.joint_score), AtLeast(rules.min_hand_share));
     let crowded = AtLeast(f64::from(rules.max_people) + 0.5);
     [
-        row(Refusal::HandShare, |m| &m.left_hand, visible, min_share),
-        row(Refusal::HandShare, |m| &m.right_hand, visible, min_share),
-        row(Refusal::Crowd, |m| &m.n_people, crowded, AtMost(rules.max_crowd_share)),
+        row(Rejection::HandShare, |m| &m.left_hand, visible, min_share),
+        row(Rejection::HandShare, |m| &m.right_hand, visible, min_share),
+        row(Rejection::Crowd, |m| &m.n_persons, crowded, AtMost(rules.max_crowd_share)),
     ]
 }

@@ -79,7 +79,7 @@ fn row(table: &Table, index: usize, last: &mut String) -> Option<Node> {
         let (class, outcome) = match against_constant_pose(table, own, index) {
             Some(Answer::Yes) => ("yes", "better"),
             Some(Answer::No) => ("no", "worse"),
-            Some(Answer::Undecided) => ("undecided", "no significant difference"),
+            Some(Answer::Inconclusive) => ("undecided", "no significant difference"),
             None => ("", ""),
         };
         node("td").class(format!("against {class}")).text(outcome)

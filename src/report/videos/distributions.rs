@@ -108,7 +108,7 @@ impl MeasureCounts {
 
     /// Counts the accepted intervals of a video.
     pub fn add_intervals(&mut self, ledger: &Ledger) {
-        self.add(LENGTHS, ledger.kept.iter().map(|kept| kept.end_secs - kept.start_secs));
+        self.add(LENGTHS, ledger.accepted.iter().map(|accepted| accepted.end_secs - accepted.start_secs));
     }
 }
 
@@ -148,7 +148,7 @@ fn card(shown: &Measure, counts: &Counts, threshold: ThresholdLine) -> Node {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use orator_base::stage::ledger::Kept;
+    use orator_base::stage::ledger::AcceptedInterval;
 
     #[test]
     fn every_measure_is_counted_except_boolean_ones() {
@@ -158,7 +158,10 @@ mod tests {
         let mut counts = MeasureCounts::new();
         let measures = Measures { jump: vec![0.1, 0.7, f32::NAN], ..Measures::default() };
         counts.add_frames(&measures);
-        counts.add_intervals(&Ledger { kept: vec![Kept { start_secs: 1.0, end_secs: 9.0 }], ..Ledger::default() });
+        counts.add_intervals(&Ledger {
+            accepted: vec![AcceptedInterval { start_secs: 1.0, end_secs: 9.0 }],
+            ..Ledger::default()
+        });
         let of = |key: &str| counts.all().find(|(row, _)| row.key == key).unwrap();
         assert_eq!((of("max_jump").1.total(), of("max_jump").1.unknown), (2, 1));
         let (row, lengths) = of("min_frames");

@@ -5,7 +5,7 @@ use super::reasons;
 use super::video::VideoSummary;
 use super::worst::{Moment, Worst};
 use crate::html::{Node, jpeg, node};
-use orator_base::stage::refusal::Refusal;
+use orator_base::stage::rejection::Rejection;
 use orator_base::text::clock;
 use orator_base::text::counted;
 use std::collections::BTreeMap;
@@ -30,7 +30,7 @@ pub fn gallery(worst: &Worst, pictures: &Pictures, videos: &[VideoSummary]) -> V
         let title = node("h3")
             .class("rule")
             .child(swatch)
-            .child(node("span").text(Refusal::label(reason)))
+            .child(node("span").text(Rejection::label(reason)))
             .child(node("small").text(about));
         let cards = moments.iter().filter_map(|moment| Some(card(moment, videos.get(moment.video)?, pictures)));
         shown.push(node("div").class("gallery").child(title).child(node("div").class("shots").children(cards)));

@@ -25,7 +25,7 @@ use std::path::Path;
 pub struct ReportData {
     pub videos: Vec<VideoSummary>,
     /// Results of `what_if` by video; `None`: the video has no measures.
-    pub kept: Vec<Option<AcceptedByThreshold>>,
+    pub accepted: Vec<Option<AcceptedByThreshold>>,
     pub measures: MeasureCounts,
     pub movement: MovementCounts,
     pub worst: Worst,
@@ -42,7 +42,7 @@ pub fn gather(settings: &Settings, videos: &[Videos], n_pictures: usize, progres
     let missing = videos.iter().flat_map(|of| of.missing.iter().map(move |text| format!("{}: {text}", of.speaker)));
     let mut all = ReportData {
         videos: Vec::new(),
-        kept: Vec::new(),
+        accepted: Vec::new(),
         measures: MeasureCounts::new(),
         movement: MovementCounts::new(),
         worst: Worst::new(n_pictures),
@@ -55,12 +55,12 @@ pub fn gather(settings: &Settings, videos: &[Videos], n_pictures: usize, progres
     for unit in units {
         task.detail(&unit.video);
         let mut video = VideoSummary::read(&settings.work.dir, unit);
-        let kept = if video.ledger.failed.is_empty() && video.ledger.duration_secs > 0.0 {
+        let accepted = if video.ledger.failed.is_empty() && video.ledger.duration_secs > 0.0 {
             all.add(settings, &mut video)
         } else {
             None
         };
-        all.kept.push(kept);
+        all.accepted.push(accepted);
         all.videos.push(video);
         task.advance(1);
     }
@@ -111,16 +111,16 @@ impl ReportData {
             max_bone_change,
             open: &open,
         };
-        let now = judged.kept_secs(rules);
-        if (now - video.ledger.kept_secs()).abs() > 1e-6 {
+        let now = judged.accepted_secs(rules);
+        if (now - video.ledger.accepted_secs()).abs() > 1e-6 {
             video.note(
                 "The thresholds have changed since this video was processed; the sliders start at the new values. Run \
                  `orator run` to update it.",
             );
         }
-        let kept = judged.table(rules);
-        debug_assert_eq!(kept.len(), THRESHOLDS.len());
-        Some(kept)
+        let accepted = judged.table(rules);
+        debug_assert_eq!(accepted.len(), THRESHOLDS.len());
+        Some(accepted)
     }
 }
 

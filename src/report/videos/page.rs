@@ -39,11 +39,11 @@ pub fn make(request: &ReportRequest, progress: &dyn Progress) -> ReportPage {
     let sums = ReportTotals::sum(&gathered.videos);
     let facts = json!({
         "n_videos": gathered.videos.len(),
-        "n_intervals": gathered.videos.iter().map(|v| v.ledger.kept.len() + v.ledger.refused.len() + v.ledger.failed.len()).sum::<usize>(),
+        "n_intervals": gathered.videos.iter().map(|v| v.ledger.accepted.len() + v.ledger.rejected.len() + v.ledger.failed.len()).sum::<usize>(),
         "n_pictures": pictures.len(),
         "duration_secs": sums.total,
-        "accepted_secs": sums.kept,
-        "rejected_secs": sums.refused,
+        "accepted_secs": sums.accepted,
+        "rejected_secs": sums.rejected,
         "failed_secs": sums.failed,
         "waiting_secs": sums.waiting,
         "missing": gathered.missing,
@@ -71,9 +71,9 @@ fn draw(settings: &Settings, gathered: &mut ReportData, progress: &dyn Progress)
 fn page(request: &ReportRequest, gathered: &ReportData, pictures: &Pictures, sums: &ReportTotals) -> Page {
     let rules = &request.settings.segment;
     let per_sec = request.settings.extract.rate().per_sec();
-    let ReportData { videos, kept, measures, movement, worst, previews, missing, n_speech_model } = gathered;
+    let ReportData { videos, accepted, measures, movement, worst, previews, missing, n_speech_model } = gathered;
     let splits = summary::video_splits(request.settings, request.videos);
-    let mut data = sliders::data(kept, videos, rules);
+    let mut data = sliders::data(accepted, videos, rules);
     data["previews"] = preview::data(previews);
     let names: Vec<&str> = request.videos.iter().map(|videos| videos.speaker.as_str()).collect();
     let section = |id, title, body| Section { id, title, body };
@@ -96,7 +96,7 @@ fn page(request: &ReportRequest, gathered: &ReportData, pictures: &Pictures, sum
             section("videos", "Videos", summary::table(videos, &splits)),
             section("previews", "Accepted motion", preview::section(previews)),
             section("timelines", "Timelines", timelines::lines(videos)),
-            section("thresholds", "Thresholds", sliders::sliders(kept, rules)),
+            section("thresholds", "Thresholds", sliders::sliders(accepted, rules)),
             section("frames", "Worst frames", gallery(worst, pictures, videos)),
             section("distributions", "Distributions", distributions(measures, request.settings, per_sec)),
             section("motion", "Motion", motion::motion(movement)),

@@ -11,10 +11,10 @@ use orator_dataset::config::SegmentConfig;
 use serde_json::{Value, json};
 
 /// Accepted seconds of all videos, by threshold and value.
-fn sums(kept: &[Option<AcceptedByThreshold>], rules: &SegmentConfig) -> AcceptedByThreshold {
+fn sums(accepted: &[Option<AcceptedByThreshold>], rules: &SegmentConfig) -> AcceptedByThreshold {
     let zeros =
         || THRESHOLDS.iter().map(|threshold| vec![0.0; threshold.grid(rules).0.len()]).collect::<AcceptedByThreshold>();
-    kept.iter().flatten().fold(zeros(), |mut sums, of| {
+    accepted.iter().flatten().fold(zeros(), |mut sums, of| {
         for (sums, of) in sums.iter_mut().zip(of) {
             sums.iter_mut().zip(of).for_each(|(sum, secs)| *sum += secs);
         }
@@ -24,7 +24,7 @@ fn sums(kept: &[Option<AcceptedByThreshold>], rules: &SegmentConfig) -> Accepted
 
 /// Data for the script: thresholds with their values and total seconds, and videos with their accepted tenths of a
 /// second by threshold and value.
-pub fn data(kept: &[Option<AcceptedByThreshold>], videos: &[VideoSummary], rules: &SegmentConfig) -> Value {
+pub fn data(accepted: &[Option<AcceptedByThreshold>], videos: &[VideoSummary], rules: &SegmentConfig) -> Value {
     let milli = |secs: f64| (secs * 1000.0).round() / 1000.0;
     let row = |(threshold, sums): (&ThresholdGrid, &Vec<f64>)| {
         let (grid, now) = threshold.grid(rules);
@@ -36,25 +36,25 @@ pub fn data(kept: &[Option<AcceptedByThreshold>], videos: &[VideoSummary], rules
             "secs": sums.iter().map(|secs| milli(*secs)).collect::<Vec<_>>(),
         })
     };
-    let thresholds: Vec<Value> = THRESHOLDS.iter().zip(&sums(kept, rules)).map(row).collect();
+    let thresholds: Vec<Value> = THRESHOLDS.iter().zip(&sums(accepted, rules)).map(row).collect();
     let tenths = |row: &Vec<f64>| row.iter().map(|secs| (secs * 10.0).round() as u64).collect::<Vec<_>>();
-    let judged = videos.iter().zip(kept).filter_map(|(video, kept)| {
-        let rows = kept.as_ref()?.iter().map(tenths).collect::<Vec<_>>();
+    let judged = videos.iter().zip(accepted).filter_map(|(video, accepted)| {
+        let rows = accepted.as_ref()?.iter().map(tenths).collect::<Vec<_>>();
         Some(json!({ "name": video.file, "id": video.anchor(), "tenths": rows }))
     });
     json!({ "thresholds": thresholds, "videos": judged.collect::<Vec<_>>() })
 }
 
 /// Section with the sliders.
-pub fn sliders(kept: &[Option<AcceptedByThreshold>], rules: &SegmentConfig) -> Vec<Node> {
-    if kept.iter().all(Option::is_none) {
+pub fn sliders(accepted: &[Option<AcceptedByThreshold>], rules: &SegmentConfig) -> Vec<Node> {
+    if accepted.iter().all(Option::is_none) {
         return vec![node("p").class("empty").text("No video has been processed yet: run `orator run`.")];
     }
     let about = "Each slider changes one threshold and leaves the others at their configured values. The durations are \
                  exact: at each step the rules were applied again to the stored measurements of all videos. Frames \
                  that lifting rejected (bone length, missing joints) stay rejected, and frames that were never lifted \
                  count as accepted. max_bone_change has no slider.";
-    let sums = sums(kept, rules);
+    let sums = sums(accepted, rules);
     let max = sums.iter().flatten().copied().fold(0.0, f64::max);
     let cards =
         THRESHOLDS.iter().zip(&sums).enumerate().map(|(i, (threshold, sums))| card(i, threshold, sums, max, rules));

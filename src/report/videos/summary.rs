@@ -6,7 +6,7 @@ use super::video::VideoSummary;
 use crate::html;
 use crate::html::{Node, legend, node};
 use orator_base::stage::artifacts::{StageName, speaker_dir};
-use orator_base::stage::refusal::Refusal;
+use orator_base::stage::rejection::Rejection;
 use orator_base::text::counted;
 use orator_base::text::{length, percent};
 use orator_base::types::split::Split;
@@ -21,12 +21,12 @@ use std::collections::BTreeMap;
 pub struct ReportTotals {
     /// All footage.
     pub total: f64,
-    pub kept: f64,
+    pub accepted: f64,
     pub failed: f64,
     /// Not processed yet.
     pub waiting: f64,
     /// By reason.
-    pub refused: BTreeMap<String, f64>,
+    pub rejected: BTreeMap<String, f64>,
     /// Number of accepted intervals.
     pub n_accepted: usize,
 }
@@ -36,21 +36,21 @@ impl ReportTotals {
         let mut sums = Self::default();
         for ledger in videos.iter().map(|video| &video.ledger) {
             sums.total += ledger.duration_secs;
-            sums.kept += ledger.kept_secs();
-            sums.n_accepted += ledger.kept.len();
+            sums.accepted += ledger.accepted_secs();
+            sums.n_accepted += ledger.accepted.len();
             for failed in &ledger.failed {
                 let sum = if failed.stage == WAITING { &mut sums.waiting } else { &mut sums.failed };
                 *sum += failed.end_secs - failed.start_secs;
             }
-            for (reason, secs) in ledger.refused_secs() {
-                *sums.refused.entry(reason).or_default() += secs;
+            for (reason, secs) in ledger.rejected_secs() {
+                *sums.rejected.entry(reason).or_default() += secs;
             }
         }
         sums
     }
 
     pub fn rejected_secs(&self) -> f64 {
-        self.refused.values().sum()
+        self.rejected.values().sum()
     }
 }
 
@@ -66,8 +66,8 @@ pub fn totals(sums: &ReportTotals, videos: &[VideoSummary], missing: &[String]) 
         tile(
             "Accepted",
             "accepted-secs",
-            sums.kept,
-            format!("{} in {}", share(sums.kept), counted(sums.n_accepted, "interval")),
+            sums.accepted,
+            format!("{} in {}", share(sums.accepted), counted(sums.n_accepted, "interval")),
         ),
         tile("Rejected", "rejected-secs", sums.rejected_secs(), share(sums.rejected_secs())),
         tile("Failed", "failed-secs", sums.failed, counted(n_failed, "video")),
@@ -102,11 +102,11 @@ type Part<'a> = (&'a str, String, f64, &'static str);
 pub fn by_reason(sums: &ReportTotals) -> Vec<Node> {
     let of_reason =
         |(reason, secs): (&'_ String, &f64)| (reason.clone(), reasons::class(reason), *secs, reasons::heading(reason));
-    let mut refused: Vec<_> = sums.refused.iter().map(of_reason).collect();
-    refused.sort_by(|a, b| b.2.total_cmp(&a.2).then(a.0.cmp(&b.0)));
-    let mut parts: Vec<Part> = vec![("accepted", "accepted".to_owned(), sums.kept, "usable for the dataset")];
+    let mut rejected: Vec<_> = sums.rejected.iter().map(of_reason).collect();
+    rejected.sort_by(|a, b| b.2.total_cmp(&a.2).then(a.0.cmp(&b.0)));
+    let mut parts: Vec<Part> = vec![("accepted", "accepted".to_owned(), sums.accepted, "usable for the dataset")];
     parts.extend(
-        refused.iter().map(|(name, class, secs, heading)| (Refusal::label(name), class.clone(), *secs, *heading)),
+        rejected.iter().map(|(name, class, secs, heading)| (Rejection::label(name), class.clone(), *secs, *heading)),
     );
     if sums.failed > 0.0 {
         parts.push(("failed", "failed".to_owned(), sums.failed, "a stage failed"));
@@ -141,8 +141,8 @@ fn by_speaker(videos: &[VideoSummary]) -> Option<Node> {
         node("tr")
             .child(node("th").attr("scope", "row").class("name").text(speaker))
             .child(node("td").class("num").text(counted(videos.len(), "video")))
-            .children([sums.total, sums.kept].map(|secs| node("td").class("num").text(length(secs))))
-            .child(node("td").class("num").text(percent(sums.kept, sums.total)))
+            .children([sums.total, sums.accepted].map(|secs| node("td").class("num").text(length(secs))))
+            .child(node("td").class("num").text(percent(sums.accepted, sums.total)))
     };
     let heads = [("Speaker", ""), ("", "num"), ("Length", "num"), ("Accepted", "num"), ("", "num")];
     (of_speakers.len() > 1).then(|| html::table("speakers", heads.map(head), of_speakers.iter().map(row)))
@@ -165,12 +165,12 @@ pub fn table(videos: &[VideoSummary], splits: &VideoSplits) -> Vec<Node> {
     let row = |video: &VideoSummary| {
         let link = node("a").attr("href", format!("#{}", video.anchor())).text(&video.file);
         let ledger = &video.ledger;
-        let mut refused: Vec<(String, f64)> = ledger.refused_secs().into_iter().collect();
-        refused.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
-        let longest = refused.iter().take(3);
+        let mut rejected: Vec<(String, f64)> = ledger.rejected_secs().into_iter().collect();
+        rejected.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
+        let longest = rejected.iter().take(3);
         let why =
             legend(longest.map(|(reason, secs)| {
-                (reasons::class(reason), format!("{} {}", Refusal::label(reason), length(*secs)))
+                (reasons::class(reason), format!("{} {}", Rejection::label(reason), length(*secs)))
             }));
         let state = match ledger.failed.first() {
             Some(failed) if failed.stage == WAITING => node("span").text("not processed"),
@@ -183,8 +183,8 @@ pub fn table(videos: &[VideoSummary], splits: &VideoSplits) -> Vec<Node> {
         node("tr")
             .child(node("th").attr("scope", "row").class("name").child(link))
             .child(node("td").class("num").text(length(ledger.duration_secs)))
-            .child(node("td").class("num").text(length(ledger.kept_secs())))
-            .child(node("td").class("num").text(percent(ledger.kept_secs(), ledger.duration_secs)))
+            .child(node("td").class("num").text(length(ledger.accepted_secs())))
+            .child(node("td").class("num").text(percent(ledger.accepted_secs(), ledger.duration_secs)))
             .child(node("td").text(splits.get(&video.unit.to_string()).map_or("", String::as_str)))
             .child(node("td").child(state))
     };

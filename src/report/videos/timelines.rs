@@ -6,8 +6,8 @@ use super::video::VideoSummary;
 use crate::html;
 use crate::html::chart::timeline::{TimelineSpan, timeline};
 use crate::html::{Node, node};
-use orator_base::stage::ledger::Kept;
-use orator_base::stage::refusal::Refusal;
+use orator_base::stage::ledger::AcceptedInterval;
+use orator_base::stage::rejection::Rejection;
 use orator_base::text::counted;
 use orator_base::text::{clock, length, number};
 use std::collections::BTreeSet;
@@ -43,9 +43,9 @@ pub fn lines(videos: &[VideoSummary]) -> Vec<Node> {
         };
         let about = format!(
             "{} of {} accepted in {}{rest}",
-            length(ledger.kept_secs()),
+            length(ledger.accepted_secs()),
             length(ledger.duration_secs),
-            counted(ledger.kept.len(), "interval")
+            counted(ledger.accepted.len(), "interval")
         );
         let share = (ledger.duration_secs / longest).max(MIN_WIDTH);
         let title = node("h3").child(node("span").text(&video.file)).child(node("small").text(about));
@@ -78,22 +78,23 @@ fn spans(video: &VideoSummary) -> Vec<TimelineSpan> {
         .trim_end()
         .to_owned(),
     };
-    let rests = |kept: &Kept| {
-        let inside = |rest: &&Kept| kept.start_secs <= rest.start_secs && rest.end_secs <= kept.end_secs;
-        let span = |rest: &Kept| format!("hands at rest {} to {}", clock(rest.start_secs), clock(rest.end_secs));
+    let rests = |accepted: &AcceptedInterval| {
+        let inside =
+            |rest: &&AcceptedInterval| accepted.start_secs <= rest.start_secs && rest.end_secs <= accepted.end_secs;
+        let span =
+            |rest: &AcceptedInterval| format!("hands at rest {} to {}", clock(rest.start_secs), clock(rest.end_secs));
         ledger.resting.iter().filter(inside).map(span).collect::<Vec<_>>().join("\n")
     };
-    let kept = ledger
-        .kept
-        .iter()
-        .map(|kept| timeline_span(kept.start_secs, kept.end_secs, "accepted".to_owned(), "accepted", rests(kept)));
-    let refused = ledger.refused.iter().map(|refused| {
+    let accepted = ledger.accepted.iter().map(|accepted| {
+        timeline_span(accepted.start_secs, accepted.end_secs, "accepted".to_owned(), "accepted", rests(accepted))
+    });
+    let rejected = ledger.rejected.iter().map(|rejected| {
         timeline_span(
-            refused.start_secs,
-            refused.end_secs,
-            reasons::class(&refused.reason),
-            Refusal::label(&refused.reason),
-            reasons::description(refused),
+            rejected.start_secs,
+            rejected.end_secs,
+            reasons::class(&rejected.reason),
+            Rejection::label(&rejected.reason),
+            reasons::description(rejected),
         )
     });
     let failed = ledger.failed.iter().map(|failed| {
@@ -101,7 +102,7 @@ fn spans(video: &VideoSummary) -> Vec<TimelineSpan> {
         let description = video.notes.first().cloned().unwrap_or_default();
         timeline_span(failed.start_secs, failed.end_secs, class.to_owned(), word, description)
     });
-    let mut all: Vec<TimelineSpan> = kept.chain(refused).chain(failed).collect();
+    let mut all: Vec<TimelineSpan> = accepted.chain(rejected).chain(failed).collect();
     all.sort_by(|a, b| a.start_secs.total_cmp(&b.start_secs));
     all
 }
@@ -110,12 +111,12 @@ fn spans(video: &VideoSummary) -> Vec<TimelineSpan> {
 fn legend(videos: &[VideoSummary]) -> Node {
     let ledgers = || videos.iter().map(|video| &video.ledger);
     let found: BTreeSet<(usize, &str)> = ledgers()
-        .flat_map(|ledger| &ledger.refused)
-        .map(|refused| (reasons::order(&refused.reason), refused.reason.as_str()))
+        .flat_map(|ledger| &ledger.rejected)
+        .map(|rejected| (reasons::order(&rejected.reason), rejected.reason.as_str()))
         .collect();
     let stages: BTreeSet<&str> = ledgers().flat_map(|ledger| &ledger.failed).map(|f| f.stage.as_str()).collect();
     let mut entries = vec![("accepted".to_owned(), "accepted")];
-    entries.extend(found.iter().map(|(_, reason)| (reasons::class(reason), Refusal::label(reason))));
+    entries.extend(found.iter().map(|(_, reason)| (reasons::class(reason), Rejection::label(reason))));
     if stages.iter().any(|stage| *stage != WAITING) {
         entries.push(("failed".to_owned(), "failed"));
     }

@@ -1,9 +1,9 @@
-//! Choice of the frames that best illustrate a rule: in each refused span the frame furthest from the threshold, and
+//! Choice of the frames that best illustrate a rule: in each rejected span the frame furthest from the threshold, and
 //! for each rule the worst spans. Ties follow the order of the videos, so the choice is deterministic.
 
 use super::reasons;
-use orator_base::stage::ledger::{Ledger, Refused};
-use orator_base::stage::refusal::Refusal;
+use orator_base::stage::ledger::{Ledger, RejectedInterval};
+use orator_base::stage::rejection::Rejection;
 use orator_base::text::number;
 use orator_dataset::config::SegmentConfig;
 use orator_formats::media_json::MediaInfo;
@@ -42,7 +42,7 @@ impl Worst {
         Self { rules: BTreeMap::new(), max_moments }
     }
 
-    /// Adds the refused spans of a video; `bone_change` is empty if the video is not lifted.
+    /// Adds the rejected spans of a video; `bone_change` is empty if the video is not lifted.
     pub fn add(
         &mut self,
         video: usize,
@@ -51,7 +51,7 @@ impl Worst {
         judged: &MediaInfo,
         rules: &SegmentConfig,
     ) {
-        for span in &ledger.refused {
+        for span in &ledger.rejected {
             let Some(moment) = moment(video, span, (measures, bone_change), judged, rules) else { continue };
             let rule = (reasons::order(&span.reason), span.reason.clone(), span.unit.clone());
             let moments = self.rules.entry(rule).or_default();
@@ -74,7 +74,7 @@ impl Worst {
 
 fn moment(
     video: usize,
-    span: &Refused,
+    span: &RejectedInterval,
     (measures, bone_change): (&Measures, &[f32]),
     judged: &MediaInfo,
     rules: &SegmentConfig,
@@ -84,27 +84,27 @@ fn moment(
     let start = frame(span.start_secs).min(n_frames.checked_sub(1)?);
     let end = frame(span.end_secs).clamp(start + 1, n_frames);
     let mean = (span.measured - span.threshold).abs();
-    let refusal = Refusal::find(&span.reason, &span.unit);
-    let (t, beyond, frame_value) = match refusal {
-        Some(refusal @ (Refusal::Cut | Refusal::Identity)) => {
-            let score = if refusal == Refusal::Cut { &measures.shot_score } else { &measures.identity };
+    let rejection = Rejection::find(&span.reason, &span.unit);
+    let (t, beyond, frame_value) = match rejection {
+        Some(rejection @ (Rejection::Cut | Rejection::Identity)) => {
+            let score = if rejection == Rejection::Cut { &measures.shot_score } else { &measures.identity };
             let ends = [start, end.min(n_frames - 1)].into_iter().filter(|t| *t > 0);
             let t = ends.max_by(|a, b| score[*a].total_cmp(&score[*b]).then(b.cmp(a)))?;
-            (t, mean, value_text(refusal, f64::from(score[t])))
+            (t, mean, value_text(rejection, f64::from(score[t])))
         }
-        Some(Refusal::Bones) if bone_change.len() == n_frames => {
+        Some(Rejection::Bones) if bone_change.len() == n_frames => {
             let (t, value) = extreme(bone_change, start..end, false);
             (t, (value - span.threshold).abs(), format!("deviation {} in this frame", number(value)))
         }
-        Some(refusal) => match farthest(refusal, measures, rules, start..end) {
+        Some(rejection) => match farthest(rejection, measures, rules, start..end) {
             Some((t, value, bound, is_mean)) => {
-                (t, if is_mean { (value - bound.threshold()).abs() } else { mean }, value_text(refusal, value))
+                (t, if is_mean { (value - bound.threshold()).abs() } else { mean }, value_text(rejection, value))
             }
             None => (start.midpoint(end - 1), mean, String::new()),
         },
         None => (start.midpoint(end - 1), mean, String::new()),
     };
-    let compares = matches!(refusal, Some(Refusal::Cut | Refusal::Identity | Refusal::Jump)) && t > 0;
+    let compares = matches!(rejection, Some(Rejection::Cut | Rejection::Identity | Rejection::Jump)) && t > 0;
     let frames = if compares { vec![t - 1, t] } else { vec![t] };
     let beyond = if beyond.is_finite() { beyond } else { 0.0 };
     Some(Moment {
@@ -117,19 +117,19 @@ fn moment(
     })
 }
 
-/// Frame that violates the rules of the refusal most: index, value, bound, and whether the ledger measures that value
+/// Frame that violates the rules of the rejection most: index, value, bound, and whether the ledger measures that value
 /// rather than a duration or share.
 fn farthest(
-    refusal: Refusal,
+    rejection: Rejection,
     measures: &Measures,
     rules: &SegmentConfig,
     frames: std::ops::Range<usize>,
 ) -> Option<(usize, f64, Bound, bool)> {
-    let on_frames = frame_rules(rules).into_iter().filter(|rule| rule.refusal == refusal);
+    let on_frames = frame_rules(rules).into_iter().filter(|rule| rule.rejection == rejection);
     let on_frames = on_frames.map(|rule| (rule.values, rule.bound, !rule.measures_secs));
     // If the rule requires a minimum share, frames that do not count are bad; for a maximum share, those that count
     // are.
-    let on_pieces = segment_rules(rules).into_iter().filter(|rule| rule.refusal == refusal).map(|rule| {
+    let on_pieces = segment_rules(rules).into_iter().filter(|rule| rule.rejection == rejection).map(|rule| {
         let bad = match rule.share {
             Bound::AtLeast(_) => rule.counted,
             Bound::AtMost(_) => Bound::AtMost(rule.counted.threshold()),
@@ -157,22 +157,22 @@ fn extreme(values: &[f32], frames: std::ops::Range<usize>, lowest: bool) -> (usi
 }
 
 /// Text with the value in a frame.
-fn value_text(refusal: Refusal, value: f64) -> String {
+fn value_text(rejection: Rejection, value: f64) -> String {
     let value = number(value);
-    match refusal {
-        Refusal::Quiet => format!("{value} dB in this frame"),
-        Refusal::NoSpeech => format!("share of speech {value} in this frame"),
-        Refusal::OffScreenSpeaker => format!("correlation {value} around this frame"),
-        Refusal::Static => format!("picture change {value} in this frame"),
-        Refusal::Small => format!("{value} px in this frame"),
-        Refusal::Turned => format!("{value} neck-nose distances in this frame"),
-        Refusal::NoseOff => format!("{value} half shoulder widths in this frame"),
-        Refusal::Jump => format!("{value} shoulder widths between the two pictures"),
-        Refusal::HandGap | Refusal::HandShare => format!("hand score {value} in this frame"),
-        Refusal::Crowd => format!("{value} persons in this frame"),
-        Refusal::Cut => format!("shot score {value} in the second picture"),
-        Refusal::Identity => "before and after".to_owned(),
-        Refusal::NoPerson | Refusal::Face | Refusal::Arms => format!("score {value} in this frame"),
+    match rejection {
+        Rejection::Quiet => format!("{value} dB in this frame"),
+        Rejection::NoSpeech => format!("share of speech {value} in this frame"),
+        Rejection::OffScreenSpeaker => format!("correlation {value} around this frame"),
+        Rejection::Static => format!("picture change {value} in this frame"),
+        Rejection::Small => format!("{value} px in this frame"),
+        Rejection::Turned => format!("{value} neck-nose distances in this frame"),
+        Rejection::NoseOff => format!("{value} half shoulder widths in this frame"),
+        Rejection::Jump => format!("{value} shoulder widths between the two pictures"),
+        Rejection::HandGap | Rejection::HandShare => format!("hand score {value} in this frame"),
+        Rejection::Crowd => format!("{value} persons in this frame"),
+        Rejection::Cut => format!("shot score {value} in the second picture"),
+        Rejection::Identity => "before and after".to_owned(),
+        Rejection::NoPerson | Rejection::Face | Rejection::Arms => format!("score {value} in this frame"),
         _ => String::new(),
     }
 }
@@ -180,7 +180,7 @@ fn value_text(refusal: Refusal, value: f64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use orator_base::stage::refusal::FrameRefusal;
+    use orator_base::stage::rejection::FrameRejection;
     use orator_base::types::time::FrameRate;
 
     #[test]
@@ -191,16 +191,16 @@ mod tests {
         (measures.jump[20], measures.jump[50]) = (0.8, 1.8);
         measures.right_hand[70..90].fill(0.2);
         measures.right_hand[74] = 0.1;
-        let span = |start: f64, end: f64, refusal: Refusal, measured: f64| {
-            Refused::new(start, end, FrameRefusal::new(refusal, measured, 0.5))
+        let span = |start: f64, end: f64, rejection: Rejection, measured: f64| {
+            RejectedInterval::new(start, end, FrameRejection::new(rejection, measured, 0.5))
         };
-        let refused = vec![
-            span(2.0, 2.1, Refusal::Jump, 0.8),
-            span(5.0, 5.1, Refusal::Jump, 1.8),
-            span(7.0, 9.0, Refusal::HandGap, 2.0),
-            span(9.0, 9.5, Refusal::TooShort, 0.5),
+        let rejected = vec![
+            span(2.0, 2.1, Rejection::Jump, 0.8),
+            span(5.0, 5.1, Rejection::Jump, 1.8),
+            span(7.0, 9.0, Rejection::HandGap, 2.0),
+            span(9.0, 9.5, Rejection::TooShort, 0.5),
         ];
-        let ledger = Ledger { duration_secs: 10.0, refused, ..Ledger::default() };
+        let ledger = Ledger { duration_secs: 10.0, rejected, ..Ledger::default() };
         let judged = MediaInfo::new(10.0, 100, FrameRate::new(10, 1));
         let mut worst = Worst::new(1);
         worst.add(0, &ledger, (&measures, &[]), &judged, &SegmentConfig::default());

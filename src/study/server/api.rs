@@ -201,7 +201,7 @@ pub async fn answer(
         RecordOutcome::Unknown => Err(unknown()),
         RecordOutcome::Replaced => Err(gone()),
         RecordOutcome::Differs => Err(ApiError::conflict("A different answer to this trial is already stored.")),
-        RecordOutcome::OutOfTurn => Err(out_of_turn()),
+        RecordOutcome::OutOfOrder => Err(out_of_turn()),
         RecordOutcome::TooEarly(left_ms) => {
             let sentence = "The films cannot have been played to the end yet.";
             Err(ApiError::new(StatusCode::TOO_EARLY, sentence).retry_after(left_ms / 1000 + 1))

@@ -162,12 +162,13 @@ fn constant(of: usize, source: &SpeakerSource, n_frames: usize) -> Result<ShownM
     let dataset: &Dataset = source.dataset.as_ref().context("no mean pose: expected a speaker with a dataset")?;
     let stats = dataset.stats();
     let mean = stats.mean();
-    let pose = |joint: usize, k: usize| if stats.n_seen[joint] > 0 { mean[[joint, k]] } else { f32::NAN };
+    let pose = |joint: usize, k: usize| if stats.n_visible[joint] > 0 { mean[[joint, k]] } else { f32::NAN };
     let (n_joints, of_axes) = mean.dim();
     let joints = Array3::from_shape_fn((n_frames, n_joints, of_axes), |(_, joint, k)| pose(joint, k));
     let angles = |channel: PostureChannel| {
         let stats = stats.posture.as_ref().and_then(|posture| posture.get(&channel));
-        let angle = |k: usize| stats.filter(|stats| stats.n_seen[k] > 0).map_or(f32::NAN, |stats| stats.mean[k] as f32);
+        let angle =
+            |k: usize| stats.filter(|stats| stats.n_visible[k] > 0).map_or(f32::NAN, |stats| stats.mean[k] as f32);
         Array2::from_shape_fn((n_frames, 3), |(_, k)| angle(k))
     };
     let posture = stats.posture.as_ref().map(|_| {

@@ -48,7 +48,7 @@ pub enum RecordOutcome {
     /// A different answer is stored at this position.
     Differs,
     /// The trial has not been presented yet.
-    OutOfTurn,
+    OutOfOrder,
     /// The films cannot have been watched yet; remaining milliseconds.
     TooEarly(i64),
 }
@@ -74,7 +74,7 @@ pub fn record(
         return Ok(RecordOutcome::Replaced);
     }
     if answer.position > participant.position || participant.status == Status::Completed {
-        return Ok(RecordOutcome::OutOfTurn);
+        return Ok(RecordOutcome::OutOfOrder);
     }
     let left_ms = terms.min_ms - (now_ms - participant.given_ms);
     if left_ms > 0 {

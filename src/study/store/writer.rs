@@ -57,7 +57,7 @@ impl ResponseStore {
     }
 
     /// Runs `work` in a transaction and returns its value after the commit. An error of `work` rolls back the entire
-    /// batch, so `work` must report refusals in its value and fail only when the database fails.
+    /// batch, so `work` must report rejections in its value and fail only when the database fails.
     ///
     /// # Errors
     /// The work was not committed, or not within the timeout.

@@ -44,7 +44,7 @@ fn a_written_dataset_is_read_back() {
         assert!(same_motion(&read.motion, &sample.motion));
     }
     assert_eq!((dataset.stats().mean().shape(), dataset.stats().std()[[0, 0]]), (&[49, 3][..], 0.0));
-    assert!(dataset.stats().n_seen[30] < 134);
+    assert!(dataset.stats().n_visible[30] < 134);
 }
 
 fn folder_bytes(dir: &Path) -> Vec<(String, Vec<u8>)> {

@@ -131,7 +131,7 @@ fn bvh_files_with_audio_become_a_dataset() {
     assert!(message("broken").contains("broken.bvh"), "{}", message("broken"));
     assert!(message("apart").contains("1.333 s apart"), "{}", message("apart"));
     for ledger in read_ledgers(&out).unwrap().iter().filter(|ledger| ledger.failure.is_none()) {
-        assert!(ledger.ledger.is_whole(), "{ledger:?}");
+        assert!(ledger.ledger.is_complete(), "{ledger:?}");
     }
 
     let samples = samples(&out);

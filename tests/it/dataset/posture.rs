@@ -51,7 +51,7 @@ fn angles_are_stored_exactly_and_removed_with_their_video() {
     let stats = dataset.stats().posture.clone().unwrap();
     let [head, trunk] = [PostureChannel::Head, PostureChannel::Trunk].map(|channel| &stats[&channel]);
     // Every ninth frame of 99 and 64 hides the head; validation does not count.
-    assert_eq!((head.n_seen, trunk.n_seen), ([163 - 11 - 8; 3], [163; 3]));
+    assert_eq!((head.n_visible, trunk.n_visible), ([163 - 11 - 8; 3], [163; 3]));
     assert!((0.3..0.35).contains(&trunk.mean[1]) || (0.25..0.3).contains(&trunk.mean[1]), "{:?}", trunk.mean);
     let card = fs::read_to_string(target.join("README.md")).unwrap();
     assert!(card.contains("the head in 88.3 %, the trunk in 100.0 % of the frames"), "{card}");
@@ -79,7 +79,7 @@ fn angles_are_stored_exactly_and_removed_with_their_video() {
     without(&target, &BTreeSet::from(["a-00000000".to_owned()])).unwrap();
     assert_eq!(verify(&target, true, &Silent).unwrap().problems, []);
     let remaining = Dataset::open(&target).unwrap();
-    assert_eq!(remaining.stats().posture.as_ref().unwrap()[&PostureChannel::Trunk].n_seen, [64; 3]);
+    assert_eq!(remaining.stats().posture.as_ref().unwrap()[&PostureChannel::Trunk].n_visible, [64; 3]);
     assert!(angles(&remaining) == written[1..], "other angles changed");
     assert!(files_under(&target).iter().all(|(name, _)| !name.contains("a-00000000")));
 }
@@ -156,6 +156,6 @@ fn a_run_writes_angles_if_enabled() {
     let dataset = Dataset::open(&with_angles).unwrap();
     assert!(angles(&dataset).iter().all(|(_, angles)| angles.is_some()));
     let stats = dataset.stats().posture.clone().unwrap();
-    assert!(stats[&PostureChannel::Trunk].n_seen[0] > 0, "{stats:?}");
+    assert!(stats[&PostureChannel::Trunk].n_visible[0] > 0, "{stats:?}");
     assert!(shards(&with_angles) != shards(&without_angles));
 }

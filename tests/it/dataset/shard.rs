@@ -87,8 +87,8 @@ fn samples_contain_the_frames_and_audio_of_their_interval() {
     assert_eq!((footage.n_videos, footage.n_intervals, footage.secs), (2, 4, 340.0 / 15.0));
     // Each wav lacks its last sample, and frames are rounded to samples.
     assert!(footage.padded_sound_secs > 0.0 && footage.padded_sound_secs < 5.0 / 16_000.0);
-    assert_eq!(dataset.stats().n_seen[5], dataset.info().splits["train"].frames as u64);
-    assert_eq!((footage.kept_secs, footage.failed_secs), (340.0 / 15.0, 0.0));
+    assert_eq!(dataset.stats().n_visible[5], dataset.info().splits["train"].frames as u64);
+    assert_eq!((footage.accepted_secs, footage.failed_secs), (340.0 / 15.0, 0.0));
     assert!(report.unwrap().facts.contains_key("windows"));
 }
 
@@ -197,7 +197,7 @@ fn missing_and_duplicate_videos_are_reported() {
     let of = |name: &str| ledgers.iter().find(|ledger| ledger.file == format!("{name}.mp4")).unwrap();
     assert_eq!(of("never").failure.as_deref(), Some("run: not every stage is done"));
     let duplicate = if of("twin").split.is_none() { of("twin") } else { of("good") };
-    assert_eq!(duplicate.ledger.refused_secs()["duplicate"], 10.0);
+    assert_eq!(duplicate.ledger.rejected_secs()["duplicate"], 10.0);
     assert_valid(&out);
 
     let short = video(dir.path(), "short", 100, 5);

@@ -17,7 +17,7 @@ const PLAN: SplitPlan =
     SplitPlan { unit: SplitUnit::Video, validation: 0.15, test: 0.1, guard_secs: 8.0, min_block_secs: 9.0 };
 
 fn unassigned(name: &str, secs: f64) -> Unassigned<'_> {
-    Unassigned { name, content: name, duration_secs: secs, kept: vec![(0.0, secs)], named: None, recorded: None }
+    Unassigned { name, content: name, duration_secs: secs, accepted: vec![(0.0, secs)], named: None, recorded: None }
 }
 
 #[test]

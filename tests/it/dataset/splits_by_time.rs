@@ -61,8 +61,8 @@ fn one_long_video_gives_all_three_splits_without_a_leak() {
     // The video is counted in each split, its seconds once.
     assert_eq!(Split::ALL.map(|split| dataset.info().splits[split.name()].videos.len()), [1; 3]);
     let footage = &dataset.stats().footage;
-    assert!((footage.kept_secs - total).abs() < 1e-6 && footage.refused_secs["between splits"] > 10.0);
-    assert_eq!(dataset.stats().n_seen[5], dataset.info().splits["train"].frames as u64);
+    assert!((footage.accepted_secs - total).abs() < 1e-6 && footage.rejected_secs["between splits"] > 10.0);
+    assert_eq!(dataset.stats().n_visible[5], dataset.info().splits["train"].frames as u64);
 
     // Frames that influence a window of a split influence no frame of another.
     let margin = (context_secs(&LiftConfig::default()) * FPS.per_sec()).ceil() as usize;
@@ -196,7 +196,7 @@ fn audio_shared_by_two_videos_is_never_in_two_splits() {
         serde_json::from_str(&fs::read_to_string(out.join("leakage.json")).unwrap()).unwrap();
     assert_eq!((leakage["shared"].as_array().unwrap().len(), leakage["leaks"].as_array().unwrap().len()), (1, 0));
     let dataset = Dataset::open(&out).unwrap();
-    assert!(dataset.stats().footage.refused_secs["duplicate"] > 5.0);
+    assert!(dataset.stats().footage.rejected_secs["duplicate"] > 5.0);
     assert!(dataset.info().videos.iter().all(|video| video.samples > 0));
     // A split named in the configuration applies to the complete video.
     let named = tempfile::tempdir().unwrap();

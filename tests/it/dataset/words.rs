@@ -80,11 +80,11 @@ fn every_word_is_in_one_sample_or_counted() {
     let names: BTreeSet<&str> = all.iter().map(|word| word.word.as_str()).collect();
     assert_eq!((all.len(), names.len()), (38, 38));
     assert!(all.iter().all(|word| word.start_secs >= 0.0 && word.end_secs <= 10.0 + 1e-6));
-    let expected = WordCount { n_words: 20, n_kept: 20, n_refused: 0, n_outside: 0 };
+    let expected = WordCount { n_words: 20, n_accepted: 20, n_rejected: 0, n_outside: 0 };
     assert_eq!(transcript_report(&out, "first").count, expected);
     let info = Dataset::open(&out).unwrap();
     assert!(info.info().members.contains_key("words.json"));
-    assert_eq!(info.stats().footage.words.unwrap().n_kept, 38);
+    assert_eq!(info.stats().footage.words.unwrap().n_accepted, 38);
     drop(info);
 
     // Importing only the shards gives the same words.
@@ -146,8 +146,8 @@ fn transcript_errors_are_reported_and_exclude_no_video() {
             talks.dataset([Some(("good.srt", good.as_bytes())), Some((name, &bytes))], &format!("out-{name}"));
         assert!(line.contains(expected), "{name}: {line}");
         let of_second = transcript_report(&out, "second");
-        assert_eq!((of_second.file.as_deref(), of_second.count.is_whole()), (Some(name), true));
-        assert_eq!(transcript_report(&out, "first").count.n_kept, 20);
+        assert_eq!((of_second.file.as_deref(), of_second.count.is_complete()), (Some(name), true));
+        assert_eq!(transcript_report(&out, "first").count.n_accepted, 20);
         assert!(words(&out).values().all(Option::is_some), "{name}: samples have word lists");
         assert!(!of_second.notes.iter().any(|note| note.contains(talks.dir.path().to_str().unwrap())));
     }

@@ -251,7 +251,7 @@ fn a_dataset_at_another_rate_than_the_speaker_is_rejected() {
     write_dataset(&project.dir().join("fast"), "host", fps, &[again(Split::Train), again(Split::Validation)]).unwrap();
     assert_eq!(Dataset::open(project.dir().join("fast")).unwrap().info().fps, fps);
     let answer = project.answer(&["evaluate", "--dataset", "fast", "--checkpoint", "words"]);
-    assert!(answer.code == 1 && answer.errors.contains("moves at 30"), "{}", answer.errors);
+    assert!(answer.code == 1 && answer.errors.contains("fast has 30 fps, the checkpoint 15 fps"), "{}", answer.errors);
 }
 
 #[test]

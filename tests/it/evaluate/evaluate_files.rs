@@ -215,7 +215,7 @@ fn invalid_input_gives_clear_errors() {
         (&["t.npy", "away.npy", "--audio", "none.mp3"], "none.mp3"),
         (&["t.npy", "away.npy", "--audio", "t.npy"], "t.npy"),
         (&["t.npy", "away.npy", "--audio", "short.wav"], "is it the audio of another clip?"),
-        (&["t.npy", "away.npy", "--alpha", "0"], "alpha of PCK"),
+        (&["t.npy", "away.npy", "--alpha", "0"], "invalid alpha 0 of PCK"),
         (&["t.npy", "away.npy", "--input-fps", "0"], "expected 1 to 1000 fps"),
     ];
     for (args, expected) in cases {

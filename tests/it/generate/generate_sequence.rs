@@ -155,7 +155,7 @@ fn dubious_transcripts_are_reported() {
     }
     let text = String::from_utf8_lossy(&generate(dir, &args("good.tsv")).stderr).into_owned();
     let text = String::from_utf8_lossy(&generate(dir, &args("good.tsv")).stdout).into_owned() + &text;
-    assert!(text.contains("2 of 3 words of the transcript were trained with"), "{text}");
+    assert!(text.contains("2 of 3 words of the transcript are in the vocabulary of the model"), "{text}");
     let answer = run(dir, &args("good.tsv").replace("words.saf", "adversarial.saf"));
     assert!(answer["note"].as_str().unwrap().contains("does not use words: good.tsv was ignored"), "{answer}");
 

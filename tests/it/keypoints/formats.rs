@@ -95,7 +95,7 @@ fn every_format_is_read_as_it_was_written() {
         let converted = converted(found);
         compare(name, &converted.keypoints, &sample, content);
         assert_eq!(
-            (converted.notes.len(), converted.extras.n_people[3], converted.keypoints.image_size),
+            (converted.notes.len(), converted.extras.n_persons[3], converted.keypoints.image_size),
             (0, 1, SIZE),
             "{name}"
         );
@@ -195,5 +195,5 @@ fn the_largest_of_several_persons_is_tracked_and_the_others_counted() {
         ["up to 2 persons in a frame (several in 97 % of the frames); one of them is followed"]
     );
     assert!(converted.extras.identity.iter().all(|number| *number == 0));
-    assert_eq!((converted.extras.n_people[0], converted.extras.n_people[20]), (2, 1));
+    assert_eq!((converted.extras.n_persons[0], converted.extras.n_persons[20]), (2, 1));
 }

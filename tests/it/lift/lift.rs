@@ -5,7 +5,7 @@ use ndarray::{Array3, s};
 use ndarray_npy::{NpzWriter, read_npy};
 use orator_base::motion::upper_body::{L_SHOULDER, NOSE, Pose, R_HIP, R_SHOULDER, metres_per_unit};
 use orator_base::stage::artifacts::{self, StageName};
-use orator_base::stage::ledger::{Kept, Ledger};
+use orator_base::stage::ledger::{AcceptedInterval, Ledger};
 use orator_base::stage::progress::Silent;
 use orator_base::stage::{Stage, Unit};
 use orator_base::types::interval::{Interval, Intervals};
@@ -259,7 +259,7 @@ fn the_stage_writes_joints_bones_and_ledger() {
     let extras = Extras {
         time_secs: ndarray::Array1::linspace(0.0, 4.6, 70),
         person: ndarray::Array2::zeros((70, 5)),
-        n_people: ndarray::Array1::ones(70),
+        n_persons: ndarray::Array1::ones(70),
         identity: ndarray::Array1::zeros(70),
         other_hand: ndarray::Array2::from_elem((70, 2), false),
         face: None,
@@ -279,8 +279,8 @@ fn the_stage_writes_joints_bones_and_ledger() {
     keypoints_npz::write(&pose2d.join("keypoints.npz"), &keypoints, &extras).unwrap();
     let intervals = |n_frames| Intervals::new(keypoints.fps, n_frames, vec![Interval { start: 2, end: 68 }]);
     std::fs::write(segment.join("intervals.json"), serde_json::to_vec(&intervals(70)).unwrap()).unwrap();
-    let accepted = Kept { start_secs: 0.0, end_secs: 4.4 };
-    let ledger = Ledger { duration_secs: 4.4, kept: vec![accepted], ..Ledger::default() };
+    let accepted = AcceptedInterval { start_secs: 0.0, end_secs: 4.4 };
+    let ledger = Ledger { duration_secs: 4.4, accepted: vec![accepted], ..Ledger::default() };
     std::fs::write(segment.join("ledger.json"), serde_json::to_vec(&ledger).unwrap()).unwrap();
 
     let stage = LiftStage::new(&config::LiftConfig::default(), &config::SegmentConfig::default(), dir.path()).unwrap();

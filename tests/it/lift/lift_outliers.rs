@@ -33,7 +33,7 @@ fn lifted(footage: &Footage) -> (Vec<(usize, usize)>, Ledger, Motion) {
     let out = artifacts::dir(&work, StageName::Lift, &unit);
     let intervals: Intervals = serde_json::from_slice(&std::fs::read(out.join("intervals.json")).unwrap()).unwrap();
     let ledger = Ledger::read(&out.join("ledger.json")).unwrap();
-    assert_eq!(ledger.kept.len(), intervals.intervals.len());
+    assert_eq!(ledger.accepted.len(), intervals.intervals.len());
     let motion = joints_npz::read(&out.join("joints.npz")).unwrap();
     let is_accepted = |t: usize| intervals.intervals.iter().any(|i| (i.start..i.end).contains(&t));
     for (t, joints) in motion.joints.outer_iter().enumerate() {
@@ -52,7 +52,7 @@ fn stretch_arm(footage: &mut Footage, frames: std::ops::Range<usize>) {
 fn a_good_video_is_accepted_completely() {
     let (intervals, ledger, _) = lifted(&good(200));
     assert_eq!(intervals, [(0, 200)]);
-    assert!(ledger.refused.is_empty());
+    assert!(ledger.rejected.is_empty());
 }
 
 #[test]
@@ -60,7 +60,7 @@ fn implausible_bone_lengths_are_rejected_and_short_errors_filled() {
     let mut footage = good(300);
     stretch_arm(&mut footage, 100..130);
     let (intervals, ledger, _) = lifted(&footage);
-    let (bones, others): (Vec<_>, Vec<_>) = ledger.refused.iter().partition(|r| r.reason == "bones");
+    let (bones, others): (Vec<_>, Vec<_>) = ledger.rejected.iter().partition(|r| r.reason == "bones");
     assert!(others.is_empty() && bones.len() == 1 && intervals.len() == 2, "{ledger:?}");
     let bones = bones[0];
     assert!((bones.start_secs - FPS.secs(100)).abs() < 0.15 && (bones.end_secs - FPS.secs(130)).abs() < 0.15);
@@ -84,6 +84,6 @@ fn adjacent_gaps_longer_than_lifting_fills_are_rejected() {
     footage.keypoints.left_hand.slice_mut(s![112..124, ..12, 2]).fill(0.0);
     let (intervals, ledger, _) = lifted(&footage);
     assert_eq!(intervals, [(0, 100), (124, 300)], "{ledger:?}");
-    assert_eq!(ledger.refused[0].reason, "open");
-    assert!(ledger.refused[0].message.starts_with("21 of the joints"), "{}", ledger.refused[0].message);
+    assert_eq!(ledger.rejected[0].reason, "open");
+    assert!(ledger.rejected[0].message.starts_with("21 of the joints"), "{}", ledger.rejected[0].message);
 }

@@ -104,7 +104,7 @@ fn the_command_draws_separate_files_and_reports_missing_ones() {
     let extras = Extras {
         time_secs: Array1::zeros(30),
         person: Array2::zeros((30, 5)),
-        n_people: Array1::ones(30),
+        n_persons: Array1::ones(30),
         identity: Array1::zeros(30),
         other_hand: Array2::from_elem((30, 2), false),
         face: None,

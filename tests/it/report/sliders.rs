@@ -52,7 +52,7 @@ fn a_slider_predicts_the_accepted_seconds_of_a_run() {
     write(dir.path(), &unit, &footage(), "a");
     let (rules, lift) = (SegmentConfig::default(), config::LiftConfig::default());
     let now = run(dir.path(), &unit, &rules, &lift);
-    assert!(now.refused_secs().contains_key("bones"), "{now:?}");
+    assert!(now.rejected_secs().contains_key("bones"), "{now:?}");
 
     let video = MediaInfo::read(&Artifact::MediaInfo.path(dir.path(), &unit)).unwrap();
     let measures = Measures::read(&Artifact::Measures.path(dir.path(), &unit)).unwrap();
@@ -66,14 +66,14 @@ fn a_slider_predicts_the_accepted_seconds_of_a_run() {
         max_bone_change,
         open: &open,
     };
-    assert!((judged(lift.max_bone_change).kept_secs(&rules) - now.kept_secs()).abs() < 1e-3);
+    assert!((judged(lift.max_bone_change).accepted_secs(&rules) - now.accepted_secs()).abs() < 1e-3);
 
     let mut n_changed = 0;
     let mut compare = |key: &str, value: f64, rules: &SegmentConfig, lift: &config::LiftConfig| {
-        let (slider, again) = (judged(lift.max_bone_change).kept_secs(rules), run(dir.path(), &unit, rules, lift));
-        let accepted = again.kept_secs();
+        let (slider, again) = (judged(lift.max_bone_change).accepted_secs(rules), run(dir.path(), &unit, rules, lift));
+        let accepted = again.accepted_secs();
         assert!((slider - accepted).abs() < 1e-3, "{key} = {value}: predicted {slider} s, accepted {accepted} s");
-        n_changed += usize::from((accepted - now.kept_secs()).abs() > 1e-3);
+        n_changed += usize::from((accepted - now.accepted_secs()).abs() > 1e-3);
     };
     for threshold in &THRESHOLDS {
         let (grid, _) = threshold.grid(&rules);

@@ -68,7 +68,7 @@ fn the_speaking_person_is_tracked_and_voices_are_distinguished() {
     let clips = ["large", "small"].map(|name| {
         let file = project.written("pose2d", name, "keypoints.npz");
         let extras = keypoints_npz::read_extras(&file).unwrap();
-        assert!(extras.n_people.iter().filter(|n| **n == 2).count() > 60, "{name}: {:?}", extras.n_people);
+        assert!(extras.n_persons.iter().filter(|n| **n == 2).count() > 60, "{name}: {:?}", extras.n_persons);
         assert!(extras.identity.iter().all(|identity| *identity == 0), "{name}: {:?}", extras.identity);
         let middle = extras.person.column(0).mean().unwrap() + extras.person.column(2).mean().unwrap() / 2.0;
         let clip = TalkingClip::read(&file, &project.written("extract", name, "audio.wav"), FPS.per_sec()).unwrap();

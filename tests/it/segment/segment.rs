@@ -4,7 +4,7 @@ use crate::fixtures::footage::{FPS, Footage, good, write};
 use ndarray::s;
 use orator_base::stage::ledger::Ledger;
 use orator_base::stage::progress::Silent;
-use orator_base::stage::refusal::Refusal;
+use orator_base::stage::rejection::Rejection;
 use orator_base::stage::{Stage, Unit};
 use orator_base::types::interval::{Interval, Intervals};
 use orator_base::types::pose2d::{Keypoints, coco};
@@ -41,12 +41,12 @@ fn judged(footage: &Footage) -> (Intervals, Ledger) {
 /// Accepted intervals, and the reasons of rejection in order of time.
 fn verdict(footage: &Footage) -> (Vec<(usize, usize)>, Vec<String>) {
     let (intervals, ledger) = judged(footage);
-    assert!(ledger.is_whole());
-    for rejected in &ledger.refused {
+    assert!(ledger.is_complete());
+    for rejected in &ledger.rejected {
         assert!(rejected.measured.is_finite() && rejected.message.len() > 20, "{rejected:?}");
     }
     let intervals = intervals.intervals.iter().map(|i| (i.start, i.end)).collect();
-    (intervals, ledger.refused.iter().map(|r| r.reason.clone()).collect())
+    (intervals, ledger.rejected.iter().map(|r| r.reason.clone()).collect())
 }
 
 fn is_fully_accepted(footage: &Footage) -> bool {
@@ -64,7 +64,7 @@ fn a_good_video_is_accepted_completely_and_its_windows_counted() {
     assert!(is_fully_accepted(&good(200)));
     let (intervals, ledger) = judged(&good(200));
     assert_eq!((intervals.windows_64.stride_5, intervals.windows_64.disjoint), (28, 3));
-    assert_eq!(ledger.kept_secs(), 200.0 / 15.0);
+    assert_eq!(ledger.accepted_secs(), 200.0 / 15.0);
     let (read, path) = (measures(&good(200)), tempfile::tempdir().unwrap().keep().join("measures.npz"));
     read.write(&path).unwrap();
     assert_eq!(Measures::read(&path).unwrap(), read);
@@ -130,9 +130,9 @@ fn judged_with(change: impl Fn(&mut Measures)) -> (Vec<(usize, usize)>, Vec<Stri
     let mut measures = measures(&good(200));
     change(&mut measures);
     let (intervals, ledger) = judged_measures(&measures, 200.0 / 15.0);
-    assert!(ledger.is_whole());
+    assert!(ledger.is_complete());
     let accepted = intervals.intervals.iter().map(|i| (i.start, i.end)).collect();
-    (accepted, ledger.refused.into_iter().map(|r| r.reason).collect())
+    (accepted, ledger.rejected.into_iter().map(|r| r.reason).collect())
 }
 
 #[test]
@@ -154,7 +154,7 @@ fn hands_that_rest_on_each_other_may_occlude_each_other() {
     let (intervals, ledger) = judged_measures(&measures, 200.0 / 15.0);
     assert_eq!(intervals.intervals, [Interval { start: 0, end: 200 }], "the remaining ten frames are a short gap");
     assert_eq!(intervals.resting, [Interval { start: 18, end: 170 }]);
-    assert!(ledger.is_whole() && (ledger.resting_secs() - 152.0 / 15.0).abs() < 1e-9);
+    assert!(ledger.is_complete() && (ledger.resting_secs() - 152.0 / 15.0).abs() < 1e-9);
     measures.rest[18..170].fill(0.15);
     let (intervals, ledger) = judged_measures(&measures, 200.0 / 15.0);
     assert!(intervals.intervals.is_empty() && intervals.resting.is_empty() && ledger.resting.is_empty());
@@ -186,8 +186,8 @@ fn a_body_turned_away_is_rejected() {
 fn another_person_ends_the_interval_and_a_crowd_is_rejected() {
     assert_eq!(judged_with(|m| m.identity[90] = 1.0), (vec![(0, 90), (90, 200)], vec![]));
     assert_eq!(judged_with(|m| m.identity[30] = 1.0), (vec![(30, 200)], vec!["other person".into()]));
-    assert_eq!(judged_with(|m| m.n_people[..60].fill(9.0)), (vec![(0, 200)], vec![]));
-    assert_eq!(judged_with(|m| m.n_people[..61].fill(9.0)), (vec![], vec!["crowd".into()]));
+    assert_eq!(judged_with(|m| m.n_persons[..60].fill(9.0)), (vec![(0, 200)], vec![]));
+    assert_eq!(judged_with(|m| m.n_persons[..61].fill(9.0)), (vec![], vec!["crowd".into()]));
 }
 
 #[test]
@@ -230,21 +230,21 @@ fn every_second_is_counted_exactly_once() {
             footage.sound.iter_mut().for_each(|sound| sound.truncate(n));
         }
         let (intervals, ledger) = judged(&footage);
-        assert!(ledger.is_whole());
-        let rejected: f64 = ledger.refused_secs().values().sum();
-        assert!((ledger.kept_secs() + rejected - footage.duration_secs).abs() < 1e-9);
-        assert_eq!(intervals.intervals.len(), ledger.kept.len());
-        for (&Interval { start, end }, accepted) in intervals.intervals.iter().zip(&ledger.kept) {
+        assert!(ledger.is_complete());
+        let rejected: f64 = ledger.rejected_secs().values().sum();
+        assert!((ledger.accepted_secs() + rejected - footage.duration_secs).abs() < 1e-9);
+        assert_eq!(intervals.intervals.len(), ledger.accepted.len());
+        for (&Interval { start, end }, accepted) in intervals.intervals.iter().zip(&ledger.accepted) {
             assert!(end - start >= rules.min_frames && end <= n_frames);
             assert!(footage.shot[start..end].iter().all(|&shot| shot == footage.shot[start]));
             assert_eq!(accepted.start_secs, FPS.secs(start));
             assert_eq!(accepted.end_secs, if end == n_frames { footage.duration_secs } else { FPS.secs(end) });
         }
         let text = serde_json::to_vec(&ledger).unwrap();
-        assert!(serde_json::from_slice::<Ledger>(&text).unwrap().is_whole());
+        assert!(serde_json::from_slice::<Ledger>(&text).unwrap().is_complete());
     }
-    let reasons = Refusal::JUDGED.map(|refusal| refusal.message(1.0, 2.0));
-    assert_eq!(reasons.iter().collect::<std::collections::BTreeSet<_>>().len(), Refusal::JUDGED.len());
+    let reasons = Rejection::JUDGED.map(|rejection| rejection.message(1.0, 2.0));
+    assert_eq!(reasons.iter().collect::<std::collections::BTreeSet<_>>().len(), Rejection::JUDGED.len());
 }
 
 #[test]
@@ -272,7 +272,7 @@ fn the_stage_reads_and_writes_its_files() {
     );
     assert!(report.line.ends_with("rejected: hand not visible 2.0 s"), "{}", report.line);
     let ledger = Ledger::read(&out.join("ledger.json")).unwrap();
-    assert_eq!((ledger.kept.len(), ledger.refused.len()), (2, 1));
+    assert_eq!((ledger.accepted.len(), ledger.rejected.len()), (2, 1));
     let (again, out_again) = run("again");
     again.unwrap();
     for name in ["intervals.json", "ledger.json", "measures.npz"] {

@@ -139,7 +139,7 @@ fn ledgers(sound: &[f32], settings: &Settings) -> [Ledger; 2] {
 }
 
 fn accepted_share(ledger: &Ledger) -> f64 {
-    ledger.kept_secs() / ledger.duration_secs
+    ledger.accepted_secs() / ledger.duration_secs
 }
 
 #[test]
@@ -151,7 +151,7 @@ fn music_noise_and_applause_are_rejected_and_speech_over_music_is_not() {
         let [by_model, loud] = ledgers(&sound, &settings);
         assert!(accepted_share(&loud) > 0.99, "{name} is loud enough");
         assert_eq!(accepted_share(&by_model), 0.0, "{name}");
-        let rejected = &by_model.refused[0];
+        let rejected = &by_model.rejected[0];
         assert_eq!(rejected.reason, "no speech");
         assert!(rejected.measured < 0.1 && rejected.threshold == 0.4, "{rejected:?}");
         assert!(
@@ -170,7 +170,7 @@ fn music_noise_and_applause_are_rejected_and_speech_over_music_is_not() {
     let mixed: Vec<f32> = speech.iter().zip(&music).map(|(speech, music)| speech + gain * music).collect();
     for sound in [&speech, &mixed] {
         let [by_model, loud] = ledgers(sound, &settings);
-        assert!((accepted_share(&by_model) - accepted_share(&loud)).abs() < 1e-9, "{:?}", by_model.refused);
+        assert!((accepted_share(&by_model) - accepted_share(&loud)).abs() < 1e-9, "{:?}", by_model.rejected);
     }
 }
 
@@ -217,23 +217,23 @@ fn pauses_are_accepted_and_longer_parts_without_speech_rejected() {
     };
     let with_pause = |pause: usize| judged(&|t| if (300..300 + pause).contains(&t) { 0.12 } else { 0.8 });
     let (intervals, ledger) = with_pause(45);
-    assert_eq!((intervals.intervals.len(), ledger.refused.len()), (1, 0), "a pause of 3 s");
+    assert_eq!((intervals.intervals.len(), ledger.rejected.len()), (1, 0), "a pause of 3 s");
     let (intervals, ledger) = with_pause(63);
-    assert_eq!((intervals.intervals.len(), ledger.refused.len()), (2, 1));
-    let rejected = &ledger.refused[0];
+    assert_eq!((intervals.intervals.len(), ledger.rejected.len()), (2, 1));
+    let rejected = &ledger.rejected[0];
     assert_eq!(rejected.message, "no speech: 12 % of the sound is speech, at least 40 % are needed");
     assert!((rejected.end_secs - rejected.start_secs - 4.2).abs() < 1e-9);
     let slider = THRESHOLDS.iter().find(|threshold| threshold.key == "min_speech").unwrap();
     let lower = slider.with(&config::SegmentConfig::default(), 0.1);
     let mut measures = Measures::from_keypoints(&good(600).keypoints);
     measures.speech = vec![0.12; 600];
-    let accepted = |rules| judge(&measures, &MediaInfo::new(40.0, 600, FPS), rules).1.kept_secs();
+    let accepted = |rules| judge(&measures, &MediaInfo::new(40.0, 600, FPS), rules).1.accepted_secs();
     assert_eq!(
         (accepted(&config::SegmentConfig::default()), accepted(&lower)),
         (0.0, 40.0),
         "the slider of the report"
     );
-    assert_eq!(judged(&|_| f32::NAN).1.refused.len(), 0, "without the model no frame is rejected for missing speech");
+    assert_eq!(judged(&|_| f32::NAN).1.rejected.len(), 0, "without the model no frame is rejected for missing speech");
 }
 
 #[test]

@@ -6,7 +6,7 @@ use anyhow::Result;
 use ndarray::{ArrayView2, Axis};
 use orator_base::math::order::Ordered;
 use orator_base::types::image::Image;
-use orator_base::types::pose2d::{Keypoints, N_HAND, SEEN_SCORE};
+use orator_base::types::pose2d::{Keypoints, N_HAND, VISIBLE_SCORE};
 use orator_media::opencv::draw;
 
 /// COCO-17 bones that are drawn, as pairs of keypoints.
@@ -29,7 +29,7 @@ pub fn draw_keypoints(
     width_px: f32,
 ) -> Result<()> {
     let at = |points: ArrayView2<f32>, point: usize| -> Option<[f32; 2]> {
-        let found = points[[point, 2]] > SEEN_SCORE;
+        let found = points[[point, 2]] > VISIBLE_SCORE;
         found.then(|| [0, 1].map(|axis| points[[point, axis]] * place.scale[axis] + place.shift[axis]))
     };
     let body = keypoints.body.index_axis(Axis(0), frame_idx);
@@ -64,7 +64,7 @@ pub fn extent(keypoints: &Keypoints) -> Option<[f32; 4]> {
     let mut extent: Option<[f32; 4]> = None;
     let arrays = [(&keypoints.body, N_UPPER), (&keypoints.left_hand, N_HAND), (&keypoints.right_hand, N_HAND)];
     for (points, point) in arrays.into_iter().flat_map(|(points, n)| (0..n).map(move |point| (points, point))) {
-        let found = points.outer_iter().filter(|frame| frame[[point, 2]] > SEEN_SCORE);
+        let found = points.outer_iter().filter(|frame| frame[[point, 2]] > VISIBLE_SCORE);
         let ends = |axis: usize| {
             let places = Ordered::new(found.clone().map(|frame| frame[[point, axis]]));
             Some([places.low_end(50)?, places.high_end(50)?])

@@ -5,7 +5,7 @@ use crate::render::PinholeCamera;
 use anyhow::{Context as _, ensure};
 use orator_base::math::order::median;
 use orator_base::math::vec3::{Vec3, add, cross, dot};
-use orator_base::types::pose2d::{Keypoints, SEEN_SCORE, coco};
+use orator_base::types::pose2d::{Keypoints, VISIBLE_SCORE, coco};
 use orator_base::types::pose3d::Motion;
 use orator_base::types::skeleton::{L_ELBOW, L_SHOULDER, L_WRIST, R_ELBOW, R_SHOULDER, R_WRIST};
 use orator_base::types::time::FrameRate;
@@ -63,7 +63,7 @@ impl SourceCamera {
                     let at = [0, 1, 2].map(|k| f64::from(motion.joints[[t, joint, k]]));
                     let px = [0, 1].map(|k| f64::from(keypoints.body[[t, point, k]]));
                     let ray = [0, 1].map(|k| (px[k] - (image_size[k] - 1.0) / 2.0) / focal_px);
-                    let is_known = keypoints.body[[t, point, 2]] >= SEEN_SCORE;
+                    let is_known = keypoints.body[[t, point, 2]] >= VISIBLE_SCORE;
                     (is_known && at.iter().chain(&ray).all(|v| v.is_finite())).then_some((at, ray))
                 };
                 PAIRS.into_iter().filter_map(correspondence).collect()

@@ -35,9 +35,9 @@ pub fn turn(posture: &Posture, rig: &Rig, filters: &SolveFilters, local: &mut [R
             Some(Rotation::IDENTITY.slerp(rotation([yaw, pitch, roll]), 0.5))
         })
         .collect();
-    let n_seen = halves.iter().flatten().count();
+    let n_visible = halves.iter().flatten().count();
     let halves = filled(halves, Rotation::IDENTITY, Some(RELAX_SECS * filters.fps));
     local[rig.neck].clone_from(&halves);
     local[rig.head] = halves;
-    n_seen
+    n_visible
 }

@@ -5,7 +5,7 @@
 
 use crate::math::order::Ordered;
 use crate::math::vec3;
-use crate::motion::upper_body::{L_HIP, L_SHOULDER, MIRROR, N_POINTS, NOSE, Pose, R_HIP, R_SHOULDER, SeenBody};
+use crate::motion::upper_body::{BodyPoints, L_HIP, L_SHOULDER, MIRROR, N_POINTS, NOSE, Pose, R_HIP, R_SHOULDER};
 use crate::types::skeleton::BODY_BONES;
 
 /// Number of frames before and after the middle one over which the proportions are measured.
@@ -35,21 +35,21 @@ impl BodyView {
     /// Builds the input for frame `t`: `window` frames (an odd number), `step` frames apart, interpolated if that is
     /// not an integer; the first and last frame are repeated beyond the ends. `None` if a shoulder is never visible in
     /// the window or all points coincide.
-    pub fn around(seen: &[SeenBody], t: usize, window: usize, step: f64) -> Option<Self> {
+    pub fn around(seen: &[BodyPoints], t: usize, window: usize, step: f64) -> Option<Self> {
         let last = seen.len().checked_sub(1)? as f64;
         let source_time = |d: isize| t as f64 + d as f64 * step;
         let half = window as isize / 2;
-        let frames: Vec<SeenBody> = (-half..=half).map(|d| at(seen, source_time(d).clamp(0.0, last))).collect();
+        let frames: Vec<BodyPoints> = (-half..=half).map(|d| at(seen, source_time(d).clamp(0.0, last))).collect();
         let inside = |d: &isize| (0.0..=last).contains(&source_time(*d));
         let half_range = AROUND.max(half);
-        let range: Vec<SeenBody> =
+        let range: Vec<BodyPoints> =
             (-half_range..=half_range).filter(inside).map(|d| at(seen, source_time(d))).collect();
         Self::from_frames(&frames, &longest(&range))
     }
 
     /// Builds the input from `frames` and the largest apparent bone lengths. A point that is not visible is copied,
     /// relative to the neck, from the nearest frame in which it is; one that is never visible is put on the neck.
-    fn from_frames(frames: &[SeenBody], longest: &[f32; N_KINDS]) -> Option<Self> {
+    fn from_frames(frames: &[BodyPoints], longest: &[f32; N_KINDS]) -> Option<Self> {
         let n = frames.len();
         let right = held(frames.iter().map(|f| f[R_SHOULDER]).collect())?;
         let left = held(frames.iter().map(|f| f[L_SHOULDER]).collect())?;
@@ -126,7 +126,7 @@ pub fn mirror_mean(output: &[f32], of_mirrored: &[f32]) -> Vec<f32> {
 
 /// Interpolates the points at `time` between two frames linearly; a point that is visible in only one of them is
 /// taken from the nearer frame.
-fn at(seen: &[SeenBody], time: f64) -> SeenBody {
+fn at(seen: &[BodyPoints], time: f64) -> BodyPoints {
     let (before, after) = (&seen[time.floor() as usize], &seen[time.ceil() as usize]);
     let share = time.fract() as f32;
     std::array::from_fn(|j| match (before[j], after[j]) {
@@ -153,10 +153,10 @@ fn held(mut track: Vec<Option<[f32; 2]>>) -> Option<Vec<[f32; 2]>> {
 
 /// Largest apparent length of each bone type in px. The largest tenth of each bone's lengths is ignored, so that a
 /// single outlier does not change the scale. 0: never visible.
-fn longest(frames: &[SeenBody]) -> [f32; N_KINDS] {
+fn longest(frames: &[BodyPoints]) -> [f32; N_KINDS] {
     let apart = |a: Option<[f32; 2]>, b: Option<[f32; 2]>| Some((a?[0] - b?[0]).hypot(a?[1] - b?[1]));
     let middle = |a: Option<[f32; 2]>, b: Option<[f32; 2]>| Some([(a?[0] + b?[0]) / 2.0, (a?[1] + b?[1]) / 2.0]);
-    let neck = |f: &SeenBody| middle(f[R_SHOULDER], f[L_SHOULDER]);
+    let neck = |f: &BodyPoints| middle(f[R_SHOULDER], f[L_SHOULDER]);
     let bones = BODY_BONES.map(|(a, b)| large(frames.iter().filter_map(|f| apart(f[a], f[b]))));
     let second = Ordered::new(bones).high_end(bones.len()).filter(|&second| second > 0.0);
     let [_, right_upper, left_upper, right_fore, left_fore] =
@@ -182,11 +182,11 @@ mod tests {
 
     const WINDOW: usize = 27;
 
-    fn middle_view(frames: &[SeenBody]) -> Option<BodyView> {
+    fn middle_view(frames: &[BodyPoints]) -> Option<BodyView> {
         BodyView::around(frames, frames.len() / 2, WINDOW, 1.0)
     }
 
-    fn frame(shift: f32) -> SeenBody {
+    fn frame(shift: f32) -> BodyPoints {
         let xs: [f32; N_POINTS] = [0.0, -50.0, -55.0, -40.0, 50.0, 55.0, 40.0, -30.0, 30.0];
         let ys: [f32; N_POINTS] = [-40.0, 0.0, 60.0, 110.0, 0.0, 60.0, 110.0, 120.0, 120.0];
         std::array::from_fn(|j| Some([xs[j] + 300.0 + shift, ys[j] + 200.0]))
@@ -194,8 +194,8 @@ mod tests {
 
     #[test]
     fn the_view_is_independent_of_position_and_size() {
-        let frames: Vec<SeenBody> = (0..WINDOW).map(|t| frame(t as f32)).collect();
-        let twice: Vec<SeenBody> =
+        let frames: Vec<BodyPoints> = (0..WINDOW).map(|t| frame(t as f32)).collect();
+        let twice: Vec<BodyPoints> =
             frames.iter().map(|f| f.map(|p| p.map(|[x, y]| [2.0 * x + 7.0, 2.0 * y - 9.0]))).collect();
         let (a, b) = (middle_view(&frames).unwrap(), middle_view(&twice).unwrap());
         assert_eq!((a.scale, b.scale), (100.0, 200.0));
@@ -207,8 +207,9 @@ mod tests {
 
     #[test]
     fn mirroring_swaps_the_sides() {
-        let frames: Vec<SeenBody> = (0..WINDOW).map(|t| frame(3.0 * t as f32)).collect();
-        let flipped: Vec<SeenBody> = frames.iter().map(|f| MIRROR.map(|j| f[j].map(|[x, y]| [900.0 - x, y]))).collect();
+        let frames: Vec<BodyPoints> = (0..WINDOW).map(|t| frame(3.0 * t as f32)).collect();
+        let flipped: Vec<BodyPoints> =
+            frames.iter().map(|f| MIRROR.map(|j| f[j].map(|[x, y]| [900.0 - x, y]))).collect();
         let (a, b) = (middle_view(&frames).unwrap(), middle_view(&flipped).unwrap());
         assert!(a.mirrored().numbers.iter().zip(&b.numbers).all(|(x, y)| (x - y).abs() < 1e-5));
         let output: Vec<f32> = (0..N_OUT).map(|i| (i * i) as f32).collect();
@@ -219,7 +220,7 @@ mod tests {
 
     #[test]
     fn hidden_points_move_with_the_neck() {
-        let mut frames: Vec<SeenBody> = (0..WINDOW).map(|t| frame(10.0 * t as f32)).collect();
+        let mut frames: Vec<BodyPoints> = (0..WINDOW).map(|t| frame(10.0 * t as f32)).collect();
         for f in &mut frames[5..] {
             f[R_WRIST] = None;
         }
@@ -237,14 +238,14 @@ mod tests {
 
     #[test]
     fn points_between_two_frames_are_interpolated() {
-        let frames: Vec<SeenBody> = vec![[Some([0.0, 4.0]); 9], [Some([2.0, 8.0]); 9], [None; 9]];
+        let frames: Vec<BodyPoints> = vec![[Some([0.0, 4.0]); 9], [Some([2.0, 8.0]); 9], [None; 9]];
         assert_eq!(at(&frames, 0.25)[0], Some([0.5, 5.0]));
         assert_eq!((at(&frames, 1.4)[0], at(&frames, 1.6)[0]), (Some([2.0, 8.0]), None));
     }
 
     #[test]
     fn a_displaced_point_does_not_change_the_scale() {
-        let mut frames: Vec<SeenBody> = (0..71).map(|_| frame(0.0)).collect();
+        let mut frames: Vec<BodyPoints> = (0..71).map(|_| frame(0.0)).collect();
         frames[40..65].iter_mut().for_each(|f| f[L_WRIST] = Some([800.0, 310.0]));
         let scale = middle_view(&frames).unwrap().scale;
         assert!((scale - 1.4 * 100.0).abs() < 1e-3, "{scale}");
@@ -252,7 +253,7 @@ mod tests {
 
     #[test]
     fn proportions_are_measured_over_a_longer_range() {
-        let mut frames: Vec<SeenBody> = (0..71).map(|_| frame(0.0)).collect();
+        let mut frames: Vec<BodyPoints> = (0..71).map(|_| frame(0.0)).collect();
         // The left forearm is stretched for a while, outside the window of the middle frame.
         frames[55..67].iter_mut().for_each(|f| f[L_WRIST] = Some([355.0, 380.0]));
         frames[20][L_WRIST] = Some([3550.0, 380.0]);

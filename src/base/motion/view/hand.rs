@@ -7,7 +7,7 @@ use crate::types::pose2d::N_HAND;
 use crate::types::skeleton::Side;
 
 /// Keypoints of a hand in px: wrist first, then thumb to little finger, each from base to tip; `None`: not visible.
-pub type SeenHand = [Option<[f32; 2]>; N_HAND];
+pub type HandPoints = [Option<[f32; 2]>; N_HAND];
 /// Joints of a hand in camera axes, with the wrist at the origin.
 pub type HandJoints = [Vec3; N_HAND];
 
@@ -39,7 +39,7 @@ pub struct HandView {
 impl HandView {
     /// Builds the input for a hand of the given side. A point that is not visible is put on the wrist. `None` if the
     /// wrist or all knuckles are not visible, or all points coincide.
-    pub fn new(seen: &SeenHand, side: Side) -> Option<Self> {
+    pub fn new(seen: &HandPoints, side: Side) -> Option<Self> {
         let mirrored = side == Side::Left;
         let wrist = seen[0]?;
         let flip = if mirrored { -1.0 } else { 1.0 };
@@ -112,7 +112,7 @@ mod tests {
         })
     }
 
-    fn observed(hand: &HandJoints, angle: f32) -> SeenHand {
+    fn observed(hand: &HandJoints, angle: f32) -> HandPoints {
         hand.map(|[x, y, _]| {
             let (x, y) = (x as f32, y as f32);
             Some([100.0 + angle.cos() * x - angle.sin() * y, 50.0 + angle.sin() * x + angle.cos() * y])

@@ -113,7 +113,7 @@ impl Drop for FolderLock {
     }
 }
 
-/// Returns whether locks work in the existing folder `folder`: a second file handle must be refused.
+/// Returns whether locks work in the existing folder `folder`: a second file handle must be rejected.
 ///
 /// # Errors
 /// The folder is not writable.
@@ -165,7 +165,7 @@ fn take(folder: &Path, path: &Path, is_exclusive: bool) -> Result<Option<File>> 
     }
 }
 
-/// Opens a lock file, created if missing: links are refused and the file is never truncated. Opened for reading only
+/// Opens a lock file, created if missing: links are rejected and the file is never truncated. Opened for reading only
 /// if it is not writable.
 ///
 /// # Errors

@@ -232,8 +232,8 @@ fn clip(
     let [ground_truth_joints, mut predicted_joints] =
         [ground_truth.joints, predicted.joints].map(|joints| joints.slice_move(s![..n_frames, .., ..]));
     let (mask, n_missing) = compared(&ground_truth_joints, &ground_truth.mask, &mut predicted_joints);
-    let n_seen = ground_truth.mask.iter().filter(|seen| **seen).count().max(1);
-    let share = n_missing as f64 / n_seen as f64;
+    let n_visible = ground_truth.mask.iter().filter(|seen| **seen).count().max(1);
+    let share = n_missing as f64 / n_visible as f64;
     ensure!(
         share <= MAX_MISSING,
         "the prediction {} is NaN for {:.1} % of the joints that are visible in the truth: at most {:.0} % may be \
@@ -244,7 +244,7 @@ fn clip(
     );
     if n_missing > 0 {
         notes.push(format!(
-            "{}: the prediction is NaN for {n_missing} of {n_seen} joints: their last positions are used",
+            "{}: the prediction is NaN for {n_missing} of {n_visible} joints: their last positions are used",
             pair.name
         ));
     }

@@ -66,10 +66,10 @@ pub fn of_joints(clips: &EvalClips, common: &[usize]) -> String {
     let fingers = (n_fingers > 0).then(|| counted(n_fingers, "finger joint"));
     let others = missing().filter(|joint| !is_finger(joint)).map(skeleton::name);
     let left_out: Vec<String> = fingers.into_iter().chain(others).collect();
-    let is_whole =
+    let is_complete =
         |seen: ndarray::ArrayView1<bool>| common.iter().filter(|joint| **joint != NECK).all(|joint| seen[*joint]);
     let n_whole: usize =
-        clips.clips.iter().map(|clip| clip.mask.outer_iter().filter(|seen| is_whole(*seen)).count()).sum();
+        clips.clips.iter().map(|clip| clip.mask.outer_iter().filter(|seen| is_complete(*seen)).count()).sum();
     let share = 100.0 * n_whole as f64 / clips.n_frames().max(1) as f64;
     format!(
         "all rows, including the truth, are measured on the joints that all predictors have, {} of {}; left out: {}. These \

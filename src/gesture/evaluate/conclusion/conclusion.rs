@@ -31,7 +31,7 @@ pub enum Aspect {
 pub enum Answer {
     Yes,
     No,
-    Undecided,
+    Inconclusive,
 }
 
 /// Vote of a metric.
@@ -72,7 +72,7 @@ pub fn better_than_constant_pose(table: &Table, own: &PredictorRow) -> Conclusio
     let rest = match combined(others()) {
         // A constant pose may fit better in its poses, but it has no movement.
         Answer::Yes if of(Aspect::Movement).next().is_some() && combined(of(Aspect::Movement)) != Answer::Yes => {
-            Answer::Undecided
+            Answer::Inconclusive
         }
         rest => rest,
     };
@@ -82,13 +82,15 @@ pub fn better_than_constant_pose(table: &Table, own: &PredictorRow) -> Conclusio
     let position_text = match position {
         Some(Answer::Yes) => "its joint positions are closer to the truth than a constant pose",
         Some(Answer::No) => "the joint positions of a constant pose are closer to the truth",
-        Some(Answer::Undecided) => "its joint positions are not shown to be closer to the truth than a constant pose",
+        Some(Answer::Inconclusive) => {
+            "its joint positions are not shown to be closer to the truth than a constant pose"
+        }
         None => "no metric of this convention compares joint positions with a constant pose",
     };
     let motion_text = match rest {
         Some(Answer::Yes) => "its poses and movements are more like the speaker's",
         Some(Answer::No) => "its poses or movements are less like the speaker's",
-        Some(Answer::Undecided) => "its poses and movements are not shown to be more like the speaker's",
+        Some(Answer::Inconclusive) => "its poses and movements are not shown to be more like the speaker's",
         None => "no metric of this convention compares poses and movements",
     };
     let answers = [position, rest];
@@ -126,7 +128,7 @@ fn answer(tested: &TestedDifference) -> Answer {
     match (tested.mean.interval.excludes_zero(), tested.mean.value > 0.0) {
         (true, true) => Answer::Yes,
         (true, false) => Answer::No,
-        (false, _) => Answer::Undecided,
+        (false, _) => Answer::Inconclusive,
     }
 }
 
@@ -147,10 +149,10 @@ pub fn depends_on_audio(table: &Table, own: &PredictorRow) -> Conclusion {
             ("yes", "its motion matches its own audio better than motion generated for other audio or another time")
         }
         Answer::No => ("no", "motion generated for other audio or another time matches its audio better"),
-        Answer::Undecided if votes.iter().any(|vote| vote.answer == Answer::Yes) => {
+        Answer::Inconclusive if votes.iter().any(|vote| vote.answer == Answer::Yes) => {
             ("in part", "its motion matches its own audio better in some metrics and worse in others")
         }
-        Answer::Undecided => (
+        Answer::Inconclusive => (
             "undecided",
             "its motion is not shown to match its own audio better than motion generated for other audio or another time",
         ),
@@ -236,7 +238,7 @@ fn combined<'a>(votes: impl Iterator<Item = &'a Vote>) -> Answer {
     match (yes, no) {
         (true, false) => Answer::Yes,
         (false, true) => Answer::No,
-        _ => Answer::Undecided,
+        _ => Answer::Inconclusive,
     }
 }
 
@@ -248,7 +250,8 @@ impl Conclusion {
                 self.votes.iter().filter(|v| v.answer == answer).map(|v| v.metric.as_str()).collect();
             names.join("; ")
         };
-        let parts = [(Answer::Yes, "better"), (Answer::No, "worse"), (Answer::Undecided, "no significant difference")];
+        let parts =
+            [(Answer::Yes, "better"), (Answer::No, "worse"), (Answer::Inconclusive, "no significant difference")];
         let parts = parts.into_iter().map(|(answer, word)| (word, of(answer))).filter(|(_, names)| !names.is_empty());
         parts.fold(self.sentence.clone(), |text, (word, names)| format!("{text}\n  {word}: {names}"))
     }

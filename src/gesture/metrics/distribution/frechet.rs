@@ -24,21 +24,21 @@ pub struct GaussianFit {
 /// Joints by which poses are compared: those that are visible in at least half of the frames of all `masks` [T, 49],
 /// except the neck and the hand roots. A dataset without finger tips is compared without them.
 pub fn joints<'a>(masks: impl IntoIterator<Item = ArrayView2<'a, bool>>) -> Vec<usize> {
-    let (mut n_seen, mut n_frames) = ([0; N_JOINTS], 0);
+    let (mut n_visible, mut n_frames) = ([0; N_JOINTS], 0);
     for mask in masks {
         n_frames += mask.nrows();
         for frame in mask.outer_iter() {
-            n_seen.iter_mut().zip(frame).for_each(|(n, visible)| *n += usize::from(*visible));
+            n_visible.iter_mut().zip(frame).for_each(|(n, visible)| *n += usize::from(*visible));
         }
     }
-    (NECK + 1..N_JOINTS).filter(|joint| !is_duplicate(*joint) && n_seen[*joint] * 2 >= n_frames.max(1)).collect()
+    (NECK + 1..N_JOINTS).filter(|joint| !is_duplicate(*joint) && n_visible[*joint] * 2 >= n_frames.max(1)).collect()
 }
 
 /// Rows of the coordinates of `joints` in centimetres, for the frames of `motion` [T, 49, 3] (metres) in which `mask`
 /// [T, 49] is true for all of them. The mask of a prediction is that of its ground truth.
 pub fn poses(motion: ArrayView3<f32>, mask: ArrayView2<bool>, joints: &[usize]) -> Array2<f64> {
-    let is_whole = |t: &usize| !joints.is_empty() && joints.iter().all(|joint| mask[[*t, *joint]]);
-    let whole: Vec<usize> = (0..mask.nrows()).filter(is_whole).collect();
+    let is_complete = |t: &usize| !joints.is_empty() && joints.iter().all(|joint| mask[[*t, *joint]]);
+    let whole: Vec<usize> = (0..mask.nrows()).filter(is_complete).collect();
     Array2::from_shape_fn((whole.len(), 3 * joints.len()), |(row, i)| {
         CM * f64::from(motion[[whole[row], joints[i / 3], i % 3]])
     })

@@ -116,8 +116,8 @@ fn family(variants: Vec<(PckAxes, BodyPart, f64)>, neck_in_box: bool, by_frame: 
             for (row, (axes, joints, alpha)) in blocks.at(t).chunks_exact_mut(2).zip(&variants) {
                 let boxed = (first_boxed..N_JOINTS).filter(|joint| visible[*joint]);
                 let radius = alpha * extent(*axes, boxed, |joint, k| ground_truth[joint][k]);
-                let n_seen = joints.iter().filter(|joint| visible[**joint]).count();
-                let weight = if by_frame { 1.0 / n_seen as f64 } else { 1.0 };
+                let n_visible = joints.iter().filter(|joint| visible[**joint]).count();
+                let weight = if by_frame { 1.0 / n_visible as f64 } else { 1.0 };
                 for &joint in joints.iter().filter(|joint| visible[**joint]) {
                     let correct = distance(*axes, |k| predicted[joint][k], |k| ground_truth[joint][k]) <= radius;
                     row[0] += if correct { weight } else { 0.0 };

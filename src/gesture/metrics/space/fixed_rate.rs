@@ -31,11 +31,11 @@ impl Frames {
     /// neighbours, and complete if both are.
     pub fn new(joints: ArrayView3<f32>, mask: ArrayView2<bool>, fps: FrameRate) -> Self {
         let n = joints.shape()[0].min(mask.nrows());
-        let is_whole = |t: usize| {
+        let is_complete = |t: usize| {
             let there = |joint: usize| (0..3).all(|k| joints[[t, joint, k]].is_finite());
             there(NECK) && joints_used().all(|joint| mask[[t, joint]] && there(joint))
         };
-        let source: Vec<bool> = (0..n).map(is_whole).collect();
+        let source: Vec<bool> = (0..n).map(is_complete).collect();
         let per_frame = fps.per_sec() / FPS.per_sec();
         let n_out = if n == 0 { 0 } else { ((n - 1) as f64 / per_frame + 1e-9) as usize + 1 };
         let neighbour = |t: usize| {

@@ -101,7 +101,7 @@ pub const fn preset(preset: NetworkPreset) -> Preset {
 fn channels(dataset: &Dataset, wanted: &[PostureChannel]) -> Result<Vec<ChannelNormalisation>> {
     let posture = dataset.stats().posture.as_ref();
     let of = |channel: PostureChannel| -> Result<ChannelNormalisation> {
-        let stats = posture.and_then(|posture| posture.get(&channel)).filter(|stats| stats.n_seen != [0; 3]);
+        let stats = posture.and_then(|posture| posture.get(&channel)).filter(|stats| stats.n_visible != [0; 3]);
         let stats = stats.with_context(|| {
             let (name, dir) = (channel.name(), dataset.dir().display());
             format!(
@@ -109,7 +109,7 @@ fn channels(dataset: &Dataset, wanted: &[PostureChannel]) -> Result<Vec<ChannelN
                  [dataset] and build the dataset again, or remove it from gan.channels"
             )
         })?;
-        Ok(ChannelNormalisation::new(channel, stats.n_seen, stats.mean, stats.std))
+        Ok(ChannelNormalisation::new(channel, stats.n_visible, stats.mean, stats.std))
     };
     PostureChannel::ALL.into_iter().filter(|channel| wanted.contains(channel)).map(of).collect()
 }

@@ -9,7 +9,7 @@ use anyhow::{Context, Result, ensure};
 use ndarray::{Array2, Array3, ArrayView3, Axis, Zip, s};
 use orator_base::math::order::{Ordered, upper_median};
 use orator_base::stage::artifacts::{Artifact, StageName, speaker_dir};
-use orator_base::types::pose2d::SEEN_SCORE;
+use orator_base::types::pose2d::VISIBLE_SCORE;
 use orator_base::types::skeleton::{
     L_ELBOW, L_HAND, L_SHOULDER, L_WRIST, N_JOINTS, NECK, R_ELBOW, R_HAND, R_SHOULDER, R_WRIST, parent,
 };
@@ -185,7 +185,7 @@ pub fn measure_keypoints(dir: &Path) -> Result<PipelineCheck> {
         measured.shoulders_px = measured.shoulders_px.or(shoulders_px);
         let seen = keypoints_npz::read(&Artifact::Keypoints.within(&unit))?;
         measured.n_drawn += truth.motion.n_frames();
-        body.compare(seen.body.slice(s![.., ..13, ..]), truth.body.view(), SEEN_SCORE);
+        body.compare(seen.body.slice(s![.., ..13, ..]), truth.body.view(), VISIBLE_SCORE);
         hands.compare(seen.left_hand.view(), truth.left_hand.view(), 0.0);
         hands.compare(seen.right_hand.view(), truth.right_hand.view(), 0.0);
     }

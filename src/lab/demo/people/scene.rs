@@ -179,8 +179,8 @@ impl PersonScene {
         let images: Vec<Image> = beside.chain([middle]).map(|step| self.draw(renderer, step)).collect();
         let first = &self.actors[0];
         let n_own = first.n_body_meshes() + usize::from(first.held.is_some());
-        let n_people = n_own + self.actors[1..].iter().map(Actor::n_body_meshes).sum::<usize>();
-        let counts = [first.n_body_meshes(), n_own, n_people];
+        let n_persons = n_own + self.actors[1..].iter().map(Actor::n_body_meshes).sum::<usize>();
+        let counts = [first.n_body_meshes(), n_own, n_persons];
         let truth = FrameTruth::of(first, owners, &first.poses[middle], &self.camera, (renderer, counts));
         let image = lens::mean(&images).unwrap_or_else(|| self.background.image.clone());
         (self.defects.apply(image, frame_idx), truth)

@@ -96,13 +96,13 @@ impl PointOwners {
 
     /// Visibility of a point at `depth` (cm); `front` is the mesh, label and depth of the foremost surface at its
     /// pixel. Mesh counts: those of the first actor's body (`n_body`), with the held object (`n_own`), and of all
-    /// persons (`n_people`).
+    /// persons (`n_persons`).
     fn visibility(
         &self,
         point: usize,
         depth: f64,
         front: Option<(usize, u16, f64)>,
-        [n_body, n_own, n_people]: [usize; 3],
+        [n_body, n_own, n_persons]: [usize; 3],
     ) -> Visibility {
         let owner = &self.owners[point];
         let Some((mesh, label, front)) = front else { return Visibility::Visible };
@@ -111,7 +111,7 @@ impl PointOwners {
             return Visibility::Visible;
         }
         if mesh >= n_body {
-            let things = (n_body..n_own).contains(&mesh) || mesh >= n_people;
+            let things = (n_body..n_own).contains(&mesh) || mesh >= n_persons;
             return if things { Visibility::BehindObject } else { Visibility::BehindPerson };
         }
         let label = usize::from(label);

@@ -14,7 +14,7 @@ use orator_base::math::order::median;
 use orator_base::math::procrustes;
 use orator_base::math::vec3;
 use orator_base::motion::hand_bones::relaxed;
-use orator_base::motion::view::hand::{HandJoints, SeenHand, parent};
+use orator_base::motion::view::hand::{HandJoints, HandPoints, parent};
 use orator_base::types::pose2d::N_HAND;
 use orator_base::types::skeleton::Side;
 use orator_formats::checkpoint;
@@ -35,7 +35,7 @@ const PALM: f64 = 0.093;
 const PX: f64 = 1000.0;
 
 /// Lifter of right hands: keypoints to joints in any unit, the wrist at 0; `None`: not lifted.
-pub type LiftHands<'a> = dyn Fn(&[SeenHand]) -> Result<Vec<Option<HandJoints>>> + 'a;
+pub type LiftHands<'a> = dyn Fn(&[HandPoints]) -> Result<Vec<Option<HandJoints>>> + 'a;
 
 /// Errors in mm, medians over all compared points of all hands.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -67,7 +67,7 @@ pub struct HandRow {
 /// A projected hand: true joints in metres in camera axes, and its keypoints in px.
 struct ProjectedHand {
     truth: Truth,
-    seen: SeenHand,
+    seen: HandPoints,
 }
 
 /// Errors of `lift` on `sets`, for `n_hands` hands each, sampled with `seed`.
@@ -96,7 +96,7 @@ fn row(lift: &LiftHands, set: &FingerSet, n_hands: usize, seed: u64) -> Result<H
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let shots: Vec<ProjectedHand> =
         (0..n_hands).map(|_| shot(&truths[rng.random_range(0..truths.len())], &mut rng)).collect();
-    let seen: Vec<SeenHand> = shots.iter().map(|s| s.seen).collect();
+    let seen: Vec<HandPoints> = shots.iter().map(|s| s.seen).collect();
     let lifted = lift(&seen)?;
     let has_knuckles = set.takes.iter().all(|take| take.has_knuckles());
     let sized: Vec<Option<HandJoints>> =
@@ -135,12 +135,12 @@ fn to_size(truth: &Truth, hand: &HandJoints) -> HandJoints {
     hand.map(|p| vec3::scale(p, grow))
 }
 
-fn flat(seen: &SeenHand) -> HandJoints {
+fn flat(seen: &HandPoints) -> HandJoints {
     let [x0, y0] = seen[0].unwrap_or_default();
     seen.map(|p| p.map_or([0.0; 3], |[x, y]| [f64::from(x - x0) / PX, f64::from(y - y0) / PX, 0.0]))
 }
 
-fn relaxed_hand(seen: &SeenHand) -> HandJoints {
+fn relaxed_hand(seen: &HandPoints) -> HandJoints {
     let points = flat(seen);
     let palm = relaxed();
     let back = palm.map(|[x, y, z]| [-x, y, -z]);

@@ -6,7 +6,7 @@ use super::hands::{self, HandOutcome};
 use super::points::{self, share};
 use crate::rendered_truth::Visibility;
 use orator_base::motion::upper_body::{ARMS, COCO};
-use orator_base::types::pose2d::{N_HAND, SEEN_SCORE};
+use orator_base::types::pose2d::{N_HAND, VISIBLE_SCORE};
 use orator_base::types::pose3d::Motion;
 use orator_base::types::skeleton::{L_HAND, N_HAND_JOINTS, R_HAND};
 use serde::Serialize;
@@ -65,7 +65,7 @@ fn arm_points() -> impl Iterator<Item = usize> {
 
 fn is_arm_incorrect(clip: &RenderedClip, t: usize) -> bool {
     arm_points().any(|point| {
-        let is_judged = clip.keypoints.body[[t, point, 2]] > SEEN_SCORE
+        let is_judged = clip.keypoints.body[[t, point, 2]] > VISIBLE_SCORE
             && clip.truth.body_visibility[[t, point]] != Visibility::Outside;
         let [dx, dy] = points::error(clip, t, point);
         is_judged && dx.hypot(dy) > MAX_ARM_ERROR
@@ -74,7 +74,8 @@ fn is_arm_incorrect(clip: &RenderedClip, t: usize) -> bool {
 
 fn are_arms_detected(clip: &RenderedClip, t: usize) -> bool {
     arm_points().all(|point| {
-        clip.truth.body_visibility[[t, point]] != Visibility::Outside && clip.keypoints.body[[t, point, 2]] > SEEN_SCORE
+        clip.truth.body_visibility[[t, point]] != Visibility::Outside
+            && clip.keypoints.body[[t, point, 2]] > VISIBLE_SCORE
     })
 }
 

@@ -7,7 +7,7 @@ use anyhow::{Result, ensure};
 use ndarray::ArrayView3;
 use orator_base::math::order::{Ordered, median};
 use orator_base::stage::artifacts::Artifact;
-use orator_base::types::pose2d::{HAND_VISIBLE_SCORE, Keypoints, SEEN_SCORE, coco};
+use orator_base::types::pose2d::{HAND_VISIBLE_SCORE, Keypoints, VISIBLE_SCORE, coco};
 use orator_dataset::config;
 use orator_formats::keypoints_npz;
 use serde::Serialize;
@@ -61,7 +61,7 @@ fn measure(name: &str, clips: &[Keypoints]) -> KeypointStatistics {
     for clip in clips {
         let width = |t: usize| {
             let at = |point: usize, k: usize| clip.body[[t, point, k]];
-            let found = at(coco::L_SHOULDER, 2).min(at(coco::R_SHOULDER, 2)) > SEEN_SCORE;
+            let found = at(coco::L_SHOULDER, 2).min(at(coco::R_SHOULDER, 2)) > VISIBLE_SCORE;
             let [dx, dy] = [0, 1].map(|k| at(coco::L_SHOULDER, k) - at(coco::R_SHOULDER, k));
             found.then(|| f64::from(dx.hypot(dy)))
         };
@@ -72,7 +72,7 @@ fn measure(name: &str, clips: &[Keypoints]) -> KeypointStatistics {
             for &point in *points {
                 scores[group].extend((0..clip.n_frames()).map(|t| f64::from(clip.body[[t, point, 2]])));
                 jitter[group]
-                    .extend(second_differences(clip.body.view(), point, None, SEEN_SCORE).map(|d| d / shoulders));
+                    .extend(second_differences(clip.body.view(), point, None, VISIBLE_SCORE).map(|d| d / shoulders));
             }
         }
         for (hand, wrist) in [(&clip.left_hand, coco::L_WRIST), (&clip.right_hand, coco::R_WRIST)] {
@@ -82,7 +82,7 @@ fn measure(name: &str, clips: &[Keypoints]) -> KeypointStatistics {
                     continue;
                 }
                 n_hands += 1;
-                if clip.body[[t, wrist, 2]] > SEEN_SCORE {
+                if clip.body[[t, wrist, 2]] > VISIBLE_SCORE {
                     let [dx, dy] = [0, 1].map(|k| hand[[t, 0, k]] - clip.body[[t, wrist, k]]);
                     wrist_distances.push(f64::from(dx.hypot(dy)) / shoulders);
                 }

@@ -6,8 +6,8 @@ use super::clips::RenderedClip;
 use crate::rendered_truth::Visibility;
 use crate::train::scene::noise::{FrameNoise, KeypointNoise, N_BASIS, PointNoise, Runs, basis, kind};
 use orator_base::math::order::{Ordered, median};
-use orator_base::motion::upper_body::{COCO, N_POINTS, SeenBody};
-use orator_base::types::pose2d::SEEN_SCORE;
+use orator_base::motion::upper_body::{BodyPoints, COCO, N_POINTS};
+use orator_base::types::pose2d::VISIBLE_SCORE;
 
 /// Error of a point in shoulder widths, and the basis vectors of its bias.
 type PointError = ([f64; 2], [[f64; 2]; N_BASIS]);
@@ -37,11 +37,11 @@ impl PointTrack {
         let coco = COCO[point];
         let seen = |t: usize| clip.truth.body_visibility[[t, coco]];
         let error = |t: usize| {
-            let is_found = clip.keypoints.body[[t, coco, 2]] > SEEN_SCORE;
+            let is_found = clip.keypoints.body[[t, coco, 2]] > VISIBLE_SCORE;
             if !is_found || seen(t) == Visibility::Outside {
                 return None;
             }
-            let truth: SeenBody = COCO.map(|c| Some([0, 1].map(|k| clip.truth.body[[t, c, k]])));
+            let truth: BodyPoints = COCO.map(|c| Some([0, 1].map(|k| clip.truth.body[[t, c, k]])));
             Some((super::points::error(clip, t, coco), basis(&truth, point, f64::from(clip.shoulders_px(t)))?))
         };
         let frames = 0..clip.n_frames();
@@ -151,7 +151,7 @@ mod tests {
             .map(|_| {
                 let mut clip = exact();
                 let frame = |t: usize| COCO.map(|c| Some([0, 1].map(|k| clip.truth.body[[t, c, k]])));
-                let mut body: Vec<SeenBody> = (0..clip.n_frames()).map(frame).collect();
+                let mut body: Vec<BodyPoints> = (0..clip.n_frames()).map(frame).collect();
                 known.apply(&mut body, f64::from(clip.shoulders_px(0)), 1.0, true, &mut rng);
                 for (t, frame) in body.iter().enumerate() {
                     for (point, coco) in COCO.into_iter().enumerate() {
@@ -167,7 +167,7 @@ mod tests {
         let found = fit("found", &clips).points[3].clone();
         let near = |a: f64, b: f64, off: f64| assert!((a - b).abs() < off, "{a} {b}: {found:?}");
         // A single pose does not determine the weights, only their sum.
-        let frame: SeenBody = COCO.map(|c| Some([0, 1].map(|k| exact().truth.body[[3, c, k]])));
+        let frame: BodyPoints = COCO.map(|c| Some([0, 1].map(|k| exact().truth.body[[3, c, k]])));
         let vectors = basis(&frame, 3, f64::from(exact().shoulders_px(3))).unwrap();
         let along = |bias| bias_fit::residual([0.0; 2], &vectors, bias);
         (0..2).for_each(|k| near(along(&found.bias)[k], along(&known.points[3].bias)[k], 0.01));

@@ -5,7 +5,7 @@
 use super::clips::RenderedClip;
 use crate::rendered_truth::Visibility;
 use orator_base::math::order::Ordered;
-use orator_base::types::pose2d::{SEEN_SCORE, coco};
+use orator_base::types::pose2d::{VISIBLE_SCORE, coco};
 use serde::Serialize;
 
 /// Groups of points that are reported together, with their names.
@@ -49,7 +49,7 @@ fn of_group(name: &'static str, points: &[usize], clips: &[&RenderedClip]) -> Po
         for &point in points {
             let mut errors: Vec<[f64; 2]> = Vec::new();
             for t in 0..clip.n_frames() {
-                let is_found = clip.keypoints.body[[t, point, 2]] > SEEN_SCORE;
+                let is_found = clip.keypoints.body[[t, point, 2]] > VISIBLE_SCORE;
                 if clip.truth.body_visibility[[t, point]] != Visibility::Visible {
                     n_hidden += 1;
                     n_false_positives += usize::from(is_found);

@@ -8,7 +8,7 @@ use orator_base::math::procrustes;
 use orator_base::math::vec3;
 use orator_base::math::vec3::Vec3;
 use orator_base::motion::upper_body::{
-    L_SHOULDER, L_WRIST, N_POINTS, NOSE, Pose, R_HIP, R_SHOULDER, R_WRIST, SeenBody, metres_per_unit,
+    BodyPoints, L_SHOULDER, L_WRIST, N_POINTS, NOSE, Pose, R_HIP, R_SHOULDER, R_WRIST, metres_per_unit,
 };
 use orator_base::types::skeleton;
 use serde::Serialize;
@@ -136,7 +136,7 @@ pub fn mean_pose(scenes: &[FilmedScene]) -> Pose {
 
 /// 2D points of a clean scene with zero depth, in metres at the neck's distance, relative to the neck.
 fn flat(scene: &FilmedScene) -> Vec<Pose> {
-    let frame = |seen: &SeenBody| {
+    let frame = |seen: &BodyPoints| {
         let points: Pose = seen.map(|p| {
             let [x, y] = p.unwrap_or_default();
             [f64::from(x) / scene.px_per_metre, f64::from(y) / scene.px_per_metre, 0.0]
@@ -159,7 +159,7 @@ pub fn with_mean_depth(scene: &FilmedScene, mean: &Pose) -> Vec<Option<Pose>> {
 /// points to. Requires a clean scene; uses the true camera and neck position.
 pub fn with_bone_depth(scene: &FilmedScene) -> Vec<Option<Pose>> {
     let bones = Proportions::MEAN;
-    let solve = |seen: &SeenBody| {
+    let solve = |seen: &BodyPoints| {
         let rays = seen.map(|p| p.map(|[x, y]| [f64::from(x) / scene.focal_px, f64::from(y) / scene.focal_px, 1.0]));
         let mut pose: Pose = [[0.0; 3]; N_POINTS];
         let middle = vec3::scale(vec3::add(rays[R_SHOULDER]?, rays[L_SHOULDER]?), 0.5);

@@ -6,7 +6,7 @@ use super::conv3x3::Conv3x3;
 use super::score_maps::{Crop, MAP_SIZE, N_MAPS, assembled, score_maps};
 use candle_core::{D, Device, Module, Result, Tensor};
 use candle_nn::Linear;
-use orator_base::motion::view::hand::{HandJoints, SeenHand};
+use orator_base::motion::view::hand::{HandJoints, HandPoints};
 use orator_base::types::skeleton::Side;
 use orator_nn::Mode;
 use orator_nn::lifter::hand;
@@ -95,9 +95,9 @@ impl HeatmapLifter {
     ///
     /// # Errors
     /// An error of the tensor library.
-    pub fn lift(&self, seen: &[SeenHand], side: Side) -> Result<Vec<Option<HandJoints>>> {
+    pub fn lift(&self, seen: &[HandPoints], side: Side) -> Result<Vec<Option<HandJoints>>> {
         let flip = if side == Side::Left { -1.0 } else { 1.0 };
-        let mirrored: Vec<SeenHand> = seen.iter().map(|s| s.map(|p| p.map(|[x, y]| [flip * x, y]))).collect();
+        let mirrored: Vec<HandPoints> = seen.iter().map(|s| s.map(|p| p.map(|[x, y]| [flip * x, y]))).collect();
         let crops: Vec<Option<Crop>> = mirrored.iter().map(Crop::around).collect();
         let valid_crops: Vec<(usize, Crop)> = crops.iter().enumerate().filter_map(|(i, c)| Some((i, (*c)?))).collect();
         let mut hands = vec![None; seen.len()];

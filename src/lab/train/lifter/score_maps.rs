@@ -4,7 +4,7 @@
 
 use orator_base::math::vec3;
 use orator_base::math::vec3::Vec3;
-use orator_base::motion::view::hand::{HandJoints, SeenHand};
+use orator_base::motion::view::hand::{HandJoints, HandPoints};
 use orator_base::types::pose2d::N_HAND;
 
 /// Width and height of a score map.
@@ -27,7 +27,7 @@ pub struct Crop {
 impl Crop {
     /// Centred on the middle knuckle (or the mean of the points), just large enough to contain all detected points.
     /// `None` if no two points differ.
-    pub fn around(seen: &SeenHand) -> Option<Self> {
+    pub fn around(seen: &HandPoints) -> Option<Self> {
         let there = || seen.iter().flatten().map(|p| p.map(f64::from));
         let n = there().count().max(1) as f64;
         let middle = || [0, 1].map(|k| there().map(|p| p[k]).sum::<f64>() / n);
@@ -39,7 +39,7 @@ impl Crop {
 
 /// Writes the score maps, mean-pooled from 256 to 32 pixels across (a 2D Gaussian is separable, and so are its means).
 /// The map of a point that is missing or outside the crop is zero.
-pub fn score_maps(seen: &SeenHand, crop: Crop, maps: &mut [f32]) {
+pub fn score_maps(seen: &HandPoints, crop: Crop, maps: &mut [f32]) {
     maps.fill(0.0);
     for (j, point) in seen.iter().enumerate() {
         let Some(point) = point else { continue };
@@ -108,7 +108,7 @@ mod tests {
 
     #[test]
     fn maps_are_the_means_of_the_large_gaussians() {
-        let mut seen: SeenHand = [None; N_HAND];
+        let mut seen: HandPoints = [None; N_HAND];
         (seen[9], seen[4], seen[20]) = (Some([100.0, 50.0]), Some([140.0, 80.0]), Some([60.0, 50.0]));
         let crop = Crop::around(&seen).unwrap();
         assert!((crop.side - 100.0).abs() < 1e-9);

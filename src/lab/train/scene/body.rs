@@ -10,7 +10,7 @@ use crate::mocap::upper_body::BodyTake;
 use orator_base::math::vec3;
 use orator_base::math::vec3::Vec3;
 use orator_base::motion::upper_body::{
-    L_ELBOW, L_HIP, L_SHOULDER, L_WRIST, MIRROR, N_POINTS, NOSE, Pose, R_HIP, R_SHOULDER, R_WRIST, SeenBody,
+    BodyPoints, L_ELBOW, L_HIP, L_SHOULDER, L_WRIST, MIRROR, N_POINTS, NOSE, Pose, R_HIP, R_SHOULDER, R_WRIST,
 };
 use orator_base::types::skeleton;
 use rand::{Rng, SeedableRng};
@@ -29,7 +29,7 @@ const MEASURED_BIAS: f64 = 0.7;
 #[derive(Clone, Debug)]
 pub struct FilmedScene {
     pub truth: Vec<Pose>,
-    pub seen: Vec<SeenBody>,
+    pub seen: Vec<BodyPoints>,
     /// [T]; whether a frame has a gross error (`jumps`); such frames are not training targets.
     pub disturbed: Vec<bool>,
     /// Camera yaw relative to the body's mean front, radians; 0: frontal view.
@@ -112,7 +112,7 @@ impl FilmedScene {
             let [x, y, z] = vec3::add(p, neck);
             [0, 1].map(|k| (focal_px * [x, y][k] / z.max(0.2)) as f32)
         };
-        let mut seen: Vec<SeenBody> = truth.iter().map(|pose| pose.map(|p| Some(picture(p)))).collect();
+        let mut seen: Vec<BodyPoints> = truth.iter().map(|pose| pose.map(|p| Some(picture(p)))).collect();
         let px_per_metre = focal_px / distance;
         if filming != Filming::Clean {
             let shoulders = vec3::norm(vec3::sub(truth[0][R_SHOULDER], truth[0][L_SHOULDER]));
@@ -129,7 +129,7 @@ impl FilmedScene {
 
 /// Adds assumed noise, outliers and gaps. `shoulders_px` is the true shoulder width in px. In training the noise level
 /// varies and each point has a constant bias.
-fn perturb(seen: &mut [SeenBody], shoulders_px: f64, training: bool, rng: &mut ChaCha8Rng) {
+fn perturb(seen: &mut [BodyPoints], shoulders_px: f64, training: bool, rng: &mut ChaCha8Rng) {
     // Detectors and motion capture place shoulders and elbows up to a few cm apart, which is constant over a scene.
     let bias = if !training {
         0.0
@@ -177,7 +177,7 @@ fn perturb(seen: &mut [SeenBody], shoulders_px: f64, training: bool, rng: &mut C
 }
 
 /// Adds the measured noise of a random model set in 70 % of the scenes; returns whether it did.
-fn perturb_as_measured(seen: &mut [SeenBody], shoulders_px: f64, rng: &mut ChaCha8Rng) -> bool {
+fn perturb_as_measured(seen: &mut [BodyPoints], shoulders_px: f64, rng: &mut ChaCha8Rng) -> bool {
     let sets = &noise::measured().bodies;
     if sets.is_empty() || !rng.random_bool(MEASURED_NOISE) {
         return false;
@@ -190,7 +190,7 @@ fn perturb_as_measured(seen: &mut [SeenBody], shoulders_px: f64, rng: &mut ChaCh
 }
 
 /// Removes the hips in 60 % of the scenes: they are often hidden by a desk or below the image.
-fn drop_hips(seen: &mut [SeenBody], shoulders_px: f64, training: bool, rng: &mut ChaCha8Rng) {
+fn drop_hips(seen: &mut [BodyPoints], shoulders_px: f64, training: bool, rng: &mut ChaCha8Rng) {
     if rng.random_bool(0.6) {
         seen.iter_mut().for_each(|f| (f[R_HIP], f[L_HIP]) = (None, None));
     } else if training && rng.random_bool(0.5) {
@@ -199,7 +199,7 @@ fn drop_hips(seen: &mut [SeenBody], shoulders_px: f64, training: bool, rng: &mut
 }
 
 /// Places the hips straight below the shoulders, as many detectors do when a desk or the image border hides them.
-fn guess_hips(seen: &mut [SeenBody], shoulders_px: f64, rng: &mut ChaCha8Rng) {
+fn guess_hips(seen: &mut [BodyPoints], shoulders_px: f64, rng: &mut ChaCha8Rng) {
     let (below, width) = (rng.random_range(0.8..1.7), rng.random_range(0.25..0.75));
     let aside = 0.1 * normal(rng);
     for frame in seen.iter_mut() {

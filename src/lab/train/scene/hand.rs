@@ -7,7 +7,7 @@ use orator_base::math::order;
 use orator_base::math::procrustes;
 use orator_base::math::vec3;
 use orator_base::motion::hand_bones::PHALANX;
-use orator_base::motion::view::hand::{HandJoints, SeenHand, parent};
+use orator_base::motion::view::hand::{HandJoints, HandPoints, parent};
 use orator_base::types::pose2d::N_HAND;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -19,7 +19,7 @@ const MEASURED_BIAS: f64 = 0.8;
 /// A hand: ground truth in px of the image with the wrist at 0, and the detected keypoints.
 pub struct HandSample {
     pub truth: HandJoints,
-    pub seen: SeenHand,
+    pub seen: HandPoints,
 }
 
 /// Samples a hand in a random orientation at a distance of 5 to 20 hand lengths, in px, with measured or assumed
@@ -98,14 +98,14 @@ fn missing(rng: &mut ChaCha8Rng) -> [bool; N_HAND] {
 /// # Errors
 /// Errors of `lift`.
 pub fn errors(
-    lift: impl Fn(&[SeenHand]) -> Result<Vec<Option<HandJoints>>>,
+    lift: impl Fn(&[HandPoints]) -> Result<Vec<Option<HandJoints>>>,
     n: usize,
     brief: bool,
 ) -> Result<Vec<String>> {
     let mut rng = ChaCha8Rng::seed_from_u64(20_001);
     let n = if brief { n / 10 } else { n };
     let samples: Vec<HandSample> = (0..n).map(|_| sample_hand(&mut rng)).collect();
-    let seen: Vec<SeenHand> = samples.iter().map(|s| s.seen).collect();
+    let seen: Vec<HandPoints> = samples.iter().map(|s| s.seen).collect();
     let (mut lifted, mut hands) = (Vec::new(), Vec::new());
     for (sample, hand) in samples.iter().zip(lift(&seen)?) {
         if let Some(hand) = hand {

@@ -3,7 +3,7 @@
 //! jump must not affect neighbouring frames, and lifting rejects it by the bone length.
 
 use super::hand_shape::normal;
-use orator_base::motion::upper_body::{L_ELBOW, L_WRIST, NOSE, R_ELBOW, R_WRIST, SeenBody};
+use orator_base::motion::upper_body::{BodyPoints, L_ELBOW, L_WRIST, NOSE, R_ELBOW, R_WRIST};
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 
@@ -19,7 +19,7 @@ const SWAP_SHARE: f64 = 0.25;
 
 /// Disturbs `seen` and returns for each frame whether it is disturbed. `shoulders_px` is the true shoulder width in
 /// px.
-pub fn disturb(seen: &mut [SeenBody], shoulders_px: f64, rng: &mut ChaCha8Rng) -> Vec<bool> {
+pub fn disturb(seen: &mut [BodyPoints], shoulders_px: f64, rng: &mut ChaCha8Rng) -> Vec<bool> {
     let mut disturbed = vec![false; seen.len()];
     if !rng.random_bool(SCENE_SHARE) || seen.len() < 2 * *FRAMES.start() {
         return disturbed;

@@ -6,7 +6,7 @@ use super::hand_noise::HandNoise;
 use super::hand_shape::normal;
 use anyhow::{Context, Result};
 use orator_base::motion::upper_body::{
-    L_ELBOW, L_HIP, L_SHOULDER, L_WRIST, N_POINTS, NOSE, R_ELBOW, R_HIP, R_SHOULDER, R_WRIST, SeenBody,
+    BodyPoints, L_ELBOW, L_HIP, L_SHOULDER, L_WRIST, N_POINTS, NOSE, R_ELBOW, R_HIP, R_SHOULDER, R_WRIST,
 };
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
@@ -116,7 +116,7 @@ pub fn kind(point: usize) -> usize {
 /// Basis vectors of the bias of a point, in image axes and shoulder widths: the adjacent bones, then the downward
 /// direction. Bone vectors rotate with the image and are mirrored with the body, so that left and right share their
 /// weights. `None` if a required point is missing.
-pub fn basis(body: &SeenBody, point: usize, shoulders_px: f64) -> Option<[[f64; 2]; N_BASIS]> {
+pub fn basis(body: &BodyPoints, point: usize, shoulders_px: f64) -> Option<[[f64; 2]; N_BASIS]> {
     let at = |joint: usize| body[joint].map(|p| p.map(|v| f64::from(v) / shoulders_px));
     let between = |a: [f64; 2], b: [f64; 2]| [b[0] - a[0], b[1] - a[1]];
     let (right, left) = (at(R_SHOULDER)?, at(L_SHOULDER)?);
@@ -141,7 +141,7 @@ pub fn basis(body: &SeenBody, point: usize, shoulders_px: f64) -> Option<[[f64; 
 impl KeypointNoise {
     /// Adds noise to exact keypoints; `scale` multiplies everything except the gaps. If `with_bias`, the measured bias
     /// is added, otherwise a bias of equal size in a random direction that is constant over the clip.
-    pub fn apply(&self, body: &mut [SeenBody], shoulders_px: f64, scale: f64, with_bias: bool, rng: &mut ChaCha8Rng) {
+    pub fn apply(&self, body: &mut [BodyPoints], shoulders_px: f64, scale: f64, with_bias: bool, rng: &mut ChaCha8Rng) {
         let exact = body.to_vec();
         for point in 0..N_POINTS {
             let noise = &self.points[kind(point)];
@@ -193,7 +193,7 @@ mod tests {
 
     #[test]
     fn the_bias_goes_with_the_bones_and_changes_sides_with_the_body() {
-        let body: SeenBody = [
+        let body: BodyPoints = [
             [0.0, -60.0],
             [-50.0, 0.0],
             [-60.0, 80.0],

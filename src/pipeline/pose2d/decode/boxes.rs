@@ -14,13 +14,13 @@ pub fn overlap(a: &PersonBox, b: &PersonBox) -> f32 {
 /// `max_overlap`.
 pub fn non_max_suppression(mut boxes: Vec<PersonBox>, max_overlap: f32) -> Vec<PersonBox> {
     boxes.sort_by(|a, b| b.score.total_cmp(&a.score));
-    let mut kept: Vec<PersonBox> = Vec::new();
+    let mut accepted: Vec<PersonBox> = Vec::new();
     for candidate in boxes {
-        if kept.iter().all(|better| overlap(better, &candidate) <= max_overlap) {
-            kept.push(candidate);
+        if accepted.iter().all(|better| overlap(better, &candidate) <= max_overlap) {
+            accepted.push(candidate);
         }
     }
-    kept
+    accepted
 }
 
 /// Box from two corners; `None` if a value is not finite or the area is empty.
@@ -55,8 +55,8 @@ mod tests {
     fn the_better_of_overlapping_boxes_is_retained() {
         let at = |x: f32, score: f32| from_corners([x, 0.0, x + 10.0, 10.0], score).unwrap();
         assert!((overlap(&at(0.0, 1.0), &at(5.0, 1.0)) - 1.0 / 3.0).abs() < 1e-6);
-        let kept = non_max_suppression(vec![at(0.0, 0.5), at(1.0, 0.9), at(8.0, 0.7)], 0.45);
-        assert_eq!(kept.iter().map(|b| b.score).collect::<Vec<_>>(), [0.9, 0.7]);
+        let accepted = non_max_suppression(vec![at(0.0, 0.5), at(1.0, 0.9), at(8.0, 0.7)], 0.45);
+        assert_eq!(accepted.iter().map(|b| b.score).collect::<Vec<_>>(), [0.9, 0.7]);
         assert_eq!(from_corners([0.0, 0.0, f32::NAN, 1.0], 1.0), None);
         assert_eq!(from_corners([5.0, 0.0, 5.0, 1.0], 1.0), None);
     }

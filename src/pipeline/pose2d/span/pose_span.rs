@@ -3,7 +3,7 @@
 
 use super::keypoint_frames::KeypointFrames;
 use crate::pose2d::face::views::PortraitViews;
-use crate::pose2d::speaker::{SeenPerson, is_same_person};
+use crate::pose2d::speaker::{TrackedPerson, is_same_person};
 use anyhow::{Context, Result, ensure};
 use orator_base::stage::artifacts::Artifact;
 use orator_base::stage::{Report, workdir};
@@ -30,8 +30,8 @@ pub struct PoseSpan {
     /// Number of identities so far.
     pub n_identities: i64,
     /// The first identity, when first recognised, and the last.
-    pub first: Option<SeenPerson>,
-    pub last: Option<SeenPerson>,
+    pub first: Option<TrackedPerson>,
+    pub last: Option<TrackedPerson>,
 }
 
 impl PoseSpan {
@@ -101,7 +101,7 @@ impl PoseSpan {
             format!("{}: person in {body}, left hand {left}, right hand {right}", counted(n_frames, "frame"));
         let mut facts = json!({
             "n_frames": n_frames, "person": person, "left_hand": left_hand, "right_hand": right_hand,
-            "several_persons": self.frames.share(|pose| pose.n_people > 1),
+            "several_persons": self.frames.share(|pose| pose.n_persons > 1),
             "mouth": self.frames.share(|pose| pose.face.is_some()),
         });
         if let Some([several, speaking]) = self.followed {

@@ -2,16 +2,16 @@
 //! heading and a sentence for the user.
 
 /// Defines the reasons: the measured quantity as documentation, then name, word in the ledger, label, unit and heading.
-macro_rules! refusals {
+macro_rules! rejections {
     ($($(#[$doc:meta])* $name:ident: $reason:literal, $label:literal, $unit:literal, $heading:literal;)*) => {
-        /// A reason for refusing frames. The reasons in `JUDGED` come first, in the order in which they are checked:
+        /// A reason for rejecting frames. The reasons in `JUDGED` come first, in the order in which they are checked:
         /// the first one that applies is recorded.
         #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-        pub enum Refusal {
+        pub enum Rejection {
             $($(#[$doc])* $name,)*
         }
 
-        impl Refusal {
+        impl Rejection {
             const ALL: &[Self] = &[$(Self::$name),*];
 
             const fn texts(self) -> [&'static str; 4] {
@@ -23,7 +23,7 @@ macro_rules! refusals {
     };
 }
 
-refusals! {
+rejections! {
     /// Fraction of the frames with sound.
     NoSound: "no sound", "no audio", "", "no audio track, or it has ended";
     /// Loudness in dB of full scale.
@@ -56,7 +56,7 @@ refusals! {
     Cut: "cut", "close to a cut", "s", "the interval before or after a cut is too short";
     /// Seconds of an interval that remain beside a change of the tracked person.
     Identity: "other person", "change of person", "s", "the interval before or after a change of person is too short";
-    /// Seconds of an interval that remain between other refusals.
+    /// Seconds of an interval that remain between other rejections.
     TooShort: "too short", "too short", "s", "too short between other rejected intervals";
     /// Fraction of the frames in which the less visible hand is visible.
     HandShare: "hands", "hand not visible", "", "a hand is not visible for too long";
@@ -82,7 +82,7 @@ refusals! {
     NotImported: "not here", "not here", "s", "not contained in the imported shards";
 }
 
-impl Refusal {
+impl Rejection {
     /// Reasons by which `segment` and `lift` judge frames.
     pub const JUDGED: [Self; 21] = match Self::ALL.first_chunk() {
         Some(judged) => *judged,
@@ -91,7 +91,7 @@ impl Refusal {
 
     /// Finds the judged reason of a ledger entry with this word and unit.
     pub fn find(reason: &str, unit: &str) -> Option<Self> {
-        Self::JUDGED.into_iter().find(|refusal| refusal.reason() == reason && refusal.unit() == unit)
+        Self::JUDGED.into_iter().find(|rejection| rejection.reason() == reason && rejection.unit() == unit)
     }
 
     /// Machine-readable word in the ledger.
@@ -163,21 +163,21 @@ impl Refusal {
     }
 }
 
-/// Why a frame or a run of frames is refused: the reason, the measured value, and the limit that it violates.
+/// Why a frame or a run of frames is rejected: the reason, the measured value, and the limit that it violates.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct FrameRefusal {
-    pub refusal: Refusal,
+pub struct FrameRejection {
+    pub rejection: Rejection,
     pub measured: f64,
     pub threshold: f64,
 }
 
-impl FrameRefusal {
-    pub const fn new(refusal: Refusal, measured: f64, threshold: f64) -> Self {
-        Self { refusal, measured, threshold }
+impl FrameRejection {
+    pub const fn new(rejection: Rejection, measured: f64, threshold: f64) -> Self {
+        Self { rejection, measured, threshold }
     }
 
     /// Returns the mean measured value over a run of frames.
     pub fn mean_measured(run: &[Option<Self>]) -> f64 {
-        run.iter().flatten().map(|refused| refused.measured).sum::<f64>() / run.len().max(1) as f64
+        run.iter().flatten().map(|rejected| rejected.measured).sum::<f64>() / run.len().max(1) as f64
     }
 }

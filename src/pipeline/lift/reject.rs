@@ -3,8 +3,8 @@
 
 use super::gaps::long_gaps;
 use anyhow::{Result, ensure};
-use orator_base::stage::ledger::{Kept, Ledger, Refused};
-use orator_base::stage::refusal::{FrameRefusal, Refusal};
+use orator_base::stage::ledger::{AcceptedInterval, Ledger, RejectedInterval};
+use orator_base::stage::rejection::{FrameRejection, Rejection};
 use orator_base::text::counted;
 use orator_base::types::interval::{Interval, Intervals};
 use orator_base::types::time::FrameRate;
@@ -17,12 +17,12 @@ pub fn max_gap_frames(rules: &config::SegmentConfig, fps: FrameRate) -> usize {
 
 /// Rejects the frames of runs longer than `max_gap` in which a bone deviates by more than `most`. `bone_change` [T] is
 /// the largest relative deviation of a bone in each frame; NaN: unknown, not rejected.
-pub fn bone_refusals(bone_change: &[f32], most: f64, max_gap: usize) -> Vec<Option<FrameRefusal>> {
+pub fn bone_rejections(bone_change: &[f32], most: f64, max_gap: usize) -> Vec<Option<FrameRejection>> {
     let fine: Vec<bool> = bone_change.iter().map(|&change| !exceeds(change, most)).collect();
     let long = long_gaps(&fine, max_gap);
-    let refused =
-        |(&change, &long): (&f32, &bool)| long.then(|| FrameRefusal::new(Refusal::Bones, f64::from(change), most));
-    bone_change.iter().zip(&long).map(refused).collect()
+    let rejected =
+        |(&change, &long): (&f32, &bool)| long.then(|| FrameRejection::new(Rejection::Bones, f64::from(change), most));
+    bone_change.iter().zip(&long).map(rejected).collect()
 }
 
 /// Whether a relative deviation `change` exceeds `most`.
@@ -37,35 +37,35 @@ pub fn exceeds(change: f32, most: f64) -> bool {
 pub fn exclude_frames(
     intervals: &Intervals,
     ledger: &Ledger,
-    refusals: &[Option<FrameRefusal>],
+    rejections: &[Option<FrameRejection>],
     min_frames: usize,
 ) -> Result<(Intervals, Ledger)> {
     let fps = intervals.fps;
     ensure!(
-        ledger.kept.len() == intervals.intervals.len(),
+        ledger.accepted.len() == intervals.intervals.len(),
         "{}, but {} accepted in the ledger: run the stage segment again",
         counted(intervals.intervals.len(), "interval"),
-        ledger.kept.len()
+        ledger.accepted.len()
     );
     let mut left = Vec::new();
-    let mut reduced = Ledger { kept: Vec::new(), ..ledger.clone() };
-    for (interval, kept) in intervals.intervals.iter().zip(&ledger.kept) {
-        for (piece, refused) in pieces(*interval, refusals) {
-            let start_secs = if piece.start == interval.start { kept.start_secs } else { fps.secs(piece.start) };
-            let end_secs = if piece.end == interval.end { kept.end_secs } else { fps.secs(piece.end) };
+    let mut reduced = Ledger { accepted: Vec::new(), ..ledger.clone() };
+    for (interval, accepted) in intervals.intervals.iter().zip(&ledger.accepted) {
+        for (piece, rejected) in pieces(*interval, rejections) {
+            let start_secs = if piece.start == interval.start { accepted.start_secs } else { fps.secs(piece.start) };
+            let end_secs = if piece.end == interval.end { accepted.end_secs } else { fps.secs(piece.end) };
             let short = piece.n_frames() < min_frames && piece != *interval;
             let (secs, least) = (fps.secs(piece.n_frames()), fps.secs(min_frames));
-            let too_short = || short.then(|| FrameRefusal::new(Refusal::TooShort, secs, least));
-            match refused.or_else(too_short) {
+            let too_short = || short.then(|| FrameRejection::new(Rejection::TooShort, secs, least));
+            match rejected.or_else(too_short) {
                 None => {
                     left.push(piece);
-                    reduced.kept.push(Kept { start_secs, end_secs });
+                    reduced.accepted.push(AcceptedInterval { start_secs, end_secs });
                 }
-                Some(why) => reduced.refused.push(Refused::new(start_secs, end_secs, why)),
+                Some(why) => reduced.rejected.push(RejectedInterval::new(start_secs, end_secs, why)),
             }
         }
     }
-    reduced.refused.sort_by(|a, b| a.start_secs.total_cmp(&b.start_secs));
+    reduced.rejected.sort_by(|a, b| a.start_secs.total_cmp(&b.start_secs));
     let left = Intervals::new(fps, intervals.n_frames, left).with_resting(&intervals.resting);
     let reduced = reduced.with_resting(left.resting_intervals());
     Ok((left, reduced))
@@ -73,15 +73,15 @@ pub fn exclude_frames(
 
 /// Splits an interval into consecutive pieces, each accepted (`None`) or rejected for one reason with the mean of the
 /// measured value.
-fn pieces(interval: Interval, refusals: &[Option<FrameRefusal>]) -> Vec<(Interval, Option<FrameRefusal>)> {
+fn pieces(interval: Interval, rejections: &[Option<FrameRejection>]) -> Vec<(Interval, Option<FrameRejection>)> {
     let Interval { start, end } = interval;
-    let reason = |refused: &Option<FrameRefusal>| refused.map(|refused| refused.refusal);
+    let reason = |rejected: &Option<FrameRejection>| rejected.map(|rejected| rejected.rejection);
     let mut at = start;
-    let runs = refusals[start..end].chunk_by(|a, b| reason(a) == reason(b)).map(|run| {
+    let runs = rejections[start..end].chunk_by(|a, b| reason(a) == reason(b)).map(|run| {
         let piece = Interval { start: at, end: at + run.len() };
         at = piece.end;
-        let measured = FrameRefusal::mean_measured(run);
-        (piece, run[0].map(|refused| FrameRefusal { measured, ..refused }))
+        let measured = FrameRejection::mean_measured(run);
+        (piece, run[0].map(|rejected| FrameRejection { measured, ..rejected }))
     });
     runs.collect()
 }
@@ -95,19 +95,21 @@ mod tests {
         let fps = FrameRate::new(15, 1);
         let intervals =
             Intervals::new(fps, 300, vec![Interval { start: 0, end: 100 }, Interval { start: 120, end: 300 }]);
-        let silent = Refused::new(fps.secs(100), 8.0, FrameRefusal::new(Refusal::Quiet, -70.0, -50.0));
-        let kept = [(0.0, fps.secs(100)), (8.0, 19.99)].map(|(start_secs, end_secs)| Kept { start_secs, end_secs });
-        let ledger = Ledger { duration_secs: 19.99, kept: kept.to_vec(), refused: vec![silent], ..Ledger::default() };
-        let mut refusals = vec![None; 300];
-        let same = exclude_frames(&intervals, &ledger, &refusals, 64).unwrap();
+        let silent = RejectedInterval::new(fps.secs(100), 8.0, FrameRejection::new(Rejection::Quiet, -70.0, -50.0));
+        let accepted = [(0.0, fps.secs(100)), (8.0, 19.99)]
+            .map(|(start_secs, end_secs)| AcceptedInterval { start_secs, end_secs });
+        let ledger =
+            Ledger { duration_secs: 19.99, accepted: accepted.to_vec(), rejected: vec![silent], ..Ledger::default() };
+        let mut rejections = vec![None; 300];
+        let same = exclude_frames(&intervals, &ledger, &rejections, 64).unwrap();
         assert_eq!(same, (intervals.clone(), ledger.clone()));
-        refusals[150..160].fill(Some(FrameRefusal::new(Refusal::Bones, 0.75, 0.5)));
-        refusals[299] = Some(FrameRefusal::new(Refusal::MissingJoints, 3.0, 0.0));
-        let (left, reduced) = exclude_frames(&intervals, &ledger, &refusals, 64).unwrap();
+        rejections[150..160].fill(Some(FrameRejection::new(Rejection::Bones, 0.75, 0.5)));
+        rejections[299] = Some(FrameRejection::new(Rejection::MissingJoints, 3.0, 0.0));
+        let (left, reduced) = exclude_frames(&intervals, &ledger, &rejections, 64).unwrap();
         assert_eq!(left.intervals, [Interval { start: 0, end: 100 }, Interval { start: 160, end: 299 }]);
-        assert!(reduced.is_whole());
-        let reasons: Vec<(&str, f64)> = reduced.refused.iter().map(|r| (r.reason.as_str(), r.measured)).collect();
+        assert!(reduced.is_complete());
+        let reasons: Vec<(&str, f64)> = reduced.rejected.iter().map(|r| (r.reason.as_str(), r.measured)).collect();
         assert_eq!(reasons, [("quiet", -70.0), ("too short", 2.0), ("bones", 0.75), ("open", 3.0)]);
-        assert!(exclude_frames(&intervals, &Ledger { kept: vec![], ..ledger }, &refusals, 64).is_err());
+        assert!(exclude_frames(&intervals, &Ledger { accepted: vec![], ..ledger }, &rejections, 64).is_err());
     }
 }
