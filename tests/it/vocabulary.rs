@@ -91,9 +91,8 @@ fn flags() -> BTreeSet<String> {
         let output = Command::new(program).args(args).output().unwrap();
         assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
         let text = String::from_utf8(output.stdout).unwrap();
-        text.split_whitespace()
-            .filter_map(|word| word.trim_matches('"').strip_prefix("--").map(str::to_owned))
-            .collect()
+        let flag = |word: &str| identifier(&word.trim_start_matches('"').strip_prefix("--")?.replace('-', "_"));
+        text.split_whitespace().filter_map(flag).collect()
     };
     of(Path::new(env!("CARGO_BIN_EXE_orator")), &["completions", "bash"])
 }

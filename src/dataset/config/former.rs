@@ -9,9 +9,10 @@ use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
 /// Former names of keys and sections, with their current names.
-pub(super) const RENAMED: [(&str, &str); 10] = [
+pub(super) const RENAMED: [(&str, &str); 11] = [
     ("shard", "dataset"),
     ("segment.max_bone_change", "lift.max_bone_change"),
+    ("segment.max_people", "segment.max_persons"),
     ("segment.max_still_secs", "segment.max_static_secs"),
     ("pose2d.person_follow", "pose2d.box_smoothing"),
     ("gan.fade_to", "gan.final_lr_ratio"),

@@ -166,7 +166,8 @@ section! {
         max_static_secs: f64 = 0.5 => (0.0, 1.0, "seconds, the longest gap that lift fills"),
         min_facing: f64 = 1.0 => (-10.0, 10.0, "neck-nose distances"),
         max_nose_off: f64 = 1.0 => (0.0, 10.0, "half shoulder widths"),
-        max_people: u32 = 5 => (1.0, 255.0, "people"),
+        #[serde(alias = "max_people")]
+        max_persons: u32 = 5 => (1.0, 255.0, "persons"),
         max_crowd_share: f64 = 0.3 => (0.0, 1.0, ""),
         max_jump: f64 = 0.5 => (0.01, 100.0, "shoulder widths"),
     }

@@ -118,7 +118,7 @@ pub fn segment_rules(rules: &config::SegmentConfig) -> [SegmentRule; 3] {
         allows_rest: matches!(rejection, Rejection::HandShare),
     };
     let (visible, min_share) = (AtLeast(rules.joint_score), AtLeast(rules.min_hand_share));
-    let crowded = AtLeast(f64::from(rules.max_people) + 0.5);
+    let crowded = AtLeast(f64::from(rules.max_persons) + 0.5);
     [
         row(Rejection::HandShare, |m| &m.left_hand, visible, min_share),
         row(Rejection::HandShare, |m| &m.right_hand, visible, min_share),

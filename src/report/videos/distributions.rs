@@ -55,7 +55,7 @@ const ROWS: [Measure; 18] = [
     row("rest", "Wrist movement of resting hands", "shoulder widths", UNIT_RANGE, 50, "max_rest_move"),
     row("jump", "Neck movement per frame", "shoulder widths", [0.0, 1.5], 60, "max_jump"),
     row("shot_score", "Shot score", "", UNIT_RANGE, 50, "shot_threshold"),
-    row("n_people", "Persons in view", "persons", [-0.5, 10.5], 11, "max_people"),
+    row("n_people", "Persons in view", "persons", [-0.5, 10.5], 11, "max_persons"),
     row(BONES, "Deviation of lifted bones from their length", "\u{d7} length", [0.0, 1.5], 60, "max_bone_change"),
     row(LENGTHS, "Length of accepted intervals", "s", [0.0, 60.0], 60, "min_frames"),
 ];

@@ -65,7 +65,7 @@ pub const THRESHOLDS: [ThresholdGrid; 19] = [
     row!(max_rest_move, "maximum wrist movement of resting hands within a second", "shoulder widths", 0.0, 0.4),
     row!(max_jump, "maximum neck movement between two frames", "shoulder widths", 0.1, 2.1),
     row!(shot_threshold, "minimum shot score of the first frame of a shot", "", 0.0, 1.0),
-    row!(max_people, "maximum number of persons in view", "persons", 1.0, 21.0, u32),
+    row!(max_persons, "maximum number of persons in view", "persons", 1.0, 21.0, u32),
     row!(max_crowd_share, "maximum share of an interval with more persons", "", 0.0, 1.0),
     row!(min_frames, "minimum length of an accepted interval", "frames", 16.0, 176.0, usize),
 ];
@@ -93,7 +93,7 @@ impl ThresholdGrid {
     /// Value in the format of `pipeline.toml`.
     pub fn written(&self, value: f64) -> String {
         match self.key {
-            "max_people" | "min_frames" => format!("{value:.0}"),
+            "max_persons" | "min_frames" => format!("{value:.0}"),
             _ => format!("{value:?}"),
         }
     }
