@@ -86,7 +86,7 @@ demo: build
 		$(LAB) demo draw $(DEMO) --rendered --speech $(SPEECH) $(DRAW) && \
 		$(ORATOR) run -c $(DEMO)/pipeline.toml --set models.dir=$(ORATOR_MODELS); \
 	else \
-		echo 'The models for real people cannot be had (no network, or no npm): the speaker wears a suit of markers.'; \
+		echo 'No models for real persons are available (no network, or no npm): the speaker wears a suit of markers.'; \
 		$(LAB) demo draw $(DEMO) --speech $(SPEECH) $(DRAW) && $(ORATOR) run -c $(DEMO)/pipeline.toml; \
 	fi
 	$(ORATOR) train gan --dataset $(DEMO)/speech --out $(DEMO)/work/gan/spoken --steps $(or $(STEPS),$(SPOKEN_STEPS))

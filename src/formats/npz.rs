@@ -12,7 +12,7 @@ use std::io::{self, BufReader, BufWriter, Read as _, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use zip::ZipArchive;
 
-/// Maximum total size of the arrays of a file, bytes: a day of keypoints at 30 frames a second.
+/// Maximum total size of the arrays of a file, bytes: a day of keypoints at 30 fps.
 const MAX_BYTES: u64 = 2 << 30;
 
 /// An open `.npz` file.

@@ -73,15 +73,15 @@ pub(crate) fn run(args: &Args, progress: &dyn Progress) -> Result<Report> {
 
     let n_frames = args.frames as f64;
     let ratio = median(lifting.iter().zip(&inference).map(|(lifting, inference)| lifting / inference).collect());
-    let [frames_a_second, of_networks] = [&lifting, &inference].map(|secs| n_frames / median(secs.clone()));
+    let [frames_per_sec, of_networks] = [&lifting, &inference].map(|secs| n_frames / median(secs.clone()));
     let text = format!(
         "{n_frames} frames, body and both hands, median of {} rounds, one thread\n\
-         lifting         {frames_a_second:8.0} frames a second\n\
-         networks alone  {of_networks:8.0} frames a second: ratio {ratio:.3}",
+         lifting         {frames_per_sec:8.0} frames per second\n\
+         networks alone  {of_networks:8.0} frames per second: ratio {ratio:.3}",
         args.rounds
     );
     let facts = json!({
-        "n_frames": args.frames, "frames_a_second": frames_a_second, "frames_a_second_networks": of_networks,
+        "n_frames": args.frames, "frames_per_sec": frames_per_sec, "frames_per_sec_networks": of_networks,
         "ratio": ratio,
     });
     Ok(Report { text, facts })

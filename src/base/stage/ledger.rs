@@ -68,7 +68,7 @@ impl std::ops::AddAssign for WordCount {
     }
 }
 
-/// A accepted interval.
+/// An accepted interval.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct AcceptedInterval {
     pub start_secs: f64,

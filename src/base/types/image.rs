@@ -59,7 +59,7 @@ pub struct PixelArea {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct PictureOptions {
-    /// Deinterlace: one field of a frame is accepted, the other is interpolated where the two fields differ.
+    /// Deinterlace: one field of a frame is kept, the other is interpolated where the two fields differ.
     pub deinterlace: bool,
     /// Flip the picture horizontally.
     pub mirrored: bool,

@@ -77,7 +77,7 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     }
     let terms: Vec<_> = task.removals.iter().flat_map(|removal| removal.terms.clone()).collect();
     let mut searched = search(&task.folders, &terms).context("cannot verify the removal")?;
-    // A accepted model lists its training videos; it is reported as accepted instead.
+    // A model that stays lists its training videos; it is reported as such instead.
     searched.hits.retain(|hit| !accepted.iter().any(|model| Path::new(&hit.file).starts_with(model)));
     let mut text = match lines.is_empty() {
         true => vec![format!("found nothing to remove for {names}")],

@@ -1,6 +1,6 @@
 //! Streaming spectrogram of a sound: pieces are read one after another as spectrogram frames are requested in order,
 //! and samples that are no longer needed are dropped. Beyond its end the sound is extended by its mirror image, for
-//! which the tail is accepted.
+//! which the tail is kept.
 
 use anyhow::Result;
 use candle_core::{Device, Tensor};

@@ -192,7 +192,7 @@ mod tests {
         (predicted, ground_truth)
     }
 
-    /// Interval of [predicted, ground truth] at 15 frames a second.
+    /// Interval of [predicted, ground truth] at 15 fps.
     fn interval<'a>(
         [predicted, ground_truth]: [ArrayView3<'a, f32>; 2],
         mask: ArrayView2<'a, bool>,

@@ -198,7 +198,7 @@ fn add_scaled<T: Scalar>(to: &mut [T], scale: T, row: &[T]) {
 pub struct DropMask {
     seed: u32,
     threshold: u32,
-    /// Factor of the accepted values.
+    /// Factor of the kept values.
     pub scale: f64,
 }
 

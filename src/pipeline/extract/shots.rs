@@ -116,7 +116,7 @@ impl ShotFinder {
         }
     }
 
-    /// Non-repeated frame number `at`; `None` if it is no longer accepted.
+    /// Non-repeated frame number `at`; `None` if it has been dropped.
     fn recent(&self, at: usize) -> Option<&RecentFrame> {
         let first = self.frames.len() - self.recent.len();
         self.recent.get(at.checked_sub(first)?)

@@ -16,7 +16,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
 use std::time::Duration;
 
-/// Bytes of standard error that are accepted, counted from the end.
+/// Bytes of standard error that are stored, counted from the end.
 const MAX_STDERR_BYTES: usize = 2000;
 /// Interval between two checks of the limits.
 const TICK: Duration = Duration::from_secs(1);

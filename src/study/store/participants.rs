@@ -359,7 +359,7 @@ mod tests {
         }
         let left = all(&db).unwrap();
         assert_eq!(left.iter().map(|participant| participant.id.as_str()).collect::<Vec<_>>(), ["other-99"]);
-        // The identifier of a deleted participant may begin anew; a token of the earlier session stores nothing then.
+        // The identifier of a deleted participant may start again; a token of the earlier session stores nothing then.
         assert_eq!(session(&begin_as(&db, "own-0", "p", 29_700_001)), Some(1));
         let response = Response::Number(42);
         let [stalled_secs, unfocused_secs, response_secs] = [0.0; 3];

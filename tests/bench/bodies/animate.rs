@@ -34,7 +34,7 @@ const FPS: FrameRate = FrameRate::new(15, 1);
 
 pub(crate) fn run(args: &Args, progress: &dyn Progress) -> Result<Report> {
     ensure!(args.secs >= 1.0 && args.secs < 1e5, "--secs is {}, expected 1 to a hundred thousand", args.secs);
-    ensure!(args.rounds > 0 && args.fps > 0, "nothing to measure: there must be rounds and frames a second");
+    ensure!(args.rounds > 0 && args.fps > 0, "nothing to measure: there must be rounds and frames per second");
     let mut rng = ChaCha8Rng::seed_from_u64(1337);
     let speech = Speech::new(args.secs, &mut rng);
     let mut motion =

@@ -1,4 +1,4 @@
-//! Sound features for evaluation, computed on a stream of samples that are not accepted: onsets for the beat metrics,
+//! Sound features for evaluation, computed on a stream of samples that are not stored: onsets for the beat metrics,
 //! and a pooled spectrogram for the nearest neighbour.
 
 use crate::generate::mel_stream::mel_frames;

@@ -15,7 +15,7 @@ use serde::{Deserialize, Serialize};
 /// accurate enough.
 const FRONTAL: f64 = 0.1;
 const NEARLY_FRONTAL: f64 = 0.15;
-/// Largest number of accepted views, and least number of (most frontal) views for a portrait, if available.
+/// Largest number of stored views, and least number of (most frontal) views for a portrait, if available.
 const N_VIEWS: usize = 48;
 const MIN_VIEWS: usize = 12;
 /// Sampling grid of a region: columns, rows.

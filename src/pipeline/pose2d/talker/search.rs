@@ -1,6 +1,6 @@
 //! Mouth tracks of all people in a shot: people are detected every few frames and associated by overlap; while two or
 //! more are visible, the face model measures each mouth in every frame. Only one value per frame and person and the
-//! detected boxes are accepted.
+//! detected boxes are kept.
 
 use super::choice::{self, MouthOpening, ShotVoice};
 use super::path::{MIN_OVERLAP, TalkerPath};
