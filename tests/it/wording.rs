@@ -150,7 +150,7 @@ fn phrases_of_the_earlier_style_are_gone() {
             .iter()
             .any(|(phrase, _)| words.contains(&format!(" {phrase}")) || words.contains(&format!("\"{phrase}")))
     });
-    none(&wrong);
+    assert_none(&wrong);
 }
 
 #[test]
