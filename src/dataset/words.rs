@@ -92,7 +92,7 @@ impl VideoWords {
     }
 
     /// Transcript account with the words counted that are in samples with these start and end times, seconds.
-    pub fn account(&self, samples: impl IntoIterator<Item = (f64, f64)>) -> TranscriptReport {
+    pub fn report(&self, samples: impl IntoIterator<Item = (f64, f64)>) -> TranscriptReport {
         let n_accepted = samples.into_iter().map(|(start, end)| self.within(start, end).len()).sum();
         let mut account = self.account.clone();
         account.count.n_accepted = n_accepted;
@@ -156,7 +156,7 @@ mod tests {
             words.iter().map(|w| format!("{} {} {}", w.word, w.start_secs, w.end_secs)).collect::<Vec<_>>()
         };
         assert_eq!((at(0), at(1)), (vec!["a 0.1 0.3".to_owned()], vec!["b 0 0.3".to_owned(), "c 0.5 0.6".to_owned()]));
-        let WordCount { n_words, n_accepted, n_rejected, n_outside } = video_words.account(samples).count;
+        let WordCount { n_words, n_accepted, n_rejected, n_outside } = video_words.report(samples).count;
         assert_eq!((n_words, n_accepted, n_rejected, n_outside), (5, 3, 2, 0));
         let shifted = VideoWords::new(words, path, 10.0, 0.5).unwrap();
         assert_eq!(shifted.within(1.0, 2.0).len(), 1);
@@ -168,11 +168,11 @@ mod tests {
     #[test]
     fn a_few_words_after_the_end_are_dropped_with_a_note() {
         let rows: String = (0..20).map(|n| format!("{n} {} w\n", n + 1)).collect();
-        let account = VideoWords::new(transcript(&rows), Path::new("a.tsv"), 19.0, 0.0).unwrap().account([(0.0, 19.0)]);
+        let account = VideoWords::new(transcript(&rows), Path::new("a.tsv"), 19.0, 0.0).unwrap().report([(0.0, 19.0)]);
         assert_eq!((account.count.n_accepted, account.count.n_outside), (19, 1));
         assert!(account.notes[0].contains("`w` at 19.00 s"));
-        let missing = VideoWords::read(Some(Path::new("/none/a.tsv")), 1.0, 0.0).account([]);
+        let missing = VideoWords::read(Some(Path::new("/none/a.tsv")), 1.0, 0.0).report([]);
         assert!(missing.notes[0].starts_with("cannot read a.tsv"), "{:?}", missing.notes);
-        assert!(VideoWords::read(None, 1.0, 0.0).account([]).notes[0].contains("no transcript"));
+        assert!(VideoWords::read(None, 1.0, 0.0).report([]).notes[0].contains("no transcript"));
     }
 }

@@ -17,7 +17,7 @@ pub const PARTS: &str = ".parts";
 
 /// Work on a unit that is divided into parts.
 #[derive(Clone)]
-pub struct PartedWork<'a> {
+pub struct SplitWork<'a> {
     pub stage: &'a dyn Stage,
     pub unit: &'a Unit,
     pub n_parts: usize,
@@ -42,7 +42,7 @@ pub fn remove_parts(folder: &Path) -> Result<()> {
     workdir::remove(&parts).with_context(|| format!("cannot remove {}", parts.display()))
 }
 
-impl PartedWork<'_> {
+impl SplitWork<'_> {
     /// Runs a part, unless it is already done.
     ///
     /// # Errors
@@ -82,7 +82,7 @@ struct PoolState<'a> {
 /// A unit with parts in progress.
 struct SharedUnit<'a> {
     number: usize,
-    work: Arc<PartedWork<'a>>,
+    work: Arc<SplitWork<'a>>,
     next: usize,
     n_running: usize,
     failed: Option<anyhow::Error>,
@@ -99,7 +99,7 @@ impl<'a> WorkerPool<'a> {
     ///
     /// # Errors
     /// The first error of a part; no further part is started after it.
-    pub fn work(&self, work: PartedWork<'a>) -> Result<Vec<PathBuf>> {
+    pub fn work(&self, work: SplitWork<'a>) -> Result<Vec<PathBuf>> {
         let folders = (0..work.n_parts).map(|part| work.part_folder(part)).collect();
         let number = {
             let mut state = self.state();

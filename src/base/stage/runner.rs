@@ -4,7 +4,7 @@
 use super::attempt::{attempt, catch_panics};
 use super::fingerprint::{Fingerprint, HashCache};
 use super::overall::OverallProgress;
-use super::parts::{BusyGuard, PartedWork, WorkerPool, remove_parts};
+use super::parts::{BusyGuard, SplitWork, WorkerPool, remove_parts};
 use super::progress::{Event, Progress};
 use super::record::{DirtyReason, Failure, Record};
 use super::workdir::FolderLock;
@@ -146,7 +146,7 @@ pub fn run_parts(
     }
     let overall = OverallProgress::begin(&[stage], std::slice::from_ref(unit), progress);
     let folder = unit.dir(&work.join(stage.name()));
-    let parts = PartedWork { stage, unit, n_parts, fingerprint, folder, overall: &overall };
+    let parts = SplitWork { stage, unit, n_parts, fingerprint, folder, overall: &overall };
     let bound = |idx: usize| idx * n_parts / of.max(1);
     (bound(idx)..bound(idx + 1)).try_for_each(|part| catch_panics(|| parts.work_on(part)))
 }
@@ -206,7 +206,7 @@ fn run_unit<'a>(
             return attempt(&folder, stage.common_folder(), &fingerprint, |out| stage.run(unit, out, &progress));
         }
         let key = fingerprint.clone();
-        let parts = PartedWork { stage, unit, n_parts, fingerprint: key, folder: folder.clone(), overall };
+        let parts = SplitWork { stage, unit, n_parts, fingerprint: key, folder: folder.clone(), overall };
         let parts = pool.work(parts)?;
         let report = attempt(&folder, None, &fingerprint, |out| stage.join(unit, &parts, out))?;
         // What cannot be removed now is removed by the next run.

@@ -86,8 +86,8 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     text.extend(accepted.iter().map(|model| format!("retained, although trained on it: {}", model.display())));
     text.extend(task.advice.iter().cloned());
     text.extend(searched.hits.iter().map(|found| match found.at {
-        Some(at) => format!("FOUND   {} at byte {at}: {}", found.file, found.what),
-        None => format!("FOUND   {}: {} in the file name", found.file, found.what),
+        Some(at) => format!("FOUND   {} at byte {at}: {}", found.file, found.term),
+        None => format!("FOUND   {}: {} in the file name", found.file, found.term),
     }));
     let SearchReport { n_files, bytes, inside_bytes, hits } = &searched;
     text.push(format!(
@@ -96,7 +96,7 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
         counted(terms.len(), "name"),
         counted(hits.len(), "hit")
     ));
-    let found: Vec<_> = hits.iter().map(|hit| json!({ "file": hit.file, "at": hit.at, "term": hit.what })).collect();
+    let found: Vec<_> = hits.iter().map(|hit| json!({ "file": hit.file, "at": hit.at, "term": hit.term })).collect();
     let next = match &args.dataset {
         Some(dir) => verify_deep(dir),
         None => format!("orator status{}", args.config.flags()),

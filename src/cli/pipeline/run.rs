@@ -14,7 +14,7 @@ use orator_base::text::counted;
 use orator_cluster::plan::ClusterPlan;
 use orator_dataset::config::Settings;
 use orator_onnx::{ModelError, ModelStore};
-use orator_pipeline::pose2d::models::wanted;
+use orator_pipeline::pose2d::models::required_models;
 use orator_pipeline::segment::speech_rule::SpeechDetector;
 use orator_pipeline::{Pipeline, Selection, UnitFailure};
 use serde_json::json;
@@ -73,7 +73,8 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
         {
             let settings = &pipeline.config().settings;
             let Settings { models, pose2d, .. } = settings;
-            let models_used: Vec<_> = wanted(pose2d).into_iter().chain(SpeechDetector::wanted(settings)).collect();
+            let models_used: Vec<_> =
+                required_models(pose2d).into_iter().chain(SpeechDetector::required_models(settings)).collect();
             fetch(&ModelStore::open(&models.dir)?, &models_used, None, ui)?;
             pipeline.run(&selection, ui)?
         }

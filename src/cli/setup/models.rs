@@ -89,7 +89,10 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
                     let entries = store.manifest().models.iter().filter(is_available);
                     entries.map(|entry| ModelRequest::Id(entry.id.clone())).collect()
                 }
-                (false, []) => models::wanted(pose2d).into_iter().chain(SpeechDetector::wanted(&settings)).collect(),
+                (false, []) => models::required_models(pose2d)
+                    .into_iter()
+                    .chain(SpeechDetector::required_models(&settings))
+                    .collect(),
                 (false, ids) => ids.iter().cloned().map(ModelRequest::Id).collect(),
             };
             if find_library(&folder.onnxruntime, &folder.dir).is_err() {

@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct SearchTerm {
     /// Description shown to the user.
-    pub what: String,
+    pub term: String,
     pub bytes: Vec<u8>,
     /// Whether a match must not follow a letter, digit, `-` or `_` (`a.mp4` does not match `extra.mp4`).
     pub needs_boundary: bool,
@@ -21,26 +21,26 @@ pub struct SearchTerm {
 impl SearchTerm {
     /// Terms for a name, with a boundary before it: as it is, and as escaped in JSON, in HTML and in error messages,
     /// also with two of these escapes nested.
-    pub fn name(what: &str, name: &str) -> Vec<Self> {
+    pub fn name(term: &str, name: &str) -> Vec<Self> {
         let mut forms = BTreeSet::from([name.to_owned()]);
         for _ in 0..2 {
             let more: Vec<String> = forms.iter().flat_map(|form| escaped(form)).collect();
             forms.extend(more);
         }
         let term =
-            |form: String| Self { what: format!("{what} {name}"), bytes: form.into_bytes(), needs_boundary: true };
+            |form: String| Self { term: format!("{term} {name}"), bytes: form.into_bytes(), needs_boundary: true };
         forms.into_iter().map(term).collect()
     }
 
     /// Terms for a hexadecimal hash: as text, and (from 16 bytes on) as the bytes it encodes.
-    pub fn hash(what: &str, hex: &str) -> Vec<Self> {
-        let text = Self { what: format!("{what} {hex}"), bytes: hex.as_bytes().to_vec(), needs_boundary: false };
+    pub fn hash(term: &str, hex: &str) -> Vec<Self> {
+        let text = Self { term: format!("{term} {hex}"), bytes: hex.as_bytes().to_vec(), needs_boundary: false };
         let digit = |byte: u8| char::from(byte).to_digit(16);
         let pairs = hex.as_bytes().as_chunks::<2>().0.iter();
         let raw: Option<Vec<u8>> = pairs.map(|[a, b]| Some((16 * digit(*a)? + digit(*b)?) as u8)).collect();
         // Short byte sequences occur by chance: any 4 bytes about once in 4 GiB.
         let raw = raw.filter(|raw| raw.len() >= 16);
-        let raw = raw.map(|bytes| Self { what: format!("{what} {hex}, as bytes"), bytes, needs_boundary: false });
+        let raw = raw.map(|bytes| Self { term: format!("{term} {hex}, as bytes"), bytes, needs_boundary: false });
         [text].into_iter().chain(raw).collect()
     }
 }
@@ -61,7 +61,7 @@ pub struct SearchHit {
     pub file: String,
     /// Byte offset of the match; `None`: in the name of the file.
     pub at: Option<u64>,
-    pub what: String,
+    pub term: String,
 }
 
 /// Result of a search.
@@ -109,7 +109,7 @@ fn walk(root: &Path, path: &Path, terms: &[&SearchTerm], searched: &mut SearchRe
         let mut scan = Scan::new(terms);
         scan.piece(name.as_bytes());
         let found =
-            scan.found.into_iter().map(|(_, what)| SearchHit { file: path.display().to_string(), at: None, what });
+            scan.found.into_iter().map(|(_, term)| SearchHit { file: path.display().to_string(), at: None, term });
         searched.hits.extend(found);
     }
     if path.is_dir() && !path.is_symlink() {
@@ -127,7 +127,7 @@ fn walk(root: &Path, path: &Path, terms: &[&SearchTerm], searched: &mut SearchRe
     searched.n_files += 1;
     let (bytes, found) = scan(input::open(path).with_context(reading)?, terms).with_context(reading)?;
     searched.bytes += bytes;
-    let to_hit = |file: &str, (at, what)| SearchHit { file: file.to_owned(), at: Some(at), what };
+    let to_hit = |file: &str, (at, term)| SearchHit { file: file.to_owned(), at: Some(at), term };
     let file = path.display().to_string();
     searched.hits.extend(found.into_iter().map(|found| to_hit(&file, found)));
     if path.extension().is_some_and(|ending| ending == "npz" || ending == "zip") {
@@ -197,7 +197,7 @@ impl<'a> Scan<'a> {
                 let before = at.checked_sub(1).map(|before| bytes[before]);
                 let is_joined = before.is_some_and(|b| b.is_ascii_alphanumeric() || b == b'-' || b == b'_');
                 if new && !(term.needs_boundary && is_joined) {
-                    self.found.push((start + at as u64, term.what.clone()));
+                    self.found.push((start + at as u64, term.term.clone()));
                 }
             }
         }

@@ -172,7 +172,7 @@ fn to_accepted(
     let end_secs = fps.secs(n_frames);
     let timed = found.transcript.as_ref().filter(|_| !transcript.words.is_empty());
     let video_words = timed.map(|path| VideoWords::new(transcript.clone(), path, sound_secs, 0.0)).transpose()?;
-    let words = video_words.as_ref().map(|words| words.account([(0.0, end_secs)]));
+    let words = video_words.as_ref().map(|words| words.report([(0.0, end_secs)]));
     let transcript = transcript.until(end_secs);
     let word_json =
         |word: &Word| json!({ "start_secs": word.start_secs, "end_secs": word.end_secs, "word": word.word });

@@ -157,7 +157,7 @@ impl LiftedVideo {
     /// Statistics of the words in samples of these intervals.
     pub fn transcript_stats(&self, intervals: impl Iterator<Item = Interval>) -> Option<TranscriptReport> {
         let fps = self.intervals.fps;
-        self.words.as_ref().map(|words| words.account(intervals.map(|i| (fps.secs(i.start), fps.secs(i.end)))))
+        self.words.as_ref().map(|words| words.report(intervals.map(|i| (fps.secs(i.start), fps.secs(i.end)))))
     }
 
     /// Audio fingerprint codes (`audio::fingerprint`); `None` without audio. Memory: the codes, 0.45 MB per hour.

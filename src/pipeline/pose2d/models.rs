@@ -86,7 +86,7 @@ fn face_is_missing(config: &Pose2dConfig, store: &ModelStore) -> bool {
 }
 
 /// Models to pass to `ModelStore::fetch`, so that every model of the configuration is installed.
-pub fn wanted(config: &Pose2dConfig) -> Vec<ModelRequest> {
+pub fn required_models(config: &Pose2dConfig) -> Vec<ModelRequest> {
     let named = keys(config).into_iter().filter(|(_, _, id)| !id.is_empty());
     named
         .map(|(_, role, id)| if id == AUTO { ModelRequest::Role(role) } else { ModelRequest::Id(id.clone()) })

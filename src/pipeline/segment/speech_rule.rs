@@ -40,7 +40,7 @@ impl SpeechDetector {
     }
 
     /// Model to pass to `ModelStore::fetch`, unless only loudness is requested.
-    pub fn wanted(settings: &Settings) -> Option<ModelRequest> {
+    pub fn required_models(settings: &Settings) -> Option<ModelRequest> {
         (settings.segment.speech != SpeechRule::Loudness).then_some(ModelRequest::Role(ModelRole::Speech))
     }
 

@@ -84,7 +84,7 @@ fn are_arms_detected(clip: &RenderedClip, t: usize) -> bool {
 pub struct MaskCounts {
     /// Number of joints in accepted frames that the mask marks as visible, and the share of them that is visible.
     pub n_masked: usize,
-    pub truly_visible: f64,
+    pub visible_share: f64,
     /// Number of visible joints in accepted frames, and the share of them that the mask marks as visible.
     pub n_visible: usize,
     pub masked: f64,
@@ -104,7 +104,7 @@ impl MaskCounts {
                 }
             }
         }
-        Self { n_masked, truly_visible: share(n_both, n_masked), n_visible, masked: share(n_both, n_visible) }
+        Self { n_masked, visible_share: share(n_both, n_masked), n_visible, masked: share(n_both, n_visible) }
     }
 }
 

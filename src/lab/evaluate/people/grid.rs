@@ -117,7 +117,7 @@ fn seconds(rows: &[ConditionRow]) -> Grid {
     let cells = |ConditionRow { condition, seconds: s, mask: m, .. }: &ConditionRow| {
         let mut cells: Vec<String> =
             [s.total, s.accepted, s.false_accepts, s.false_rejects].map(|secs| number(secs, 1)).into();
-        cells.extend([m.truly_visible, m.masked].map(percent));
+        cells.extend([m.visible_share, m.masked].map(percent));
         (condition.clone(), cells)
     };
     Grid {
