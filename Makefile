@@ -37,7 +37,7 @@ build: setup runtime
 	cargo build --release --locked --workspace
 
 # Integration tests that do not start other programs or load ONNX Runtime and take a few seconds.
-QUICK := house:: wording:: vocabulary:: lift:: segment::segment cli::guide cli::completions animate::animate:: animate::bvh animate::motion_files \
+QUICK := source_tree:: wording:: vocabulary:: lift:: segment::segment cli::guide cli::completions animate::animate:: animate::bvh animate::motion_files \
 	dataset::shard:: dataset::dataset_verify dataset::import_readers evaluate::metrics evaluate::golden_metrics \
 	train::networks train::operators robustness::runner
 

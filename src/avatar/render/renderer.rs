@@ -230,7 +230,7 @@ mod tests {
         let (floor, ball) = (floor(0.0, 0.0, 60.0), ball([0.0, 20.0, 0.0], 6.0, 8));
         let mut renderer = Renderer::new([200, 160]);
         let together = renderer.draw(&camera, &[&floor, &ball], &light, &black());
-        let on_floor = |x: f64| camera.pixel(camera.see([x, 0.0, 0.0])).map(f64::round);
+        let on_floor = |x: f64| camera.pixel(camera.to_camera_axes([x, 0.0, 0.0])).map(f64::round);
         let at = |x: f64| together.pixel(on_floor(x)[0] as usize, on_floor(x)[1] as usize)[0];
         // The light comes from +x at 45 degrees, so from a height of 20 cm the shadow falls 20 cm towards -x.
         assert!(at(-20.0) < 140 && at(20.0) > 180 && at(-40.0).abs_diff(at(40.0)) < 12, "{} {}", at(-20.0), at(20.0));

@@ -157,7 +157,7 @@ mod tests {
         let (floor, cube) = (floor(), cube([0.0, 20.0, 0.0], 10.0));
         let mut renderer = Renderer::new([200, 160]);
         let over = renderer.draw(&camera, &[&cube], &light, &background(&camera, &[&floor], &light, black()));
-        let on_floor = |x: f64| camera.pixel(camera.see([x, 0.0, 0.0])).map(f64::round);
+        let on_floor = |x: f64| camera.pixel(camera.to_camera_axes([x, 0.0, 0.0])).map(f64::round);
         for image in [&over, &background(&camera, &[&floor, &cube], &light, black()).image] {
             let at = |x: f64| image.pixel(on_floor(x)[0] as usize, on_floor(x)[1] as usize)[0];
             // The light comes from +x at 45 degrees: 20 cm up, the shadow falls 20 cm towards -x.
@@ -166,7 +166,7 @@ mod tests {
         }
         let (mesh, label, depth) = renderer.label_at(on_floor(20.0)).unwrap();
         assert_eq!((mesh, label), (1, 0));
-        assert!((depth - camera.see([20.0, 0.0, 0.0])[2]).abs() < 1.0);
+        assert!((depth - camera.to_camera_axes([20.0, 0.0, 0.0])[2]).abs() < 1.0);
     }
 
     #[test]

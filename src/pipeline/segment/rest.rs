@@ -14,7 +14,7 @@ const HALF_WINDOW_SECS: f64 = 0.5;
 /// Quantile of the distances that counts as movement, so that single outliers are ignored.
 const QUANTILE: f64 = 0.8;
 /// Value where the wrists are apart or not visible.
-pub const APART: f32 = 10.0;
+pub const NOT_RESTING: f32 = 10.0;
 
 /// Distance of the wrists from their median position in the second around each frame (the larger of the two, 0.8
 /// quantile), in shoulder widths, [T].
@@ -22,7 +22,7 @@ pub fn movement(keypoints: &Keypoints) -> Vec<f32> {
     let wrists: Vec<Option<[f32; 4]>> = keypoints.body.outer_iter().map(|body| wrists(&body)).collect();
     let half_window = (HALF_WINDOW_SECS * keypoints.fps.per_sec()).round() as usize;
     let around = |t: usize| &wrists[t.saturating_sub(half_window)..wrists.len().min(t + half_window + 1)];
-    (0..wrists.len()).map(|t| spread(wrists[t], around(t)).unwrap_or(APART)).collect()
+    (0..wrists.len()).map(|t| spread(wrists[t], around(t)).unwrap_or(NOT_RESTING)).collect()
 }
 
 /// Left and right wrist relative to the neck (x, y, x, y), in shoulder widths; `None` if a point is not visible.
@@ -70,15 +70,15 @@ mod tests {
     fn static_wrists_close_together_are_resting() {
         let static_wrists = movement(&seated(40.0, |t| if t == 20 { 90.0 } else { (t % 2) as f32 }));
         assert!(
-            static_wrists.iter().enumerate().all(|(t, &m)| if t == 20 { m == APART } else { m < 0.02 }),
+            static_wrists.iter().enumerate().all(|(t, &m)| if t == 20 { m == NOT_RESTING } else { m < 0.02 }),
             "{static_wrists:?}"
         );
         let stroke =
             movement(&seated(40.0, |t| if (20..40).contains(&t) { (20 - t.abs_diff(30)) as f32 } else { 0.0 }));
         assert!(stroke[5] == 0.0 && stroke[24] > 0.05, "{stroke:?}");
-        assert!(movement(&seated(70.0, |_| 0.0)).iter().all(|&m| m == APART), "apart");
+        assert!(movement(&seated(70.0, |_| 0.0)).iter().all(|&m| m == NOT_RESTING), "apart");
         let mut hidden = seated(40.0, |_| 0.0);
         hidden.body.slice_mut(s![.., coco::L_WRIST, 2]).fill(0.1);
-        assert!(movement(&hidden).iter().all(|&m| m == APART));
+        assert!(movement(&hidden).iter().all(|&m| m == NOT_RESTING));
     }
 }

@@ -178,7 +178,7 @@ mod tests {
             let view = camera.at(fps.secs(t), neck, [640, 360]);
             for [j, point] in PAIRS {
                 let [x, y, z] = joint(j, t).map(|v| 100.0 * v);
-                let px = view.pixel(view.see(add(neck, [x, -y, -z])));
+                let px = view.pixel(view.to_camera_axes(add(neck, [x, -y, -z])));
                 let known = [0, 1].map(|k| f64::from(keypoints.body[[t, point, k]]));
                 assert!((px[0] - known[0]).hypot(px[1] - known[1]) < 3.0, "frame {t}: {px:?} for {known:?}");
             }

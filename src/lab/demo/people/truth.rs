@@ -141,7 +141,7 @@ impl FrameTruth {
         let positions = rig.skeleton.positions(pose.root, &pose.local);
         let world = points(actor, pose, &positions);
         let (renderer, counts) = drawn;
-        let seen = world.map(|at| camera.see(at));
+        let seen = world.map(|at| camera.to_camera_axes(at));
         let px = seen.map(|at| camera.pixel(at));
         let [width, height] = camera.size.map(|n| n as f64 - 0.5);
         let visible = std::array::from_fn(|point| {
@@ -151,7 +151,7 @@ impl FrameTruth {
             }
             owners.visibility(point, seen[point][2], renderer.label_at(px[point]), counts)
         });
-        let joints = rig.positions.map(|joint| scale(camera.see(positions[joint]), 0.01));
+        let joints = rig.positions.map(|joint| scale(camera.to_camera_axes(positions[joint]), 0.01));
         let head = head_degrees(camera.axes * rig.skeleton.world(&pose.local)[rig.head]);
         let body = std::array::from_fn(|point| scale(seen[point], 0.01));
         Self { px, seen: visible, joints, body, head, mouth: pose.mouth }
