@@ -5,6 +5,7 @@ use crate::cli::Outcome;
 use crate::cli::sandbox::enter_sandbox;
 use crate::cli::ui::Ui;
 use anyhow::Result;
+use orator_base::stage::rejection::Rejection;
 use orator_base::text::{counted, length, number};
 use orator_dataset::config::SplitUnit;
 use orator_dataset::split::SplitRule;
@@ -113,7 +114,12 @@ fn info(dir: &std::path::Path, ui: &Ui) -> Result<Outcome> {
     }
     let footage = &stats.footage;
     lines.push(format!("accepted {} of {} of video", length(footage.accepted_secs), length(footage.secs)));
-    lines.extend(footage.rejected_secs.iter().map(|(reason, secs)| format!("  rejected, {reason}: {}", length(*secs))));
+    lines.extend(
+        footage
+            .rejected_secs
+            .iter()
+            .map(|(reason, secs)| format!("  rejected, {}: {}", Rejection::label(reason), length(*secs))),
+    );
     lines.push(format!(
         "  failed: {}, and {} of unknown duration",
         length(footage.failed_secs),
