@@ -207,7 +207,7 @@ struct LoadingRates {
 /// Loads random batches as training does, then trains on the same dataset.
 fn loader(args: &Args, dir: &Path, out: &Path) -> Result<LoadingRates> {
     let settings = config::GanConfig {
-        recipe: config::GanRecipe::Paper,
+        recipe: config::GanRecipe::Rebol2021,
         preset: config::NetworkPreset::Light,
         window_frames: 64,
         stride_frames: 5,

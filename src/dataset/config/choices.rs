@@ -6,8 +6,10 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum NetworkPreset {
-    /// Small network for CPUs: convolutions over time only.
+    /// Chosen by the recipe; replaced before training.
     #[default]
+    Auto,
+    /// Small network for CPUs: convolutions over time only.
     Light,
     /// Network of Rebol et al. (2021): convolutions over time and frequency.
     Paper,
@@ -17,8 +19,10 @@ pub enum NetworkPreset {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum MotionRepresentation {
-    /// Bone directions; bone lengths are constant by construction.
+    /// Chosen by the recipe; replaced before training.
     #[default]
+    Auto,
+    /// Bone directions; bone lengths are constant by construction.
     Bones,
     /// Joint positions, as in Rebol et al. (2021).
     Positions,
@@ -28,13 +32,31 @@ pub enum MotionRepresentation {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum AdversarialLoss {
+    /// Chosen by the recipe; replaced before training.
+    #[default]
+    Auto,
     /// Least squares (Mao et al. 2017), as in the code that Rebol et al. (2021) built on: scores of real motion are
     /// pushed towards 1, scores of generated motion towards 0.
-    #[default]
     LeastSquares,
-    /// Cross entropy with the scores as logits (Goodfellow et al. 2014; the equation in Rebol et al. 2021). The
-    /// generator minimises the non-saturating form, -log D(generated) instead of log(1 - D(generated)).
+    /// Cross entropy with the scores as logits (Goodfellow et al. 2014). The generator minimises the non-saturating form,
+    /// -log D(generated) instead of log(1 - D(generated)).
     Log,
+    /// The minimax game as written in Rebol et al. (2021), eq. 3: the generator minimises log(1 - D(generated)), whose
+    /// gradient vanishes where the discriminator is certain.
+    Minimax,
+}
+
+/// Form of the bone length loss (Rebol et al. 2021, eq. 1, second term).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum BoneLoss {
+    /// Chosen by the recipe; replaced before training.
+    #[default]
+    Auto,
+    /// Change of each bone's length relative to the speaker's length of that bone, averaged over the bones.
+    Relative,
+    /// Change of the bone lengths in metres, summed over the bones (the 1-norm of eq. 1).
+    Metres,
 }
 
 /// Rule by which the stage pose2d selects one of several visible persons.
@@ -137,6 +159,8 @@ pub enum GanRecipe {
     /// Chosen by the minutes of speech in the dataset.
     #[default]
     Auto,
-    /// Settings of Rebol et al. (2021) and the code they built on, for many hours of speech.
-    Paper,
+    /// System of Rebol et al. (2021), with the values of the code they built on (Ginosar et al. 2019) where the paper
+    /// states none; for many hours of speech.
+    #[serde(alias = "paper")]
+    Rebol2021,
 }

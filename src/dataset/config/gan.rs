@@ -3,7 +3,7 @@
 //! and the guide (`configuration`) document the keys.
 
 use super::auto::{AUTO, Auto};
-use super::choices::{AdversarialLoss, ComputeDevice, GanRecipe, MotionRepresentation, NetworkPreset};
+use super::choices::{AdversarialLoss, BoneLoss, ComputeDevice, GanRecipe, MotionRepresentation, NetworkPreset};
 use super::sections::KeyRanges;
 use orator_base::types::posture::PostureChannel;
 use serde::{Deserialize, Serialize};
@@ -33,8 +33,8 @@ macro_rules! gan_values {
 
 gan_values! { |number, count|
     recipe: GanRecipe = GanRecipe::Auto,
-    preset: NetworkPreset = NetworkPreset::Light,
-    representation: MotionRepresentation = MotionRepresentation::Bones,
+    preset: NetworkPreset = NetworkPreset::Auto,
+    representation: MotionRepresentation = MotionRepresentation::Auto,
     channels: Vec<PostureChannel> = Vec::new(),
     window_frames: usize = 64 => (32.0, 4096.0, "frames"),
     stride_frames: usize = 5 => (1.0, 4096.0, "frames"),
@@ -45,13 +45,14 @@ gan_values! { |number, count|
     warmup_steps: C = count => (0.0, 1e9, "steps"),
     #[serde(alias = "fade_to")]
     final_lr_ratio: N = number => (0.0, 1.0, ""),
-    adversarial: AdversarialLoss = AdversarialLoss::LeastSquares,
+    adversarial: AdversarialLoss = AdversarialLoss::Auto,
     lambda_l1: f64 = 1.0 => (0.0, 1e4, ""),
     lambda_speed: N = number => (0.0, 1e4, ""),
     lambda_energy: N = number => (0.0, 1e4, ""),
     lambda_velocity: f64 = 0.0 => (0.0, 1e4, ""),
     lambda_gan: N = number => (0.0, 1e4, ""),
-    lambda_bone: f64 = 0.1 => (0.0, 1e4, ""),
+    lambda_bone: N = number => (0.0, 1e4, ""),
+    bone_loss: BoneLoss = BoneLoss::Auto,
     adversarial_from: C = count => (0.0, 1e9, "steps"),
     adversarial_ramp: C = count => (0.0, 1e9, "steps"),
     ema_decay: N = number => (0.0, 0.999_999, ""),
@@ -84,12 +85,16 @@ impl Default for GanConfig {
     }
 }
 
-/// Values of keys that are missing in a checkpoint: program versions without recipes trained with the settings of
-/// `paper`.
+/// Values of keys that are missing in a checkpoint of an earlier program version.
 impl Default for GanSettings {
     fn default() -> Self {
         Self {
-            recipe: GanRecipe::Paper,
+            recipe: GanRecipe::Rebol2021,
+            preset: NetworkPreset::Light,
+            representation: MotionRepresentation::Bones,
+            adversarial: AdversarialLoss::LeastSquares,
+            lambda_bone: 0.1,
+            bone_loss: BoneLoss::Relative,
             shared_rate: 1.0,
             final_lr_ratio: 1.0,
             augment_noise_db: -120.0,
@@ -103,14 +108,14 @@ impl GanConfig {
     ///
     /// # Errors
     /// An `"auto"` key for which the recipe has no value, or a fraction for a count.
-    pub fn filled(&self, recipe: impl Fn(&str) -> Option<f64>) -> serde_json::Result<GanSettings> {
+    pub fn filled(&self, recipe: impl Fn(&str) -> Option<Value>) -> serde_json::Result<GanSettings> {
         let mut values = serde_json::to_value(self)?;
         for (key, value) in values.as_object_mut().into_iter().flatten() {
             if *value == AUTO
                 && key != "recipe"
                 && let Some(chosen) = recipe(key)
             {
-                *value = number(chosen);
+                *value = chosen;
             }
         }
         serde_json::from_value(values)
@@ -118,7 +123,7 @@ impl GanConfig {
 }
 
 /// JSON number; a non-negative value without fraction becomes an integer, so that it is accepted for a count.
-fn number(value: f64) -> Value {
+pub fn number(value: f64) -> Value {
     if value.fract() == 0.0 && value >= 0.0 { json!(value as u64) } else { json!(value) }
 }
 
@@ -171,9 +176,21 @@ mod tests {
     #[test]
     fn a_recipe_fills_in_only_missing_values() {
         let asked = GanConfig { steps: 400.into(), dropout: 0.0.into(), ..GanConfig::default() };
-        let filled = asked.filled(|key| Some(if key == "augment_noise_db" { -0.5 } else { 7.0 })).unwrap();
-        let expected = GanSettings { steps: 400, dropout: 0.0, augment_noise_db: -0.5, ..GanSettings::with(7.0, 7) };
+        let chosen = |key: &str| match key {
+            "augment_noise_db" => json!(-0.5),
+            "preset" => json!("paper"),
+            "representation" | "adversarial" | "bone_loss" => json!("auto"),
+            _ => number(7.0),
+        };
+        let filled = asked.filled(|key| Some(chosen(key))).unwrap();
+        let expected = GanSettings {
+            steps: 400,
+            dropout: 0.0,
+            augment_noise_db: -0.5,
+            preset: NetworkPreset::Paper,
+            ..GanSettings::with(7.0, 7)
+        };
         assert_eq!(filled, expected);
-        assert!(asked.filled(|_| None).is_err() && asked.filled(|_| Some(0.5)).is_err());
+        assert!(asked.filled(|_| None).is_err() && asked.filled(|_| Some(json!(0.5))).is_err());
     }
 }

@@ -18,12 +18,12 @@ pub mod videos;
 
 pub use auto::Auto;
 pub use choices::{
-    AdversarialLoss, ComputeDevice, ContinuityLoss, DistanceLoss, FollowRule, GanRecipe, MotionRepresentation,
+    AdversarialLoss, BoneLoss, ComputeDevice, ContinuityLoss, DistanceLoss, FollowRule, GanRecipe, MotionRepresentation,
     NetworkPreset, SequenceNetwork, SpeechRule, SplitUnit, VarianceLoss,
 };
 pub use file::{Problem, SourceLocation};
 pub use former::to_stored;
-pub use gan::{GanConfig, GanSettings};
+pub use gan::{GanConfig, GanSettings, number};
 pub use keypoints::KeypointSource;
 pub use load::{Config, ConfigError, DEFAULT_FILE, load, load_default};
 pub use sections::*;

@@ -65,7 +65,7 @@ struct FixedBatch {
 impl FixedBatch {
     fn new(args: &Args) -> Result<Self> {
         let preset = serde_json::from_value(json!(args.preset))?;
-        let config = GanConfig { recipe: GanRecipe::Paper, preset, batch: args.batch.into(), ..GanConfig::default() };
+        let config = GanConfig { recipe: GanRecipe::Rebol2021, preset, batch: args.batch.into(), ..GanConfig::default() };
         let settings = recipe::settings(
             &config,
             &TrainingMaterial { train_secs: 0.0, validation_secs: 0.0, n_speakers: 1 },

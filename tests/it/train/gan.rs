@@ -18,7 +18,15 @@ use std::panic::AssertUnwindSafe;
 use std::path::Path;
 
 fn settings() -> GanConfig {
-    let gan = GanConfig { recipe: GanRecipe::Paper, batch: 2.into(), window_frames: 32, ..GanConfig::default() };
+    let gan = GanConfig {
+        recipe: GanRecipe::Rebol2021,
+        preset: NetworkPreset::Light,
+        representation: MotionRepresentation::Bones,
+        adversarial: AdversarialLoss::LeastSquares,
+        batch: 2.into(),
+        window_frames: 32,
+        ..GanConfig::default()
+    };
     GanConfig { steps: 6.into(), epoch_steps: 3.into(), checkpoint_every: 2, keep_checkpoints: 2, ..gan }
 }
 

@@ -188,7 +188,7 @@ mod tests {
             let [first, last] = change.masked_bands;
             assert!(last - first <= of.augment_mask_bands && last <= mel::N_MELS);
         }
-        assert!(changes(&of_minutes(GanRecipe::Paper, 10.0), 3, fps).is_empty());
+        assert!(changes(&of_minutes(GanRecipe::Rebol2021, 10.0), 3, fps).is_empty());
     }
 
     #[test]

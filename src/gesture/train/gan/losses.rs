@@ -3,7 +3,7 @@
 use crate::generate::normalisation::{N_FEATURES, Normalisation};
 use candle_core::{DType, Device, Result, Tensor};
 use orator_base::types::skeleton::{L_HAND, L_WRIST, N_JOINTS, NECK, R_HAND, R_WRIST, is_duplicate, parent};
-use orator_dataset::config::AdversarialLoss;
+use orator_dataset::config::{AdversarialLoss, BoneLoss};
 use orator_nn::gan::discriminator::motion;
 
 /// Value of a scalar f32 tensor.
@@ -64,18 +64,22 @@ pub fn both_visible(mask: &Tensor) -> Result<Tensor> {
 /// Scalar loss of the discriminator for its scores (of any shape) of real and of generated motion.
 pub fn discriminator_loss(loss: AdversarialLoss, real_scores: &Tensor, generated_scores: &Tensor) -> Result<Tensor> {
     match loss {
-        AdversarialLoss::LeastSquares => {
+        AdversarialLoss::Auto | AdversarialLoss::LeastSquares => {
             (real_scores - 1.0)?.sqr()?.mean_all()? + generated_scores.sqr()?.mean_all()?
         }
-        AdversarialLoss::Log => softplus(&real_scores.neg()?)?.mean_all()? + softplus(generated_scores)?.mean_all()?,
+        AdversarialLoss::Log | AdversarialLoss::Minimax => {
+            softplus(&real_scores.neg()?)?.mean_all()? + softplus(generated_scores)?.mean_all()?
+        }
     }
 }
 
 /// Scalar adversarial loss of the generator for the discriminator's scores (of any shape) of generated motion.
 pub fn generator_loss(loss: AdversarialLoss, generated_scores: &Tensor) -> Result<Tensor> {
     match loss {
-        AdversarialLoss::LeastSquares => (generated_scores - 1.0)?.sqr()?.mean_all(),
+        AdversarialLoss::Auto | AdversarialLoss::LeastSquares => (generated_scores - 1.0)?.sqr()?.mean_all(),
         AdversarialLoss::Log => softplus(&generated_scores.neg()?)?.mean_all(),
+        // log(1 - D) = -softplus(score).
+        AdversarialLoss::Minimax => softplus(generated_scores)?.neg()?.mean_all(),
     }
 }
 
@@ -84,8 +88,9 @@ fn softplus(x: &Tensor) -> Result<Tensor> {
     x.relu()? + (x.abs()?.neg()?.exp()? + 1.0)?.log()?
 }
 
-/// Bone length constancy loss (Rebol et al. 2021, eq. 1): mean absolute change of each bone's length between
-/// consecutive frames, relative to the speaker's length of that bone. Holds the tables for the computation.
+/// Bone length constancy loss (Rebol et al. 2021, eq. 1): absolute change of the bone lengths between consecutive
+/// frames, averaged over frames and batch; summed over the bones in metres, or averaged over the bones relative to the
+/// speaker's length of each ([`BoneLoss`]). Holds the tables for the computation.
 pub struct BoneConstancy {
     mean: Tensor,
     std: Tensor,
@@ -93,14 +98,16 @@ pub struct BoneConstancy {
     children: Tensor,
     /// Coordinate rows of the joints at the near ends.
     parents: Tensor,
-    /// 1 / length, [1, n_bones, 1].
-    inverse_lengths: Tensor,
+    /// Weight of each bone's change, [1, n_bones, 1]: 1, or 1 / length of the bone.
+    weights: Tensor,
+    /// Whether the changes are averaged over the bones instead of summed.
+    is_mean: bool,
 }
 
 impl BoneConstancy {
     /// Loss over the bones of known length, without those to the hand roots, which coincide with the wrists.
-    pub fn new(normal: &Normalisation, dtype: DType, device: &Device) -> Result<Self> {
-        let (mut children, mut parents, mut inverse) = (Vec::new(), Vec::new(), Vec::new());
+    pub fn new(normal: &Normalisation, form: BoneLoss, dtype: DType, device: &Device) -> Result<Self> {
+        let (mut children, mut parents, mut weights) = (Vec::new(), Vec::new(), Vec::new());
         for joint in 1..N_JOINTS {
             let length = f64::from(normal.bone_lengths.get(joint - 1).copied().unwrap_or(0.0));
             if is_duplicate(joint) || length < 1e-3 {
@@ -113,7 +120,7 @@ impl BoneConstancy {
             };
             children.extend((0..3).map(|k| (3 * joint + k) as u32));
             parents.extend((0..3).map(|k| (3 * from + k) as u32));
-            inverse.push(1.0 / length);
+            weights.push(if form == BoneLoss::Metres { 1.0 } else { 1.0 / length });
         }
         let column = |values: &[f32]| Tensor::new(values, device)?.to_dtype(dtype)?.reshape((1, (), 1));
         Ok(Self {
@@ -121,14 +128,15 @@ impl BoneConstancy {
             std: column(&normal.std)?,
             children: Tensor::new(children, device)?,
             parents: Tensor::new(parents, device)?,
-            inverse_lengths: Tensor::new(inverse, device)?.to_dtype(dtype)?.reshape((1, (), 1))?,
+            is_mean: form != BoneLoss::Metres,
+            weights: Tensor::new(weights, device)?.to_dtype(dtype)?.reshape((1, (), 1))?,
         })
     }
 
     /// Loss of normalised poses [B, 144 or more, T]; trailing channels (head, trunk) are ignored.
     pub fn loss(&self, poses: &Tensor) -> Result<Tensor> {
         let (batch, n_features, n_frames) = poses.dims3()?;
-        let n_bones = self.inverse_lengths.dim(1)?;
+        let n_bones = self.weights.dim(1)?;
         if n_bones == 0 || n_frames < 2 || n_features < N_FEATURES {
             return poses.zeros_like()?.mean_all();
         }
@@ -139,9 +147,10 @@ impl BoneConstancy {
         let bones = (joints.index_select(&self.children, 1)? - joints.index_select(&self.parents, 1)?)?;
         let squares = bones.reshape((batch, n_bones, 3, n_frames))?.sqr()?.sum(2)?;
         // The derivative of the root is infinite at 0. The offset is a length of 0.1 mm.
-        let lengths = (squares + 1e-8)?.sqrt()?.broadcast_mul(&self.inverse_lengths)?;
+        let lengths = (squares + 1e-8)?.sqrt()?.broadcast_mul(&self.weights)?;
         let change = (lengths.narrow(2, 1, n_frames - 1)? - lengths.narrow(2, 0, n_frames - 1)?)?;
-        change.abs()?.mean_all()
+        let mean = change.abs()?.mean_all()?;
+        if self.is_mean { Ok(mean) } else { mean * n_bones as f64 }
     }
 }
 
@@ -163,7 +172,7 @@ mod tests {
         let mask = pattern(&shape, 9.0)?.gt(0.0)?.to_dtype(DType::F64)?;
         assert!(worst(std::slice::from_ref(&generated), |v| l1(&v[0], &real, &mask))? < 1e-7);
         assert!(worst(std::slice::from_ref(&generated), |v| velocity(&v[0], &real, &mask))? < 1e-7);
-        for loss in [AdversarialLoss::LeastSquares, AdversarialLoss::Log] {
+        for loss in [AdversarialLoss::LeastSquares, AdversarialLoss::Log, AdversarialLoss::Minimax] {
             assert!(worst(&[generated.clone(), real.clone()], |v| discriminator_loss(loss, &v[0], &v[1]))? < 1e-7);
             assert!(worst(std::slice::from_ref(&generated), |v| generator_loss(loss, &v[0]))? < 1e-7);
         }
@@ -172,8 +181,10 @@ mod tests {
         let mask = pattern(&shape, 9.0)?.gt(-0.8)?.to_dtype(DType::F64)?;
         assert!(worst(std::slice::from_ref(&poses), |v| speed(&v[0], &real, &mask))? < 1e-6);
         assert!(worst(&[poses], |v| energy(&v[0], &real, &mask))? < 1e-6);
-        let bones = BoneConstancy::new(&normal(), DType::F64, &Device::Cpu)?;
-        assert!(worst(&[pattern(&[2, N_FEATURES, 3], 0.0)?], |v| bones.loss(&v[0]))? < 1e-6);
+        for form in [BoneLoss::Relative, BoneLoss::Metres] {
+            let bones = BoneConstancy::new(&normal(), form, DType::F64, &Device::Cpu)?;
+            assert!(worst(&[pattern(&[2, N_FEATURES, 3], 0.0)?], |v| bones.loss(&v[0]))? < 1e-6);
+        }
         Ok(())
     }
 
@@ -244,13 +255,50 @@ mod tests {
 
     #[test]
     fn only_changing_bone_lengths_are_penalised() -> Result<()> {
-        let bones = BoneConstancy::new(&normal(), DType::F64, &Device::Cpu)?;
+        let bones = BoneConstancy::new(&normal(), BoneLoss::Relative, DType::F64, &Device::Cpu)?;
         let constant = pattern(&[1, N_FEATURES, 1], 0.0)?.broadcast_as((1, N_FEATURES, 5))?.contiguous()?;
         assert!(bones.loss(&constant)?.to_scalar::<f64>()? < 1e-12);
         let moving = pattern(&[1, N_FEATURES, 5], 0.0)?;
         let loss = bones.loss(&moving)?.to_scalar::<f64>()?;
         let with_channels = Tensor::cat(&[&moving, &pattern(&[1, 6, 5], 7.0)?], 1)?;
         assert!(loss > 0.01 && loss == bones.loss(&with_channels)?.to_scalar::<f64>()?);
+        Ok(())
+    }
+
+    /// One upper arm of 0.2 m gets longer by 0.06 m in the second of two frames; all other bones keep their lengths.
+    #[test]
+    fn bone_losses_match_hand_computed_values() -> Result<()> {
+        let table = |value: f32| Array2::from_shape_fn((N_JOINTS, 3), |_| value);
+        let normal = Normalisation::new(&table(0.0), &table(1.0), vec![0.2; N_JOINTS - 1]);
+        let mut joints = vec![[0.0f64; 3]; N_JOINTS];
+        for joint in 1..N_JOINTS {
+            let from = joints[parent(joint).unwrap_or(NECK)];
+            let step = if is_duplicate(joint) { 0.0 } else { 0.2 };
+            joints[joint] = [from[0] + step, from[1], from[2]];
+        }
+        // The elbow and all joints beyond it move along the bone, so that only the upper arm changes.
+        let moved = |joint: usize| std::iter::successors(Some(joint), |at| parent(*at)).any(|at| at == 2);
+        let rows = (1..N_JOINTS).flat_map(|joint| {
+            let [x, y, z] = joints[joint];
+            let after = x + if moved(joint) { 0.06 } else { 0.0 };
+            [x, after, y, y, z, z]
+        });
+        let poses = Tensor::from_vec(rows.collect::<Vec<f64>>(), (1, N_FEATURES, 2), &Device::Cpu)?;
+        let n_bones = (1..N_JOINTS).filter(|joint| !is_duplicate(*joint)).count() as f64;
+        for (form, expected) in [(BoneLoss::Metres, 0.06), (BoneLoss::Relative, 0.06 / 0.2 / n_bones)] {
+            let loss = BoneConstancy::new(&normal, form, DType::F64, &Device::Cpu)?.loss(&poses)?.to_scalar::<f64>()?;
+            assert!((loss - expected).abs() < 1e-6, "{form:?}: {loss}, expected {expected}");
+        }
+        Ok(())
+    }
+
+    #[test]
+    fn the_minimax_generator_loss_is_the_negated_fake_term() -> Result<()> {
+        let scores = Tensor::new(&[0.0f64, 2.0, -2.0, 90.0, -90.0], &Device::Cpu)?;
+        let loss = generator_loss(AdversarialLoss::Minimax, &scores)?.to_scalar::<f64>()?;
+        let log = |x: f64| (1.0 - 1.0 / (1.0 + (-x).exp())).ln();
+        let expected = (log(0.0) + log(2.0) + log(-2.0) - 90.0) / 5.0;
+        assert!((loss - expected).abs() < 1e-12, "{loss}, expected {expected}");
         Ok(())
     }
 }

@@ -51,7 +51,7 @@ pub fn metadata(
 ) -> Result<SpeakerMetadata> {
     let representation = match settings.representation {
         MotionRepresentation::Positions => Representation::Positions,
-        MotionRepresentation::Bones => Representation::bones(normal, loader.poses(PART_FRAMES))?,
+        MotionRepresentation::Auto | MotionRepresentation::Bones => Representation::bones(normal, loader.poses(PART_FRAMES))?,
     };
     let network = Config::from_preset(preset(settings.preset), normal.n_features());
     let several = n_speakers > 1;
@@ -92,7 +92,7 @@ pub fn resume(metadata: &mut SpeakerMetadata, dataset: &Dataset, differences: &m
 /// Network preset for a preset of the configuration.
 pub const fn preset(preset: NetworkPreset) -> Preset {
     match preset {
-        NetworkPreset::Light => Preset::Light,
+        NetworkPreset::Auto | NetworkPreset::Light => Preset::Light,
         NetworkPreset::Paper => Preset::Paper,
     }
 }

@@ -5,6 +5,7 @@ use crate::generate::model::SpeakerMetadata;
 use crate::generate::representation::PoseDecoder;
 use anyhow::{Result, ensure};
 use candle_core::{DType, Device, Tensor};
+use orator_dataset::config::BoneLoss;
 use orator_nn::gan::generator::Config;
 
 /// Speakers in the order of their rows in the network's speaker table.
@@ -15,12 +16,12 @@ pub struct SpeakerSet {
 }
 
 impl SpeakerSet {
-    /// Set of the speakers of one network.
+    /// Set of the speakers of one network, with the form of the bone length loss.
     ///
     /// # Errors
     /// No speaker, or another number than the network has; a speaker whose channels, frame rate or network differ from
     /// the first one's.
-    pub fn new(of: Vec<SpeakerMetadata>, device: &Device) -> Result<Self> {
+    pub fn new(of: Vec<SpeakerMetadata>, bone_loss: BoneLoss, device: &Device) -> Result<Self> {
         ensure!(!of.is_empty(), "no speaker to train");
         let first = &of[0];
         ensure!(
@@ -47,7 +48,7 @@ impl SpeakerSet {
             decoders: of.iter().map(decoder).collect::<candle_core::Result<_>>()?,
             bones: of
                 .iter()
-                .map(|of| BoneConstancy::new(&of.normalisation, DType::F32, device))
+                .map(|of| BoneConstancy::new(&of.normalisation, bone_loss, DType::F32, device))
                 .collect::<candle_core::Result<_>>()?,
             of,
         })
@@ -143,9 +144,9 @@ mod tests {
         let bones = || Representation::Bones { mean: vec![0.1; 3 * N_BONES], std: vec![0.5; 3 * N_BONES] };
         for representation in [bones, || Representation::Positions] {
             let two = |n_speakers| [0.1, 0.4].map(|mean| speaker(mean, representation(), n_speakers));
-            let both = SpeakerSet::new(two(2).to_vec(), &Device::Cpu)?;
+            let both = SpeakerSet::new(two(2).to_vec(), BoneLoss::Relative, &Device::Cpu)?;
             let alone: Vec<SpeakerSet> =
-                two(0).into_iter().map(|of| SpeakerSet::new(vec![of], &Device::Cpu)).collect::<Result<_>>()?;
+                two(0).into_iter().map(|of| SpeakerSet::new(vec![of], BoneLoss::Relative, &Device::Cpu)).collect::<Result<_>>()?;
             let raw = pattern(&[4, 3 * N_BONES, 6], 0.0)?.to_dtype(DType::F32)?;
             let speakers = [0, 1, 1, 0];
             let poses = both.poses(&raw, &speakers)?;
@@ -161,9 +162,9 @@ mod tests {
             let loss = both.bone_loss(&poses, &speakers)?.map_or(Ok(0.0), |loss| loss.to_scalar::<f32>())?;
             assert!((loss - losses).abs() <= 1e-5 * losses, "{loss} {losses}");
         }
-        assert!(SpeakerSet::new(Vec::new(), &Device::Cpu).is_err());
+        assert!(SpeakerSet::new(Vec::new(), BoneLoss::Relative, &Device::Cpu).is_err());
         let other = SpeakerMetadata { fps: FrameRate::new(25, 1), ..speaker(0.1, bones(), 2) };
-        let error = SpeakerSet::new(vec![speaker(0.1, bones(), 2), other], &Device::Cpu).err();
+        let error = SpeakerSet::new(vec![speaker(0.1, bones(), 2), other], BoneLoss::Relative, &Device::Cpu).err();
         assert!(error.is_some_and(|error| error.to_string().contains("25")));
         Ok(())
     }

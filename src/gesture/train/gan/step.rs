@@ -90,7 +90,7 @@ impl GanTrainer {
     pub fn new(speakers: Vec<SpeakerMetadata>, settings: GanSettings) -> Result<Self> {
         let device = open_device(settings.device == ComputeDevice::Cuda)?;
         let mut generator_params = Params::new(settings.seed).on(&device);
-        let speakers = SpeakerSet::new(speakers, &device)?;
+        let speakers = SpeakerSet::new(speakers, settings.bone_loss, &device)?;
         let generator = Generator::new(&mut generator_params, speakers.network())?;
         let ema = if settings.ema_decay > 0.0 {
             let mut params = Params::frozen().on(&device);
@@ -277,18 +277,22 @@ impl GanTrainer {
     }
 
     fn stored(&self) -> Result<Value> {
-        let (channels, settings) = (&self.settings.channels, self.settings.clone());
+        let (defaults, settings) = (GanSettings::default(), self.settings.clone());
         let mut speakers = self.speakers.all().iter().cloned();
         let speaker = speakers.next().context("no speaker to train")?;
         let other_speakers = speakers.collect();
         let state = TrainerState { speaker, other_speakers, settings, step: self.step, best: self.best };
         let mut facts = serde_json::to_value(&state)?;
         facts["settings"] = to_stored("gan", &self.settings)?;
-        if channels.is_empty()
-            && let Some(settings) = facts["settings"].as_object_mut()
-        {
-            // The key is only written for trainings with channels.
-            settings.shift_remove("channels");
+        if let Some(stored) = facts["settings"].as_object_mut() {
+            // Keys that version 0.1 did not have are written only if they differ from what it did.
+            let is_default = [
+                ("channels", self.settings.channels == defaults.channels),
+                ("bone_loss", self.settings.bone_loss == defaults.bone_loss),
+            ];
+            is_default.iter().filter(|(_, is_default)| *is_default).for_each(|(key, _)| {
+                stored.shift_remove(*key);
+            });
         }
         Ok(facts)
     }
