@@ -1,6 +1,7 @@
 //! Names of version 0.1 that 0.2 still accepts: flags with a note that names the new flag, and keys of the `--json`
 //! output, printed under both names. Version 0.3 removes them.
 
+use orator_base::stage::artifacts::StageName;
 use serde_json::{Map, Value};
 
 /// Renamed flags, as (verb, old flag, new flag).
@@ -12,7 +13,7 @@ const FLAGS: [(&str, &str, &str); 12] = [
     ("generate", "--again", "--force"),
     ("import", "--no-sound", "--no-audio"),
     ("import", "--max-apart", "--max-length-difference"),
-    ("lift", "--fps", "--input-fps"),
+    (StageName::Lift.as_str(), "--fps", "--input-fps"),
     ("plan", "--piece", "--max-part"),
     ("plan", "--untimed", "--no-timing"),
     ("work", "--beat", "--heartbeat"),
@@ -53,7 +54,7 @@ const KEYS: [(&str, &[(&str, &str)]); 18] = [
         ],
     ),
     ("align", &[("unaligned", "unfit")]),
-    ("lift", &[("frames_per_sec", "frames_a_second")]),
+    (StageName::Lift.as_str(), &[("frames_per_sec", "frames_a_second")]),
     (
         "sheet",
         &[

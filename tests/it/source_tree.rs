@@ -189,7 +189,7 @@ fn rejection_reasons_are_defined_in_one_file() {
     let common = ["quiet", "still", "face", "arms", "bones", "hands", "cut", "open", "jump", "no sound"];
     let reasons = Rejection::JUDGED.map(Rejection::reason);
     let is_reason = |string: &str| reasons.contains(&string) && !common.contains(&string);
-    assert_none(&strings_outside("base/stage/refusal.rs", |string, _| is_reason(string)));
+    assert_none(&strings_outside("base/stage/rejection.rs", |string, _| is_reason(string)));
 }
 
 /// Strings in code of the library and the program, outside `home` and outside tests, for which `is_misplaced` holds;

@@ -96,6 +96,6 @@ mod tests {
         assert!(error_of(b"the 1 2 3\nso 1 2 3").contains("line 2 has no line end"));
         assert!(error_of(b"3 2\nthe 1 2\nso 1 2\n").contains("states 3 words, but it has 2"));
         assert!(error_of(b"").contains("empty") && error_of(b"the\n").contains("1 to 10000"));
-        assert!(error_of(b"\xff\xfe\n").contains("no text"));
+        assert!(error_of(b"\xff\xfe\n").contains("expected UTF-8 text"));
     }
 }

@@ -203,7 +203,7 @@ fn missing_and_duplicate_videos_are_reported() {
     let short = video(dir.path(), "short", 100, 5);
     let error = shard(dir.path(), &[short], "none").0.unwrap_err().to_string();
     assert!(error.starts_with("no dataset of host: no interval was accepted in 1 video (6.7 s)"), "{error}");
-    assert!(error.contains("rejected: cut 6.7 s"), "{error}");
+    assert!(error.contains("rejected: close to a cut 6.7 s"), "{error}");
     let error = shard(dir.path(), &[], "nothing").0.unwrap_err().to_string();
     assert!(error.starts_with("no dataset of host: none of the videos passed"), "{error}");
 }

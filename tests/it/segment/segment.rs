@@ -282,7 +282,7 @@ fn the_stage_reads_and_writes_its_files() {
     write(&work, &unit, &footage, "a");
     assert_eq!(stage.inputs(&unit).unwrap().len(), 3);
     let line = run("silent").0.unwrap().line;
-    assert!(line.starts_with("no interval accepted in 13.3 s; rejected: no sound 13.3 s (no sound: "), "{line}");
+    assert!(line.starts_with("no interval accepted in 13.3 s; rejected: no audio 13.3 s (no sound: "), "{line}");
     std::fs::write(work.join("pose2d/host/talk-00000000/keypoints.npz"), "broken").unwrap();
     assert!(format!("{:#}", run("broken").0.unwrap_err()).contains("keypoints.npz"));
 }

@@ -191,7 +191,7 @@ fn errors_name_the_missing_input() {
             error_of(&|file| fs::rename(dir.join("models"), dir.join("moved")).map(|()| file.seed = 9).unwrap()),
         ),
         (
-            "has no intervals in the validation split",
+            "has no interval in the validation split",
             error_of(&|file| {
                 fs::rename(dir.join("moved"), dir.join("models")).unwrap();
                 file.speaker[0].split = orator_base::types::split::Split::Validation;
