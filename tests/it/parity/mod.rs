@@ -1,6 +1,7 @@
 //! Results compared with independent references: golden values from committed scripts, and real clips.
 
 pub(crate) mod face_parity;
+pub(crate) mod gan_losses_parity;
 pub(crate) mod generator_parity;
 pub(crate) mod golden;
 pub(crate) mod heatmap_parity;
