@@ -209,6 +209,8 @@ fn loader(args: &Args, dir: &Path, out: &Path) -> Result<LoadingRates> {
     let settings = config::GanConfig {
         recipe: config::GanRecipe::Rebol2021,
         preset: config::NetworkPreset::Light,
+        representation: config::MotionRepresentation::Bones,
+        adversarial: config::AdversarialLoss::LeastSquares,
         window_frames: 64,
         stride_frames: 5,
         steps: args.steps.into(),

@@ -23,6 +23,9 @@ pub(super) const RENAMED: [(&str, &str); 11] = [
     ("seq2seq.hears_context", "seq2seq.audio_context"),
 ];
 
+/// Former value of `gan.recipe`, with its current name.
+const RENAMED_RECIPE: (&str, &str) = ("paper", "rebol2021");
+
 /// Settings of a section as records and checkpoints store them: JSON with the former names of renamed keys, in the same
 /// order.
 ///
@@ -65,6 +68,19 @@ pub(super) fn rename(written: &mut DeTable<'_>, location_at: &dyn Fn(usize) -> S
                     table.insert(Spanned::new(name.span(), new.into()), Spanned::new(name.span(), value));
                 }
             }
+        }
+    }
+    for is_advanced in [false, true] {
+        let Some(value) = section(written, Some("gan"), is_advanced).and_then(|gan| gan.get_mut("recipe")) else {
+            continue;
+        };
+        if value.get_ref().as_str() == Some(RENAMED_RECIPE.0) {
+            let location = location_at(value.span().start);
+            let (old, new) = RENAMED_RECIPE;
+            notes.push(format!(
+                "{location}gan.recipe = {old:?} was renamed: write {new:?} (the old name works until version 0.3)"
+            ));
+            *value.get_mut() = DeValue::String(new.into());
         }
     }
     notes

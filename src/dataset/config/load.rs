@@ -86,6 +86,7 @@ fn resolve(text: &str, sets: &[String], file: PathBuf) -> Result<Config> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::config::GanRecipe;
     use std::collections::BTreeSet;
 
     fn resolved(text: &str, sets: &[&str]) -> Result<Config> {
@@ -205,10 +206,10 @@ mod tests {
     #[test]
     fn former_keys_are_read_with_a_note() {
         let text = "[segment]\nmax_bone_change = 0.3\n[seq2seq.advanced]\nlambda_reach = 0.5\n[lift]\nlevel = true\n\
-            [shard]\ntest = 0.2\n";
+            [shard]\ntest = 0.2\n[gan]\nrecipe = \"paper\"\n";
         let Config { settings, notes, .. } = resolved(text, &["shard.validation=0.1"]).unwrap();
         assert_eq!((settings.lift.max_bone_change, settings.lift.level), (0.3, true));
-        assert_eq!(settings.seq2seq.lambda_variance, 0.5);
+        assert_eq!((settings.seq2seq.lambda_variance, settings.gan.recipe), (0.5, GanRecipe::Rebol2021));
         assert_eq!((settings.dataset.validation, settings.dataset.test), (0.1, 0.2));
         assert_eq!(
             notes,
@@ -216,6 +217,7 @@ mod tests {
                 ("line 7: shard", "dataset"),
                 ("line 2: segment.max_bone_change", "lift.max_bone_change"),
                 ("line 4: seq2seq.lambda_reach", "seq2seq.lambda_variance"),
+                ("line 10: gan.recipe = \"paper\"", "\"rebol2021\""),
                 ("--set: shard", "dataset"),
             ]
             .map(|(old, new)| format!("{old} was renamed: write {new} (the old name works until version 0.3)"))
@@ -248,9 +250,9 @@ mod tests {
     #[test]
     fn an_unknown_value_is_rejected_with_a_list_of_valid_ones() {
         for (set, expected) in [
-            ("gan.preset=ligth", "unknown value \"ligth\": expected \"light\" or \"paper\" (did you mean light?)"),
-            ("gan.representation=anything", "unknown value \"anything\": expected \"bones\" or \"positions\""),
-            ("gan.adversarial=hinge", "unknown value \"hinge\": expected \"least-squares\" or \"log\""),
+            ("gan.preset=ligth", "unknown value \"ligth\": expected one of \"auto\", \"light\", \"paper\" (did you mean light?)"),
+            ("gan.representation=anything", "unknown value \"anything\": expected one of \"auto\", \"bones\", \"positions\""),
+            ("gan.adversarial=hinge", "unknown value \"hinge\": expected one of \"auto\", \"least-squares\", \"log\", \"minimax\""),
             ("gan.device=`gpu`", "unknown value \"`gpu`\": expected \"cpu\" or \"cuda\""),
         ] {
             let (key, _) = set.split_once('=').unwrap();

@@ -18,8 +18,8 @@ pub mod videos;
 
 pub use auto::Auto;
 pub use choices::{
-    AdversarialLoss, BoneLoss, ComputeDevice, ContinuityLoss, DistanceLoss, FollowRule, GanRecipe, MotionRepresentation,
-    NetworkPreset, SequenceNetwork, SpeechRule, SplitUnit, VarianceLoss,
+    AdversarialLoss, BoneLoss, ComputeDevice, ContinuityLoss, DistanceLoss, FollowRule, GanRecipe,
+    MotionRepresentation, NetworkPreset, SequenceNetwork, SpeechRule, SplitUnit, VarianceLoss,
 };
 pub use file::{Problem, SourceLocation};
 pub use former::to_stored;

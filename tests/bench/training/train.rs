@@ -10,7 +10,7 @@ use orator_base::audio::mel::N_MELS;
 use orator_base::stage::progress::Progress;
 use orator_base::types::skeleton::{N_BONES, N_JOINTS, NECK, is_duplicate, parent};
 use orator_base::types::time::FrameRate;
-use orator_dataset::config::{GanConfig, GanRecipe};
+use orator_dataset::config::{AdversarialLoss, GanConfig, GanRecipe, MotionRepresentation};
 use orator_formats::checkpoint;
 use orator_gesture::generate::mel_stream::mel_frames;
 use orator_gesture::generate::model::SpeakerMetadata;
@@ -65,7 +65,14 @@ struct FixedBatch {
 impl FixedBatch {
     fn new(args: &Args) -> Result<Self> {
         let preset = serde_json::from_value(json!(args.preset))?;
-        let config = GanConfig { recipe: GanRecipe::Rebol2021, preset, batch: args.batch.into(), ..GanConfig::default() };
+        let config = GanConfig {
+            recipe: GanRecipe::Rebol2021,
+            preset,
+            representation: MotionRepresentation::Bones,
+            adversarial: AdversarialLoss::LeastSquares,
+            batch: args.batch.into(),
+            ..GanConfig::default()
+        };
         let settings = recipe::settings(
             &config,
             &TrainingMaterial { train_secs: 0.0, validation_secs: 0.0, n_speakers: 1 },

@@ -6,7 +6,7 @@ use crate::fixtures::write_dataset::write_dataset;
 use orator::Evaluation;
 use orator_base::stage::progress::Silent;
 use orator_base::types::posture::PostureChannel;
-use orator_dataset::config::{GanConfig, GanRecipe, MotionRepresentation};
+use orator_dataset::config::{AdversarialLoss, GanConfig, GanRecipe, MotionRepresentation, NetworkPreset};
 use orator_dataset::{Dataset, Split};
 use orator_formats::checkpoint;
 use orator_gesture::evaluate::clips::checkpoint::EvaluatedCheckpoint;
@@ -21,7 +21,10 @@ use orator_gesture::train::gan::train::train;
 fn settings(channels: &[PostureChannel]) -> GanConfig {
     GanConfig {
         channels: channels.to_vec(),
-        recipe: GanRecipe::Paper,
+        recipe: GanRecipe::Rebol2021,
+        preset: NetworkPreset::Light,
+        representation: MotionRepresentation::Bones,
+        adversarial: AdversarialLoss::LeastSquares,
         batch: 4.into(),
         window_frames: 32,
         steps: 80.into(),

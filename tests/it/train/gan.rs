@@ -147,7 +147,10 @@ fn a_few_windows_are_memorised_and_generated() {
     write_dataset(&dataset_folder, "host", FPS, &[(Split::Train, long.clone())]).unwrap();
     let dataset = Dataset::open(&dataset_folder).unwrap();
     let settings = GanConfig {
-        recipe: GanRecipe::Paper,
+        recipe: GanRecipe::Rebol2021,
+        preset: NetworkPreset::Light,
+        representation: MotionRepresentation::Bones,
+        adversarial: AdversarialLoss::LeastSquares,
         batch: 4.into(),
         steps: 60.into(),
         learning_rate: 2e-3.into(),

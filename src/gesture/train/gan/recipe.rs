@@ -176,9 +176,8 @@ pub fn settings(requested: &GanConfig, material: &TrainingMaterial, initial: Ini
         let (_, rebol, auto) = CHOICES.iter().find(|(of, ..)| *of == key)?;
         Some(Value::from(if requested.recipe == GanRecipe::Rebol2021 { *rebol } else { *auto }))
     };
-    let settings = requested.filled(|key| {
-        choice(key).or_else(|| RECIPES.iter().find(|row| row.key == key).map(|row| number(value(row))))
-    });
+    let settings = requested
+        .filled(|key| choice(key).or_else(|| RECIPES.iter().find(|row| row.key == key).map(|row| number(value(row)))));
     let mut settings = settings.context("the recipe lacks a key of [gan]")?;
     if initial != InitialWeights::SeveralSpeakers {
         // All weights are trained here; a rate of 0 would freeze the network.

@@ -51,7 +51,9 @@ pub fn metadata(
 ) -> Result<SpeakerMetadata> {
     let representation = match settings.representation {
         MotionRepresentation::Positions => Representation::Positions,
-        MotionRepresentation::Auto | MotionRepresentation::Bones => Representation::bones(normal, loader.poses(PART_FRAMES))?,
+        MotionRepresentation::Auto | MotionRepresentation::Bones => {
+            Representation::bones(normal, loader.poses(PART_FRAMES))?
+        }
     };
     let network = Config::from_preset(preset(settings.preset), normal.n_features());
     let several = n_speakers > 1;

@@ -145,8 +145,10 @@ mod tests {
         for representation in [bones, || Representation::Positions] {
             let two = |n_speakers| [0.1, 0.4].map(|mean| speaker(mean, representation(), n_speakers));
             let both = SpeakerSet::new(two(2).to_vec(), BoneLoss::Relative, &Device::Cpu)?;
-            let alone: Vec<SpeakerSet> =
-                two(0).into_iter().map(|of| SpeakerSet::new(vec![of], BoneLoss::Relative, &Device::Cpu)).collect::<Result<_>>()?;
+            let alone: Vec<SpeakerSet> = two(0)
+                .into_iter()
+                .map(|of| SpeakerSet::new(vec![of], BoneLoss::Relative, &Device::Cpu))
+                .collect::<Result<_>>()?;
             let raw = pattern(&[4, 3 * N_BONES, 6], 0.0)?.to_dtype(DType::F32)?;
             let speakers = [0, 1, 1, 0];
             let poses = both.poses(&raw, &speakers)?;
