@@ -250,9 +250,18 @@ mod tests {
     #[test]
     fn an_unknown_value_is_rejected_with_a_list_of_valid_ones() {
         for (set, expected) in [
-            ("gan.preset=ligth", "unknown value \"ligth\": expected one of \"auto\", \"light\", \"paper\" (did you mean light?)"),
-            ("gan.representation=anything", "unknown value \"anything\": expected one of \"auto\", \"bones\", \"positions\""),
-            ("gan.adversarial=hinge", "unknown value \"hinge\": expected one of \"auto\", \"least-squares\", \"log\", \"minimax\""),
+            (
+                "gan.preset=ligth",
+                "unknown value \"ligth\": expected one of \"auto\", \"light\", \"paper\" (did you mean light?)",
+            ),
+            (
+                "gan.representation=anything",
+                "unknown value \"anything\": expected one of \"auto\", \"bones\", \"positions\"",
+            ),
+            (
+                "gan.adversarial=hinge",
+                "unknown value \"hinge\": expected one of \"auto\", \"least-squares\", \"log\", \"minimax\"",
+            ),
             ("gan.device=`gpu`", "unknown value \"`gpu`\": expected \"cpu\" or \"cuda\""),
         ] {
             let (key, _) = set.split_once('=').unwrap();
