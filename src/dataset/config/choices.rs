@@ -11,7 +11,7 @@ pub enum NetworkPreset {
     Auto,
     /// Small network for CPUs: convolutions over time only.
     Light,
-    /// Network of Rebol et al. (2021): convolutions over time and frequency.
+    /// Network of Ginosar et al. (2019), on which Rebol et al. (2021) build: convolutions over time and frequency.
     Paper,
 }
 

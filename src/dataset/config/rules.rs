@@ -50,9 +50,6 @@ pub fn check(settings: &Settings, locations: &BTreeMap<String, SourceLocation>) 
     if settings.dataset.validation + settings.dataset.test > 0.95 {
         rules.problem("dataset.test", "validation and test leave less than 5 % for training".to_owned());
     }
-    if !settings.gan.window_frames.is_multiple_of(32) {
-        rules.problem("gan.window_frames", format!("{}: expected a multiple of 32", settings.gan.window_frames));
-    }
     rules.speakers(settings);
     rules.problems
 }

@@ -1,6 +1,6 @@
 //! The speech-to-gesture generator (Ginosar et al. 2019, as used by Rebol et al. 2021) from log-mel spectrograms to
 //! poses. An audio encoder maps the spectrogram to one vector per pose frame; a UNet over time with additive skip
-//! connections maps these to motion. Fully convolutional: the number of frames is any multiple of [`FRAMES_MULTIPLE`].
+//! connections maps these to motion. Fully convolutional: any number of frames; the UNet pads them internally.
 
 use super::conv_block::ConvBlock;
 use super::speaker_layer::SpeakerLayer;
@@ -10,7 +10,7 @@ use crate::params::Params;
 use candle_core::{Result, Tensor};
 use serde::{Deserialize, Serialize};
 
-/// Divisor of the number of frames: the UNet halves the frame rate five times.
+/// Divisor of the number of frames inside the UNet, which halves the frame rate five times.
 pub const FRAMES_MULTIPLE: usize = 32;
 const N_ENTER: usize = 2;
 const N_LEVELS: usize = 5;
@@ -119,11 +119,11 @@ impl Generator {
         })
     }
 
-    /// Maps `mels` [B, n_mels, T_mel] to poses [B, n_out, n_frames]; `n_frames` is a multiple of [`FRAMES_MULTIPLE`]
-    /// and covers the same time as `mels`. `speakers` as in [`Self::encode`].
+    /// Maps `mels` [B, n_mels, T_mel] to poses [B, n_out, n_frames]; `n_frames` is at least 1 and covers the same time as
+    /// `mels`. `speakers` as in [`Self::encode`].
     pub fn forward(&self, mels: &Tensor, speakers: &[u32], n_frames: usize, train: bool) -> Result<Tensor> {
-        if n_frames == 0 || !n_frames.is_multiple_of(FRAMES_MULTIPLE) {
-            candle_core::bail!("{n_frames} frames: expected a multiple of {FRAMES_MULTIPLE}");
+        if n_frames == 0 {
+            candle_core::bail!("no frames: expected at least 1");
         }
         self.decode(&resize::linear(&self.encode(mels, speakers, train)?, n_frames)?, train)
     }
@@ -142,9 +142,14 @@ impl Generator {
         }
     }
 
-    /// Decodes audio vectors at every pose frame, [B, T, width], to poses [B, n_out, T]; T is a multiple of
-    /// [`FRAMES_MULTIPLE`].
+    /// Decodes audio vectors at every pose frame, [B, T, width], to poses [B, n_out, T]. If T is not a multiple of
+    /// [`FRAMES_MULTIPLE`], zeros follow the audio vectors up to the next one and the poses there are dropped.
     pub fn decode(&self, x: &Tensor, train: bool) -> Result<Tensor> {
+        let n_frames = x.dim(1)?;
+        let n_padding = n_frames.next_multiple_of(FRAMES_MULTIPLE) - n_frames;
+        if n_padding > 0 {
+            return self.decode(&x.pad_with_zeros(1, 0, n_padding)?, train)?.narrow(2, 0, n_frames)?.contiguous();
+        }
         let mut x = through(&self.enter, x.clone(), train)?;
         let mut skips = Vec::new();
         for block in &self.downs {
@@ -214,7 +219,21 @@ mod tests {
             assert_eq!(net.forward(&mels, &[], n_frames, true)?.dims(), [2, 6, n_frames]);
         }
         let mels = pattern(&[2, 64, 100], 0.0)?.to_dtype(DType::F32)?;
-        assert!(net.forward(&mels, &[], 15, false).is_err());
+        assert!(net.forward(&mels, &[], 0, false).is_err());
+        Ok(())
+    }
+
+    #[test]
+    fn other_numbers_of_frames_are_padded_and_cropped() -> Result<()> {
+        let mut params = Params::with_dtype(3, DType::F64);
+        let net = Generator::new(&mut params, &Config { width: 8, ..Config::from_preset(Preset::Light, 6) })?;
+        let encoded = pattern(&[2, 60, 8], 0.0)?;
+        let padded = Tensor::cat(&[&encoded, &Tensor::zeros((2, 4, 8), DType::F64, encoded.device())?], 1)?;
+        let (short, long) = (net.decode(&encoded, false)?, net.decode(&padded, false)?);
+        assert_eq!(short.dims(), [2, 6, 60]);
+        let difference = (short - long.narrow(2, 0, 60)?)?.abs()?.max_all()?.to_scalar::<f64>()?;
+        assert_eq!(difference, 0.0);
+        assert!(worst(&[encoded.narrow(1, 0, 20)?], |v| net.decode(&v[0], false))? < 1e-5);
         Ok(())
     }
 

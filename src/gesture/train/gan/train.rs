@@ -257,8 +257,8 @@ fn resume(
 
 fn check(settings: &GanConfig) -> Result<()> {
     ensure!(
-        settings.window_frames > 0 && settings.window_frames.is_multiple_of(FRAMES_MULTIPLE),
-        "gan.window_frames is {}: expected a multiple of {FRAMES_MULTIPLE} above 0",
+        settings.window_frames >= FRAMES_MULTIPLE,
+        "gan.window_frames is {}: expected at least {FRAMES_MULTIPLE}",
         settings.window_frames
     );
     if let Some(batch) = settings.batch.given() {
