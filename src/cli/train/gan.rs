@@ -184,8 +184,8 @@ fn metrics(validation: &Validation) -> String {
     let (predicted, mean_pose) = (&validation.generator, &validation.mean_pose);
     let row = |name: &str, predicted: f64, mean_pose: f64| format!("{name:28}{predicted:9.3}   {mean_pose:9.3}\n");
     let distance = |metrics: &ValidationMetrics| metrics.frechet.unwrap_or(f64::NAN);
-    let windows = counted(validation.n_windows, &format!("{} window", validation.split));
-    let mut text = format!("{:28}generator   mean pose\n", format!("on {windows}"));
+    let windows = format!("on {}", counted(validation.n_windows, &format!("{} window", validation.split)));
+    let mut text = format!("{windows:28}generator   mean pose\n");
     text += &row("L1 (normalised)", predicted.l1, mean_pose.l1);
     text += &row("PCK 0.2", predicted.pck, mean_pose.pck);
     text += &row("PCK 0.2, arms", predicted.pck_body, mean_pose.pck_body);

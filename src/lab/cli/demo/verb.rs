@@ -98,15 +98,15 @@ enum DemoVerb {
         #[arg(long, default_value_t = 2.0)]
         hours: f64,
         /// Add words that cannot be distinguished by their audio, some of which move a hand to a position of their
-        /// own.
+        /// own (version 2 of the first rule).
         #[arg(long)]
         words: bool,
         /// Variant of the rule: other vowels move the hands, after other delays; 0 is the original rule.
         #[arg(long, value_name = "N", default_value_t = 0)]
         habits: u64,
         /// Folder of recorded speech to use instead of synthetic speech: NAME.wav with NAME.tsv (start, end, word),
-        /// in the split that NAME begins with. The gestures follow the second rule, based on loud syllables,
-        /// phrases and eight words.
+        /// in the split that NAME begins with. The gestures follow the second rule (version 3), based on loud
+        /// syllables, phrases and eight words.
         #[arg(long, value_name = "DIR", conflicts_with_all = ["hours", "words", "habits"])]
         speech: Option<PathBuf>,
         /// Random seed of the speech and of the variation of the speaker.
