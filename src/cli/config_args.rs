@@ -9,7 +9,7 @@ pub struct ConfigArgs {
     /// Configuration file.
     #[arg(short, long, default_value = "pipeline.toml", value_name = "FILE")]
     pub config: PathBuf,
-    /// Override one configuration key, such as `--set extract.fps=15`; may be repeated.
+    /// Override one configuration key, such as `--set extract.fps=10`; may be repeated.
     #[arg(long = "set", value_name = "KEY=VALUE")]
     pub set: Vec<String>,
 }

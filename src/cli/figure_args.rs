@@ -33,7 +33,7 @@ impl FigureArgs {
         let is_named = formats.any(ExportFormat::has_names);
         ensure!(
             is_named || self.names == Names::Own,
-            "--names applies to .bvh, .fbx, .glb and .json only: write one of these formats, or remove --names"
+            "--names applies to .bvh, .fbx, .glb and .json only: write one of these formats, or omit --names"
         );
         Ok(())
     }

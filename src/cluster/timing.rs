@@ -112,7 +112,7 @@ fn time_excerpts(
     }
     ensure!(
         !files.is_empty(),
-        "cannot time the stages: no excerpt could be copied from any video; plan without estimates by --no-timing"
+        "cannot time the stages: no excerpt could be copied from any video; use --no-timing to plan without estimates"
     );
     let work = folder.join("work");
     let task = progress.begin("timing the stages", 1);

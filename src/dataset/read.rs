@@ -51,7 +51,7 @@ impl Dataset {
         let lock = FolderLock::shared(&dir)?;
         ensure!(
             dir.join(INFO).is_file(),
-            "{} is not a dataset: it has no {}; `orator run` creates one in work/dataset/<speaker>",
+            "{} is not a dataset: it has no {}; `orator run` creates one in work/dataset/SPEAKER",
             dir.display(),
             INFO
         );

@@ -96,7 +96,7 @@ impl<'a> Fetcher<'a> {
             let steps = entry.conversion.as_deref().unwrap_or("no conversion is documented");
             let _ = write!(
                 failures,
-                "\n      no source to download; the file was created from {} @ {} : {} by: {steps}",
+                "\n      no source to download; the file was created from {} @ {}: {} by: {steps}",
                 entry.origin.repository, entry.origin.commit, entry.origin.path
             );
         }

@@ -112,7 +112,8 @@ impl<'a> WorkerPool<'a> {
         while self.work_on_one(Some(number)) {}
         let mut state = self.state();
         loop {
-            let at = state.open.iter().position(|shared| shared.number == number).context("unit not shared")?;
+            let at =
+                state.open.iter().position(|shared| shared.number == number).context("the unit is not in progress")?;
             if state.open[at].n_running == 0 {
                 let ended = state.open.remove(at);
                 return ended.failed.map_or(Ok(folders), Err);

@@ -7,7 +7,7 @@ use orator_base::text::counted;
 pub(super) fn text(report: &AnimationReport) -> String {
     let number = |jerk: Option<f64>| jerk.map_or("-".to_owned(), |jerk| format!("{jerk:.0}"));
     let jerk = |jerk: Jerk| format!("{} -> {}", number(jerk.before), number(jerk.after));
-    let mut text = format!("jerk, m/s3: arms {}, hands {}\n", jerk(report.arms), jerk(report.hands));
+    let mut text = format!("jerk, m/s\u{b3}: arms {}, hands {}\n", jerk(report.arms), jerk(report.hands));
     text += &match report.face_frames {
         Some(n) if n > 0 => format!("head: detected in {n} of {}\n", counted(report.n_frames, "frame")),
         _ => "head: at rest\n".to_owned(),

@@ -106,7 +106,7 @@ pub struct Args {
     /// Limit the curl of each of the four fingers to within 10 degrees of their mean, as in Rebol et al. (2021); this
     /// also bends a pointing finger.
     #[arg(long, value_name = "on|off", default_value = "off", conflicts_with = "no_constraints", action = ArgAction::Set,
-          value_parser = BoolishValueParser::new())]
+          value_parser = BoolishValueParser::new(), hide_possible_values = true)]
     curl_coherence: bool,
 }
 
@@ -200,10 +200,7 @@ fn check_effect(args: &Args, outputs: &OutputFiles) -> Result<()> {
     let is_film = outputs.iter().any(|&(_, format)| format == ExportFormat::Mp4);
     let (beside, audio) = (args.compare.is_some(), args.audio.is_some());
     for (option, is_given) in [("--compare", beside), ("--audio", audio), ("--camera", args.film.is_given())] {
-        ensure!(
-            is_film || !is_given,
-            "{option} applies to .mp4 outputs only: add an .mp4 to --out, or remove {option}"
-        );
+        ensure!(is_film || !is_given, "{option} applies to .mp4 outputs only: add an .mp4 to --out, or omit {option}");
     }
     args.figure.check(outputs)
 }

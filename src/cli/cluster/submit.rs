@@ -118,7 +118,8 @@ struct KubernetesArgs {
 
 /// Start a worker on each host over SSH.
 ///
-/// The command waits until all workers have ended.
+/// The command waits until all workers have ended. The options --tasks, --at-once, --memory and --hours have no effect:
+/// one worker without a time limit is started on each host.
 #[derive(clap::Args)]
 struct SshArgs {
     #[command(flatten)]

@@ -103,14 +103,14 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
         let trained = TrainedSpeaker::open_as(&checkpoint, &choice)?;
         results.push((motion_files::write(&trained, &source, outputs, ui)?, trained));
     }
-    let Some((written, trained)) = results.first() else { bail!("no variant was requested") };
+    let Some((written, trained)) = results.first() else { bail!("--variants: expected at least 1") };
     let speed =
         written.secs * results.len() as f64 / results.iter().map(|result| result.0.motion_secs).sum::<f64>().max(1e-6);
     let names: Vec<String> = outputs.iter().flat_map(names).collect();
     let note = written.note.as_ref().map_or(String::new(), |note| format!("note: {note}\n"));
     let n_variants = if results.len() > 1 { format!("{} variants of ", results.len()) } else { String::new() };
     let text = format!(
-        "{n_variants}{} of speech, {} of {} at {}, {speed:.0} x real time\n{note}{}wrote {}",
+        "{n_variants}{} of speech, {} of {} at {}, {speed:.0} times real time\n{note}{}wrote {}",
         length(written.secs),
         counted(written.n_frames, "frame"),
         trained.name(),
@@ -204,7 +204,7 @@ fn batch(args: Args) -> Result<SpeechBatch> {
     };
     if let (Some(_), Some(checkpoint)) = (&args.transcript, &args.checkpoint) {
         let is_sequence = is_sequence(&checkpoint_file(checkpoint)?)?;
-        ensure!(is_sequence, "{} does not use words; remove --transcript", checkpoint.display());
+        ensure!(is_sequence, "{} does not use words; omit --transcript", checkpoint.display());
     }
     transcripts::find(&mut sounds, args.transcript.as_deref())?;
     let (figure, seams) = (args.figure.options(), seams(args.carry_state));

@@ -39,7 +39,8 @@ pub struct Args {
     /// File or folder of 2D keypoints.
     #[arg(value_name = "KEYPOINTS")]
     keypoints: PathBuf,
-    /// Frame rate of the keypoints, frames per second; defaults to what the file states.
+    /// Frame rate of the keypoints, frames per second; defaults to that of the file. Required for formats of other
+    /// programs that do not state one; the .npz of this program is then read at 15.
     #[arg(long, alias = "fps", value_name = "RATE")]
     input_fps: Option<FrameRate>,
     /// Width and height of the image, pixels, such as 1280x720; coordinates from 0 to 1 are multiplied by it.

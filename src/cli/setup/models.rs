@@ -212,11 +212,11 @@ fn list(store: &ModelStore, chosen: &[String], ui: &Ui) -> Result<Outcome> {
             entry.bytes as f64 / 1e6,
             entry.file
         );
-        text += &format!("    {}\n    from {repository} @ {commit} : {path}\n    licence {licence}\n", entry.about);
+        text += &format!("    {}\n    from {repository} @ {commit}: {path}\n    licence {licence}\n", entry.about);
         let note = Some(note.clone()).filter(|note| !note.is_empty());
         let url = entry.url.as_ref().map(|url| format!("download from {url}"));
         let sources = entry.sources.iter().map(|source| format!("download from {source}"));
-        let steps = entry.conversion.as_ref().map(|steps| format!("converted by {steps}"));
+        let steps = entry.conversion.as_ref().map(|steps| format!("conversion: {steps}"));
         text.extend(note.into_iter().chain(url).chain(sources).chain(steps).map(|line| format!("    {line}\n")));
         facts.push(json!({ "id": entry.id, "state": state, "entry": entry }));
     }

@@ -34,7 +34,7 @@ pub struct Args {
 
 #[derive(clap::Subcommand)]
 enum WordsVerb {
-    /// Download GloVe vectors of 341479 English words through the installed npm.
+    /// Download GloVe vectors of 341,479 English words through the installed npm.
     ///
     /// 100 dimensions, 137 MB, licence PDDL.
     Fetch {

@@ -182,14 +182,16 @@ fn train_one(args: &Args, speaker: Option<&String>, config: &Config, ui: &Ui) ->
 /// The last validation as a table, with applicable warnings.
 fn metrics(validation: &Validation) -> String {
     let (predicted, mean_pose) = (&validation.generator, &validation.mean_pose);
-    let row = |name: &str, predicted: f64, mean_pose: f64| format!("{name:24}{predicted:9.3}   {mean_pose:9.3}\n");
+    let row = |name: &str, predicted: f64, mean_pose: f64| format!("{name:28}{predicted:9.3}   {mean_pose:9.3}\n");
     let distance = |metrics: &ValidationMetrics| metrics.frechet.unwrap_or(f64::NAN);
-    let mut text = format!("on {} {} windows    generator   mean pose\n", validation.n_windows, validation.split);
+    let windows = format!("on {}", counted(validation.n_windows, &format!("{} window", validation.split)));
+    let mut text = format!("{windows:28}generator   mean pose\n");
     text += &row("L1 (normalised)", predicted.l1, mean_pose.l1);
     text += &row("PCK 0.2", predicted.pck, mean_pose.pck);
     text += &row("PCK 0.2, arms", predicted.pck_body, mean_pose.pck_body);
     text += &row("PCK 0.2, fingers", predicted.pck_hands, mean_pose.pck_hands);
-    text += &row(&format!("Frechet cm2 ({})", validation.n_poses), distance(predicted), distance(mean_pose));
+    text +=
+        &row(&format!("Frechet, cm\u{b2} ({} poses)", validation.n_poses), distance(predicted), distance(mean_pose));
     text += &row("motion energy / truth", predicted.energy, mean_pose.energy);
     for (channel, of) in &validation.channels {
         text += &row(&format!("{} error (degrees)", channel.name()), of.generator, of.mean_pose);

@@ -94,15 +94,14 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     let validation = &outcome.validation;
     let mut text = format!(
         "{}{} ({steps_per_sec:.2} steps/s) on {}, {}, {} parameters\n\
-         on {} {} segments: L1 {:.3} (mean pose {:.3}), motion energy / truth {:.2}\n\
+         on {}: L1 {:.3} (mean pose {:.3}), motion energy / truth {:.2}\n\
          newest checkpoint  {}\nbest (step {})  {}{}",
         counted(outcome.steps, "step"),
         if outcome.stopped_early { ", stopped early: the validation score no longer improved" } else { "" },
         counted(outcome.n_examples, "training segment"),
         counted(outcome.n_words, "word"),
         outcome.n_parameters,
-        validation.n_segments,
-        validation.split,
+        counted(validation.n_segments, &format!("{} segment", validation.split)),
         validation.l1,
         validation.mean_pose_l1,
         validation.energy,

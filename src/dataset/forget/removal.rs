@@ -167,7 +167,7 @@ impl Removal {
             lines.extend(names.iter().map(|name| format!("{name} of the dataset {}", dir.display())));
         }
         if !keep_models {
-            lines.extend(self.models.iter().map(|path| format!("{} (trained with it)", path.display())));
+            lines.extend(self.models.iter().map(|path| format!("{} (trained on it)", path.display())));
         }
         lines
     }

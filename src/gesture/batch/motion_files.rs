@@ -127,10 +127,10 @@ pub fn write(
     match speaker {
         TrainedSpeaker::Gan(speaker) => {
             let name = speaker.name();
-            ensure!(speech.transcript.is_none(), "the model of {name} does not use words: leave out --transcript");
+            ensure!(speech.transcript.is_none(), "the model of {name} does not use words: omit --transcript");
             ensure!(
                 speech.seams == StateAtSeams::Renewed,
-                "the model of {name} does not generate in segments: leave out --carry-state"
+                "the model of {name} does not generate in segments: omit --carry-state"
             );
             write_motion(speaker, speech, outputs, progress)
         }

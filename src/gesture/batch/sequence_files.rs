@@ -34,7 +34,7 @@ pub fn write_sequence(
     }
     ensure!(
         !is_captured || figure == FigureOptions::default(),
-        "this network animates the BVH skeleton it was trained on, with its bone names and frame rate: leave out \
+        "this network animates the BVH skeleton it was trained on, with its bone names and frame rate: omit \
          --names and --fps"
     );
     let parsed = transcript.map(Transcript::read).transpose()?;

@@ -42,11 +42,11 @@ impl TrainedSpeaker {
         let speaker = SequenceGenerator::open(&file)?;
         ensure!(
             choice.seed.is_none(),
-            "{} is a checkpoint of `orator train seq2seq`, which has no variants: leave out --seed and --variants",
+            "{} is a checkpoint of `orator train seq2seq`, which has no variants: omit --seed and --variants",
             path.display()
         );
         if let Some(name) = choice.speaker.as_ref().filter(|name| **name != speaker.metadata.name) {
-            bail!("{} is a model of {}, not of {name:?}: leave out --speaker", path.display(), speaker.metadata.name);
+            bail!("{} is a model of {}, not of {name:?}: omit --speaker", path.display(), speaker.metadata.name);
         }
         Ok(Self::Sequence(Box::new(speaker)))
     }

@@ -27,7 +27,7 @@ pub fn vary(contents: &mut Contents, prefix: &str, seed: u64) -> Result<()> {
     let dropout = contents.facts["settings"]["dropout"].as_f64().unwrap_or(0.0);
     ensure!(
         dropout > 0.0 && dropout < 1.0,
-        "it was trained without dropout: leave out --seed and --variants, or train with gan.recipe = \"auto\" or a \
+        "it was trained without dropout: omit --seed and --variants, or train with gan.recipe = \"auto\" or a \
          gan.dropout above 0"
     );
     let name = format!("{prefix}{FIRST_LAYER}");

@@ -102,7 +102,7 @@ fn the_page_of_errors_is_written_where_it_is_asked_for() {
         project.answer_of(env!("CARGO_BIN_EXE_orator-lab"), &["evaluate", "people", "people", "--report", &text]);
     assert_eq!(report.code, 0, "{}", report.errors);
     let html = std::fs::read_to_string(&file).unwrap();
-    assert!(html.contains("Errors on rendered people") && !html.contains("Keypoints without ground truth"), "{html}");
+    assert!(html.contains("Errors on rendered persons") && !html.contains("Keypoints without ground truth"), "{html}");
     let both = ["evaluate", "people", "people", "--real", "people/pipeline.toml", "--report", &text];
     let report = project.answer_of(env!("CARGO_BIN_EXE_orator-lab"), &both);
     assert_eq!(report.code, 0, "{}", report.errors);

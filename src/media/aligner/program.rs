@@ -140,8 +140,8 @@ fn isolated(python: &Path, code: &str, folder: &Path) -> Result<Command> {
 /// Instructions for installing the package and naming its interpreter.
 fn remedy() -> String {
     format!(
-        "create one with `python3 -m venv aligner && aligner/bin/pip install pocketsphinx=={VERSION}`, and select it with \
-         --python aligner/bin/python or in ORATOR_PYTHON"
+        "install pocketsphinx with `python3 -m venv aligner && aligner/bin/pip install pocketsphinx=={VERSION}`, and \
+         select that Python with --python aligner/bin/python or ORATOR_PYTHON=aligner/bin/python"
     )
 }
 

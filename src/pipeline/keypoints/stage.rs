@@ -84,10 +84,14 @@ impl Stage for KeypointExtractStage {
         let found = keypoints::read(&unit.source)?;
         let source = self.source(unit).with_context(|| format!("no keypoints are configured for {unit}"))?;
         let Some(source_fps) = source.fps.or(found.fps) else {
-            bail!("{file} states no frame rate: set it next to `keypoints`, for example `fps = 25`");
+            bail!(
+                "{file} does not state its frame rate: set it beside `keypoints` in [[speaker]], for example `fps = 25`"
+            );
         };
         let Some(image_size) = source.image_size.or(found.image_size) else {
-            bail!("{file} states no picture size: set it next to `keypoints`, for example `size = \"1280x720\"`");
+            bail!(
+                "{file} does not state its image size: set it beside `keypoints` in [[speaker]], for example `size = \"1280x720\"`"
+            );
         };
         let format = format!("{} at {source_fps}", found.format);
         let fps = self.settings.rate();

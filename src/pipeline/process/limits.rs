@@ -91,7 +91,7 @@ impl Limits {
         }
         error.context(format!(
             "{}: reading it needs more than the {} MiB of memory allowed for {}. The file may be damaged or malicious: \
-             encode it again, with smaller pictures if needed",
+             re-encode it, at a lower resolution if needed",
             source.display(),
             self.memory >> 20,
             self.basis
@@ -103,7 +103,7 @@ impl Limits {
         (bytes > self.memory).then(|| {
             format!(
                 "used more than the {} MiB of memory allowed for {} and was killed. The file may be damaged or \
-                 malicious: encode it again, with smaller pictures if needed",
+                 malicious: re-encode it, at a lower resolution if needed",
                 self.memory >> 20,
                 self.basis
             )

@@ -99,7 +99,7 @@ impl SheetClip<'_> {
         let step = every_secs * fps.per_sec();
         ensure!(
             step.is_finite() && step >= 1.0,
-            "invalid interval of {every_secs} s between moments: at {fps}, expected at least {:.3} s",
+            "invalid interval of {every_secs} s between poses: at {fps}, expected at least {:.3} s",
             fps.secs(1)
         );
         let moments = (0..).map(|n| (f64::from(n) * step).round() as usize).take_while(|&frame| frame < n_frames);

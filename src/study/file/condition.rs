@@ -95,8 +95,8 @@ impl TryFrom<WrittenCondition> for StudyCondition {
             }
             (ConditionKind::Files, None, None, None) => return Err(missing("files", "files = \"other/{clip}.bvh\"")),
             _ => {
-                let rule = "the keys checkpoint, of and files are for the kinds checkpoint, mismatched and files";
-                return Err(format!("condition {name}: {rule}, respectively; remove the key of another kind"));
+                let rule = "the key checkpoint applies to the kind checkpoint, of to mismatched, files to files";
+                return Err(format!("condition {name}: {rule}; remove the other keys"));
             }
         };
         let real = real.unwrap_or(source == ConditionSource::Natural);

@@ -170,9 +170,7 @@ fn dubious_transcripts_are_reported() {
         assert!(text.contains(words), "{file}: {text}");
     }
     write_untrained_speaker(&dir.join("host.safetensors"));
-    for (more, words) in
-        [("--transcript good.tsv", "leave out --transcript"), ("--carry-state", "leave out --carry-state")]
-    {
+    for (more, words) in [("--transcript good.tsv", "omit --transcript"), ("--carry-state", "omit --carry-state")] {
         let text = failure(dir, &format!("--checkpoint host.safetensors --audio talks/a.wav {more} --out a.npy"));
         assert!(text.contains(words), "{text}");
     }
@@ -250,7 +248,7 @@ fn batches_find_their_transcripts_and_are_generated_once() {
     write_untrained_speaker(&dir.join("host.safetensors"));
     let args = "--checkpoint host.safetensors --audio-folder talks/sub --out-folder others";
     assert!(run(dir, args)["sounds"][0]["segments"].is_null());
-    assert!(failure(dir, &format!("{args} --transcript said")).contains("remove --transcript"));
+    assert!(failure(dir, &format!("{args} --transcript said")).contains("omit --transcript"));
     let args = "--checkpoint words.safetensors --audio-folder talks/sub --out-folder others";
     assert!(failure(dir, &format!("{args} --transcript talks/sub/b.srt")).contains("b.srt is not a folder"));
     let (code, text) = {

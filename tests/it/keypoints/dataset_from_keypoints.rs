@@ -121,11 +121,11 @@ fn errors_name_the_configuration_key_of_a_missing_value() {
         ("keypoints = [\"kp\", \"none/*.npz\"]\naudio = \"other.wav\"", "none/*.npz: no matching file"),
         (
             "keypoints = \"kp\"\naudio = \"other.wav\"",
-            "kp/clip states no frame rate: set it next to `keypoints`, for example `fps = 25`",
+            "kp/clip does not state its frame rate: set it beside `keypoints` in [[speaker]], for example `fps = 25`",
         ),
         (
             "keypoints = \"kp\"\naudio = \"other.wav\"\nfps = 15",
-            "kp/clip states no picture size: set it next to `keypoints`, for example `size = \"1280x720\"`",
+            "kp/clip does not state its image size: set it beside `keypoints` in [[speaker]], for example `size = \"1280x720\"`",
         ),
         (
             "keypoints = \"kp\"\nfps = 2000",

@@ -39,7 +39,7 @@ impl GlbRig {
         let (scene, bytes) = chunks(file)?;
         let buffers = scene["buffers"].as_array().map_or(0, Vec::len);
         let is_outside = scene["buffers"].as_array().into_iter().flatten().any(|buffer| buffer.get("uri").is_some());
-        ensure!(buffers <= 1 && !is_outside, "buffers in other files: export the scene as a single .glb");
+        ensure!(buffers <= 1 && !is_outside, "its buffers are in other files: export the scene as a single .glb");
         let list = |key: &str| scene[key].as_array().into_iter().flatten();
         let n_nodes = list("nodes").count();
         ensure!(n_nodes <= MAX_JOINTS, "{n_nodes} nodes, expected at most {MAX_JOINTS}: export only the character");

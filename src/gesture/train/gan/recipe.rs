@@ -231,7 +231,12 @@ pub fn lines(of: &GanSettings, material: &TrainingMaterial, secs_a_step: Option<
             "recipe {}: {train} of speech to train on{whose}, {held_out} to validate on",
             values["recipe"].as_str().unwrap_or("")
         ),
-        format!("  {} steps of {} windows{time}, a validation every {} steps{end}", of.steps, of.batch, of.epoch_steps),
+        format!(
+            "  {} of {} windows{time}, a validation every {}{end}",
+            counted(of.steps, "step"),
+            of.batch,
+            counted(of.epoch_steps, "step")
+        ),
         format!("  {}", numbers.collect::<Vec<_>>().join(", ")),
     ])
 }

@@ -82,7 +82,7 @@ impl Validation {
         let (own, mean_pose) = (&self.generator, &self.mean_pose);
         let percent = |share: f64| format!("{:.0} %", 100.0 * share);
         let frechet = match (own.frechet, mean_pose.frechet) {
-            (Some(own), Some(mean_pose)) => format!(", Frechet {own:.0} cm2 ({mean_pose:.0})"),
+            (Some(own), Some(mean_pose)) => format!(", Frechet {own:.0} cm\u{b2} ({mean_pose:.0})"),
             _ => String::new(),
         };
         format!(
@@ -136,7 +136,10 @@ pub fn alarm(energy: f64, spread: f64) -> Option<String> {
         Some(format!("the motion has collapsed towards the mean pose: it has {percent:.0} % of the data's energy"))
     } else if spread < MIN_SPREAD {
         let percent = 100.0 * spread;
-        Some(format!("the motion is alike whatever the sound: windows differ by {percent:.0} % of what real ones do"))
+        Some(format!(
+            "the motion hardly depends on the audio: windows differ by {percent:.0} % of the difference between real \
+             windows"
+        ))
     } else {
         None
     }

@@ -79,7 +79,7 @@ pub fn train_with_callback(
             let mismatched = vectors.filter(|vectors| vectors.dim() != network.word);
             ensure!(
                 mismatched.is_none(),
-                "the word vectors have {} dimensions, those of the checkpoint in {} {}: leave them out, or choose another \
+                "the word vectors have {} dimensions, those of the checkpoint in {} {}: omit --words, or choose another \
                  --out",
                 mismatched.map_or(0, WordVectors::dim),
                 folder.display(),

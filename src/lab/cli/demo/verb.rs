@@ -27,7 +27,7 @@ use orator_test_support::rule::{dataset, speech_dataset};
 use serde_json::json;
 use std::path::{Path, PathBuf};
 
-/// Default duration of a clip of rendered people, seconds.
+/// Default duration of a clip of rendered persons, seconds.
 const PEOPLE_SECS: f64 = 8.0;
 
 /// Generate synthetic speakers with known motion, and measure results on them.
@@ -55,11 +55,11 @@ enum DemoVerb {
         /// Conditions to render, separated by commas (front, standing, crossing ...); defaults to all.
         #[arg(long, value_name = "NAMES", value_delimiter = ',', requires = "people")]
         conditions: Vec<String>,
-        /// Write only the ground truth of the rendered people, without videos: motion for `orator-lab train lifter
+        /// Write only the ground truth of the rendered persons, without videos: motion for `orator-lab train lifter
         /// --mocap DIR/truth`.
         #[arg(long, requires = "people")]
         truth_only: bool,
-        /// Captured motion of the rendered people, a file or a folder; the audio is the .wav next to it.
+        /// Captured motion of the rendered persons, a file or a folder; the audio is the .wav next to it.
         #[arg(long, value_name = "FILE|DIR", requires = "people")]
         motion: Option<PathBuf>,
         /// Render the speaker as a person for the models for real people (`orator models fetch`), instead of as a
@@ -70,7 +70,7 @@ enum DemoVerb {
         /// dataset of audio and joints, for `orator train gan --from`.
         #[arg(long, value_name = "MIN", conflicts_with = "people", value_parser = clap::value_parser!(u32).range(1..=6000))]
         speech: Option<u32>,
-        /// Duration of each video, seconds; defaults to 30, for rendered people to 8.
+        /// Duration of each video, seconds; defaults to 30, for rendered persons to 8.
         #[arg(long)]
         secs: Option<f64>,
         /// Frame rate, frames per second, 1 to 120.
@@ -98,15 +98,15 @@ enum DemoVerb {
         #[arg(long, default_value_t = 2.0)]
         hours: f64,
         /// Add words that cannot be distinguished by their audio, some of which move a hand to a position of their
-        /// own (version 2 of the rule).
+        /// own (version 2 of the first rule).
         #[arg(long)]
         words: bool,
         /// Variant of the rule: other vowels move the hands, after other delays; 0 is the original rule.
         #[arg(long, value_name = "N", default_value_t = 0)]
         habits: u64,
         /// Folder of recorded speech to use instead of synthetic speech: NAME.wav with NAME.tsv (start, end, word),
-        /// in the split that NAME begins with. The gestures follow version 3 of the rule, based on loud syllables,
-        /// phrases and eight words.
+        /// in the split that NAME begins with. The gestures follow the second rule (version 3), based on loud
+        /// syllables, phrases and eight words.
         #[arg(long, value_name = "DIR", conflicts_with_all = ["hours", "words", "habits"])]
         speech: Option<PathBuf>,
         /// Random seed of the speech and of the variation of the speaker.
@@ -229,7 +229,7 @@ fn render(dir: &Path, plan: &RenderPlan, ui: &Ui) -> Result<Outcome> {
     let clips = people::folder::draw(dir, plan, ui)?;
     let next = format!("orator run -c {} --to pose2d", dir.join("pipeline.toml").display());
     let text = format!(
-        "rendered {} of people under {} to {}",
+        "rendered {} of persons under {} to {}",
         counted(clips.len(), "clip"),
         counted(plan.conditions.len(), "condition"),
         dir.join("videos").display()

@@ -9,7 +9,7 @@ use orator_base::stage::workdir;
 use serde_json::json;
 use std::path::PathBuf;
 
-/// Measure the errors of a run on rendered people, by condition.
+/// Measure the errors of a run on rendered persons, by condition.
 ///
 /// Compared with the ground truth: 2D keypoints, hands (missed, detected on the other hand, swapped, false positives),
 /// falsely accepted and rejected seconds, and lifted joints. The errors of the joints are printed next to those of

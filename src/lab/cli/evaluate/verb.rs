@@ -6,7 +6,7 @@ use orator::cli::Outcome;
 use orator::cli::sandbox::enter_sandbox;
 use orator::cli::ui::Ui;
 
-/// Measure the lifters on known motion, and the pipeline on rendered people.
+/// Measure the lifters on known motion, and the pipeline on rendered persons.
 #[derive(clap::Args)]
 pub struct Args {
     #[command(subcommand)]

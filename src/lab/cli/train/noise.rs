@@ -9,7 +9,7 @@ use orator_base::stage::workdir;
 use serde_json::json;
 use std::path::PathBuf;
 
-/// Fit the noise model for lifter training to 2D errors on rendered people.
+/// Fit the noise model for lifter training to 2D errors on rendered persons.
 ///
 /// The model has a bias that depends on the orientation of the bones in the image, a residual bias per clip, noise
 /// per frame, outliers and gaps, each for visible and for hidden points.

@@ -21,8 +21,8 @@ pub fn html(rows: &[ConditionRow], last: Option<&Grid>) -> String {
         body: shown(grid).into(),
     }));
     let page = Page {
-        title: "Errors on rendered people".to_owned(),
-        lead: format!("{n_clips} clips of rendered people with ground truth; model sets: {}.", names.join(", ")),
+        title: "Errors on rendered persons".to_owned(),
+        lead: format!("{n_clips} clips of rendered persons with ground truth; model sets: {}.", names.join(", ")),
         sections,
         style: "",
         script: "",

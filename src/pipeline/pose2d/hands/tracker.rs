@@ -23,7 +23,7 @@ const MIN_HAND_DISTANCE: f64 = 0.08;
 /// A palm whose square is closer than this to a detected hand, in sides of the square, belongs to that hand.
 const MIN_PALM_DISTANCE: f64 = 0.25;
 /// Least handedness probability. Below it the shape is mostly wrong: thumb and little finger exchanged, or points of
-/// another hand. On rendered people 5.7 % of the detected hands are below, among them half of those with an error of
+/// another hand. On rendered persons 5.7 % of the detected hands are below, among them half of those with an error of
 /// more than 0.4 palms and 1.4 % of the others. 0.5 reduces the finger error by 1 to 2 %, but rejects more than twice
 /// as many of the others, and many hands of real clips in between look right.
 const MIN_SIDE_PROBABILITY: f64 = 0.3;

@@ -8,7 +8,7 @@ use orator_base::types::image::Image;
 use orator_base::types::pose2d::coco;
 
 /// Two hands whose centres are closer than this, in palm lengths of the larger, are one, and the less certain one is
-/// rejected. On rendered people this rejects 42 of 45 duplicates and 0.5 % of the true hands.
+/// rejected. On rendered persons this rejects 42 of 45 duplicates and 0.5 % of the true hands.
 const MIN_DISTANCE: f64 = 0.65;
 /// Score from which a hand is accepted even so: hands that touch without occlusion.
 const CERTAIN_SCORE: f64 = 0.95;
