@@ -105,7 +105,7 @@ impl LineChart {
                 svg = svg.child(stroke(&format!("colour-{}", drawn.colour), points.iter().copied()));
             }
             if let ([only], 1) = (&points[..], drawn.points.len()) {
-                svg = svg.child(circle("dot", *only, 3.0));
+                svg = svg.child(circle(&format!("dot colour-{}", drawn.colour), *only, 3.0));
             }
         }
         svg
