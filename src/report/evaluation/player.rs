@@ -243,9 +243,8 @@ pub fn body(excerpts: &[Excerpt], table: &Table) -> Vec<Node> {
         card.child(chart)
     });
     let about = format!(
-        "Excerpts with the smallest, median and largest mean joint error. Both figures are shown \
-         from the camera{}. The curves below belong to the selected excerpt; the scale of each is its own range of \
-         values.",
+        "Excerpts with the smallest, median and largest mean joint error. Both figures are shown from \
+         the camera{}. The curves below belong to the selected excerpt; each chart is scaled to its own range.",
         if table.with_sound { "" } else { "; the evaluation has no audio" }
     );
     [node("p").text(about), player, colour_legend()].into_iter().chain(charts).collect()

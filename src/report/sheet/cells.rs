@@ -79,7 +79,7 @@ pub fn pose_cell(joints: ArrayView2<f32>, from: CellView) -> Result<Image> {
     draw_head(&mut cell, from)?;
     draw_pose(&mut cell, joints, &view)?;
     let label = match from {
-        CellView::Front => "front",
+        CellView::Front => "front; axes in metres",
         CellView::Left => "from the speaker's left   <-- front",
     };
     draw::text(&mut cell, label, [6.0, 16.0], 9.0, INK)?;
@@ -99,7 +99,7 @@ fn draw_grid(cell: &mut Image) -> Result<()> {
         draw::line(cell, [at[0], 0.0], [at[0], end], 1.0, rgb)?;
         draw::line(cell, [0.0, at[1]], [end, at[1]], 1.0, rgb)?;
         if decimetre % 5 == 0 && (0.0..end).contains(&at[0]) {
-            let label = format!("{:.1} m", f64::from(decimetre) / 10.0);
+            let label = format!("{:.1}", f64::from(decimetre) / 10.0);
             draw::text(cell, &label, [at[0] + 3.0, end - 4.0], 8.0, mix(INK, PAPER, 0.3))?;
         }
     }

@@ -58,7 +58,7 @@ impl<'a> TrainingLog<'a> {
             ),
             chart(
                 "Frechet distance, cm\u{b2}",
-                "Between single poses of the validation; lower is better; overestimated with few poses.",
+                "Between the distributions of single poses; lower is better; overestimated from few poses.",
                 vec![generated("validation", 0, "frechet")],
                 vec![mean_pose("mean pose", 0, "frechet")],
             ),

@@ -70,7 +70,7 @@ fn of_task(task: &TaskAnalysis) -> String {
         TaskDesign::Turing => {
             "participants saw a real and a generated motion for the same speech side by side and chose the real one"
         }
-        TaskDesign::TuringSingle => "participants saw one film at a time and judged whether its motion was real",
+        TaskDesign::TuringSingle => "participants saw one video at a time and judged whether its motion was real",
         TaskDesign::Preference => {
             "participants saw two motions for the same speech side by side and rated their preference in five steps"
         }
@@ -78,7 +78,7 @@ fn of_task(task: &TaskAnalysis) -> String {
             "participants rated all conditions of a speech on one page from 0 to 100 (Jonell et al. 2021)"
         }
         TaskDesign::Mismatch => {
-            "participants saw two motions, one of which belonged to the speech in the film, and chose the matching one"
+            "participants saw two motions, one of which belonged to the speech in the video, and chose the matching one"
         }
     };
     let speakers = match task.speakers.len() {
@@ -118,7 +118,7 @@ fn statistics(analysis: &StudyAnalysis) -> String {
             distribution (MacKinnon et al. 2021). ";
     }
     if is_used(StatisticMethod::Sides) {
-        text += "The permutation test of sides is exact, over all assignments of the real film to left and right \
+        text += "The permutation test of sides is exact, over all assignments of the real motion to left and right \
             within a participant. ";
     }
     if analysis.tasks.iter().flat_map(|task| &task.shares).any(|share| share.model.is_some()) {

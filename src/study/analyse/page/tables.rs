@@ -68,8 +68,8 @@ pub(super) fn task(task: &TaskAnalysis) -> Vec<Node> {
 
 fn share_title(share: &ShareAnalysis) -> String {
     let what = match share.measure {
-        ShareMeasure::GeneratedChosen => "generated film chosen",
-        ShareMeasure::MatchedChosen => "matching film chosen",
+        ShareMeasure::GeneratedChosen => "generated motion chosen",
+        ShareMeasure::MatchedChosen => "matching motion chosen",
         ShareMeasure::Correct => "correct",
         ShareMeasure::JudgedReal => "judged real",
     };
