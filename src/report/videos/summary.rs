@@ -140,7 +140,7 @@ fn by_speaker(videos: &[VideoSummary]) -> Option<Node> {
         let sums = ReportTotals::sum(videos);
         node("tr")
             .child(node("th").attr("scope", "row").class("name").text(speaker))
-            .child(node("td").class("num").text(videos.len().to_string()))
+            .child(node("td").class("num").text(videos.len()))
             .children([sums.total, sums.accepted].map(|secs| node("td").class("num").text(length(secs))))
             .child(node("td").class("num").text(percent(sums.accepted, sums.total)))
     };
