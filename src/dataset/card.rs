@@ -6,6 +6,7 @@ use super::split::{Split, SplitRule};
 use super::stats::DatasetStats;
 use crate::config::choices::SplitUnit;
 use orator_base::stage::ledger::WordCount;
+use orator_base::stage::rejection::Rejection;
 use orator_base::text::{counted, length, percent};
 use std::fmt::Write;
 
@@ -27,6 +28,19 @@ const NOTES: [(&str, &str); 6] = [
          how much that moved its joints is in a sample's json",
         "does not come from a video: pose2d is 0. Bones have their median length in the take; the json of a sample \
          states how far this moved its joints",
+    ),
+];
+
+/// Shapes and meanings of shard members in `info.json`, and their text in the card.
+const MEMBERS: [(&str, &str); 3] = [
+    (
+        "whether the joint was seen; false where it is missing or was filled in",
+        "whether the joint was detected; false where it is missing or interpolated",
+    ),
+    ("T seconds times the sound rate", "T \u{d7} `sound_rate` / `fps`"),
+    (
+        "mono sound from the first frame's beginning to the last's end",
+        "mono audio from the start of the first frame to the end of the last",
     ),
 ];
 
@@ -55,7 +69,10 @@ pub fn text(info: &DatasetInfo, stats: &DatasetStats, leakage: &Leakage) -> Stri
          | file | shape | element | meaning |\n|---|---|---|---|\n"
     );
     for (name, member) in &info.members {
-        let _ = writeln!(text, "| `{name}` | {} | {} | {} |", member.shape, member.element, member.meaning);
+        let [shape, meaning] = [&member.shape, &member.meaning].map(|stored| {
+            MEMBERS.iter().find(|(from, _)| from == stored).map_or(stored.as_str(), |(_, printed)| printed)
+        });
+        let _ = writeln!(text, "| `{name}` | {shape} | {} | {meaning} |", member.element);
     }
     let axes = &info.axes;
     let _ = write!(
@@ -78,7 +95,7 @@ pub fn text(info: &DatasetInfo, stats: &DatasetStats, leakage: &Leakage) -> Stri
         length(stats.footage.accepted_secs)
     );
     for (reason, secs) in &stats.footage.rejected_secs {
-        let _ = writeln!(text, "| rejected: {reason} | {} |", length(*secs));
+        let _ = writeln!(text, "| rejected: {} | {} |", Rejection::label(reason), length(*secs));
     }
     let _ = writeln!(text, "| failed | {} |", length(stats.footage.failed_secs));
     if let Some(WordCount { n_words, n_accepted, .. }) = stats.footage.words {
@@ -177,16 +194,13 @@ fn describe_leakage(leakage: &Leakage) -> String {
     if leakage.duplicate_secs <= 0.0 {
         return "Videos were not compared for shared audio.".to_owned();
     }
-    let same = match leakage.shared.len() {
-        0 => "none were found".to_owned(),
-        n => format!("{} found", counted(n, "such pair")),
-    };
-    let leaks = match leakage.leaks.len() {
-        0 => "none across splits".to_owned(),
-        n => format!("{n} ACROSS SPLITS (see `leakage.json`)"),
+    let found = match (leakage.shared.len(), leakage.leaks.len()) {
+        (0, 0) => "no such pair was found".to_owned(),
+        (n, 0) => format!("{} found, none across splits", counted(n, "such pair")),
+        (n, leaks) => format!("{} found, {leaks} ACROSS SPLITS (see `leakage.json`)", counted(n, "such pair")),
     };
     format!(
-        "Videos that share at least {} of audio are assigned to one split: {same}, {leaks}.",
+        "Videos that share at least {} of audio are assigned to one split: {found}.",
         length(leakage.duplicate_secs)
     )
 }

@@ -48,7 +48,7 @@ pub fn html(table: &Table, clips: &EvalClips, title: &str) -> Result<String> {
 
 fn lead(table: &Table) -> String {
     format!(
-        "{} of {}, {} of motion at {}{}.",
+        "{}, {}, {} of motion at {}{}.",
         counted(table.n_clips, "clip"),
         counted(table.n_frames, "frame"),
         length(table.secs),

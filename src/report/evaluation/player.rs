@@ -243,8 +243,8 @@ pub fn body(excerpts: &[Excerpt], table: &Table) -> Vec<Node> {
         card.child(chart)
     });
     let about = format!(
-        "Excerpts with the smallest, median and largest mean joint error. Both figures are seen from the camera and \
-         face you{}. The curves below belong to the selected excerpt.",
+        "Excerpts with the smallest, median and largest mean joint error. Both figures are shown from \
+         the camera{}. The curves below belong to the selected excerpt; each chart is scaled to its own range.",
         if table.with_sound { "" } else { "; the evaluation has no audio" }
     );
     [node("p").text(about), player, colour_legend()].into_iter().chain(charts).collect()

@@ -79,8 +79,8 @@ pub fn pose_cell(joints: ArrayView2<f32>, from: CellView) -> Result<Image> {
     draw_head(&mut cell, from)?;
     draw_pose(&mut cell, joints, &view)?;
     let label = match from {
-        CellView::Front => "front",
-        CellView::Left => "side view from the left;  <-- facing this way",
+        CellView::Front => "front; axes in metres",
+        CellView::Left => "from the speaker's left   <-- front",
     };
     draw::text(&mut cell, label, [6.0, 16.0], 9.0, INK)?;
     Ok(cell)

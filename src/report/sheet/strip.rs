@@ -48,7 +48,7 @@ pub fn draw_strip(image: &mut Image, top: usize, motion: &Motion, frames: Range<
         }
     }
     for &mark in marks {
-        let label = format!("{:.1}", motion.fps.secs(mark));
+        let label = format!("{:.1} s", motion.fps.secs(mark));
         draw::text(image, &label, [x_of(mark) - 8.0, (top + STRIP_PX) as f32 - 8.0], 9.0, INK)?;
     }
     Ok(())

@@ -47,8 +47,8 @@ impl<'a> TrainingLog<'a> {
             chart(
                 "L1 error",
                 "Error of the normalised coordinates; lower is better.",
-                vec![training("training", 2, "l1"), generated("held out", 0, "l1")],
-                vec![mean_pose("mean pose, held out", 0, "l1")],
+                vec![training("training", 2, "l1"), generated("validation", 0, "l1")],
+                vec![mean_pose("mean pose, validation", 0, "l1")],
             ),
             chart(
                 "Correct keypoints (PCK 0.2)",
@@ -58,20 +58,20 @@ impl<'a> TrainingLog<'a> {
             ),
             chart(
                 "Frechet distance, cm\u{b2}",
-                "Between single held-out poses; lower is better; overestimated with few poses.",
-                vec![generated("held out", 0, "frechet")],
+                "Between the distributions of single poses; lower is better; overestimated from few poses.",
+                vec![generated("validation", 0, "frechet")],
                 vec![mean_pose("mean pose", 0, "frechet")],
             ),
             chart(
                 "Motion energy",
                 "Relative to the data: 1 moves as much as the speaker, 0 is static.",
-                vec![generated("held out", 0, "energy")],
+                vec![generated("validation", 0, "energy")],
                 vec![level("data", 2, 1.0), level("collapse threshold", 1, 0.3)],
             ),
             chart(
                 "Score",
-                "Selects the best checkpoint (dashed line); lower is better.",
-                vec![curve(&self.epochs, "held out", 0, |line| line["validation"]["score"].as_f64())],
+                "Selects the best checkpoint (vertical dashed line); lower is better.",
+                vec![curve(&self.epochs, "validation", 0, |line| line["validation"]["score"].as_f64())],
                 vec![],
             ),
             chart(

@@ -1,5 +1,5 @@
-//! Page of a training run, next to its checkpoints: learning curves with the best epoch marked, the metrics of the best
-//! epoch and of the mean pose, and generated and true poses.
+//! Page of a training run, next to its checkpoints: learning curves with the best checkpoint marked, the metrics of the
+//! best checkpoint and of the mean pose, and generated and true poses.
 
 use super::charts::{TrainingLog, metrics};
 use super::strip::{HeldOutPair, strip};
@@ -38,12 +38,12 @@ pub fn write(folder: &Path, speaker: &str, pairs: &[HeldOutPair]) -> Result<()> 
     let training_log = TrainingLog::parse(&lines);
     let charts = training_log.charts();
     let mut poses = vec![node("p").text(
-        "Held-out intervals: the speaker's motion and, below it, the motion that the best checkpoint generates from \
+        "Validation intervals: the speaker's motion and, below it, the motion that the best checkpoint generates from \
          the audio alone. The curves show the height of the wrists: the speaker's in grey, the generated one in \
          colour.",
     )];
     if pairs.is_empty() {
-        poses = vec![node("p").class("empty").text("No held-out interval with the 49 joints to show.")];
+        poses = vec![node("p").class("empty").text("No validation interval with the 49 joints to show.")];
     } else {
         let strip = strip(pairs)?;
         let names: Vec<&str> = pairs.iter().map(|pair| pair.name.as_str()).collect();
@@ -56,7 +56,7 @@ pub fn write(folder: &Path, speaker: &str, pairs: &[HeldOutPair]) -> Result<()> 
         title: format!("Training of {speaker}"),
         lead: lead(&training_log),
         sections: vec![
-            section("best", "Best epoch", best(&training_log)),
+            section("best", "Best checkpoint", best(&training_log)),
             section("curves", "Curves", vec![node("div").class("grid").children(charts.iter().map(LineChart::card))]),
             section("poses", "Generated and ground-truth poses", poses),
         ],
@@ -73,17 +73,22 @@ fn lead(training_log: &TrainingLog) -> String {
     let last = training_log.epochs.last().map_or(0, |line| step(line));
     let (key, of) =
         if best["validation"]["n_segments"].is_u64() { ("n_segments", "sequence") } else { ("n_windows", "window") };
+    let split = match best["validation"]["split"].as_str() {
+        Some("train") => "training",
+        Some(split) => split,
+        None => "validation",
+    };
     let windows = best["validation"][key].as_u64().unwrap_or(0) as usize;
     format!(
-        "{last} steps and {}. The best score is at step {}, measured on {} of the {} split.",
+        "{} and {}. The best score is at step {}, measured on {} of the {split} split.",
+        counted(last as usize, "step"),
         counted(training_log.epochs.len(), "validation"),
         step(best),
         counted(windows, of),
-        best["validation"]["split"].as_str().unwrap_or("validation"),
     )
 }
 
-/// Table of the best epoch's metrics, with warnings if necessary.
+/// Table of the best checkpoint's metrics, with warnings if necessary.
 fn best(training_log: &TrainingLog) -> Vec<Node> {
     let Some(best) = training_log.best.map(|line| &line["validation"]) else {
         return vec![node("p").class("empty").text("The log has no validation yet.")];

@@ -40,22 +40,29 @@ const BONES: &str = "bone_change";
 const LENGTHS: &str = "interval_secs";
 
 const ROWS: [Measure; 18] = [
-    row("sound_db", "Loudness", "dB", [-100.0, 0.0], 50, "min_sound_db"),
+    row("sound_db", "Loudness", "dBFS", [-100.0, 0.0], 50, "min_sound_db"),
     row("speech", "Share of speech", "", UNIT_RANGE, 50, "min_speech"),
     row("lip_sync", "Correlation of mouth and voice", "", [-1.0, 1.0], 50, "min_lip_sync"),
-    row("still", "Picture change", "8-bit levels", [0.0, 4.0], 80, "min_change"),
+    row("still", "Picture change", "levels (8-bit)", [0.0, 4.0], 80, "min_change"),
     row("person", "Highest score of face and arms", "", UNIT_RANGE, 40, "joint_score"),
     row("shoulder_px", "Distance between the shoulders", "px", [0.0, 600.0], 60, "min_shoulder_px"),
     row("face", "Score of nose and eyes", "", UNIT_RANGE, 40, "joint_score"),
-    row("facing", "Shoulder width", "\u{d7} neck-nose", [-2.0, 4.0], 60, "min_facing"),
-    row("nose_off", "Horizontal distance from nose to neck", "half shoulder widths", [0.0, 3.0], 60, "max_nose_off"),
+    row("facing", "Shoulder width", "\u{d7} neck-nose distance", [-2.0, 4.0], 60, "min_facing"),
+    row(
+        "nose_off",
+        "Horizontal distance from nose to neck",
+        "\u{d7} half shoulder width",
+        [0.0, 3.0],
+        60,
+        "max_nose_off",
+    ),
     row("arms", "Lowest score of shoulders and elbows", "", UNIT_RANGE, 40, "joint_score"),
     row("left_hand", "Score of the left hand", "", UNIT_RANGE, 40, "joint_score"),
     row("right_hand", "Score of the right hand", "", UNIT_RANGE, 40, "joint_score"),
-    row("rest", "Wrist movement of resting hands", "shoulder widths", UNIT_RANGE, 50, "max_rest_move"),
-    row("jump", "Neck movement per frame", "shoulder widths", [0.0, 1.5], 60, "max_jump"),
+    row("rest", "Wrist movement of resting hands", "\u{d7} shoulder width", UNIT_RANGE, 50, "max_rest_move"),
+    row("jump", "Neck movement per frame", "\u{d7} shoulder width", [0.0, 1.5], 60, "max_jump"),
     row("shot_score", "Shot score", "", UNIT_RANGE, 50, "shot_threshold"),
-    row("n_people", "Persons in view", "persons", [-0.5, 10.5], 11, "max_persons"),
+    row("n_people", "Persons in view", "", [-0.5, 10.5], 11, "max_persons"),
     row(BONES, "Deviation of lifted bones from their length", "\u{d7} length", [0.0, 1.5], 60, "max_bone_change"),
     row(LENGTHS, "Length of accepted intervals", "s", [0.0, 60.0], 60, "min_frames"),
 ];
@@ -114,8 +121,8 @@ impl MeasureCounts {
 
 /// Section with a card for each measure.
 pub fn distributions(measures: &MeasureCounts, settings: &Settings, per_sec: f64) -> Vec<Node> {
-    let about = "All frames of all videos, including rejected ones. Values that fail the threshold have another \
-                 colour. Bar heights are proportional to the square root of the share, so that rare values stay \
+    let about = "All frames of all videos, including rejected ones. Values below a minimum or above a maximum have \
+                 another colour. Bar heights are proportional to the square root of the share, so that rare values stay \
                  visible; the outer bars include all values beyond the axis.";
     let cards = measures.all().map(|(measure, counts)| card(measure, counts, measure.threshold(settings, per_sec)));
     vec![node("p").text(about), node("div").class("grid").children(cards)]
@@ -137,8 +144,9 @@ fn card(shown: &Measure, counts: &Counts, threshold: ThresholdLine) -> Node {
     let beyond: u64 = beyond.map(|bin| counts.bins[bin]).sum();
     let beyond = percent(beyond as f64, total);
     let of_unknown = format!("; unknown for {}", percent(unknown, total + unknown));
+    let side = if threshold.is_minimum { "below" } else { "above" };
     let description =
-        format!("about {beyond} beyond the threshold{}", if unknown > 0.0 { of_unknown.as_str() } else { "" });
+        format!("about {beyond} {side} the threshold{}", if unknown > 0.0 { of_unknown.as_str() } else { "" });
     let what = counted(counts.total() as usize, shown.of());
     let label = format!("{}, {what}: {description}", shown.title);
     card.child(histogram(&label, counts, shown.unit, Some(threshold)))

@@ -25,7 +25,7 @@ pub fn gallery(worst: &Worst, pictures: &Pictures, videos: &[VideoSummary]) -> V
     let mut shown = vec![node("p").text(about)];
     for ((_, reason, unit), moments) in &worst.rules {
         let swatch = node("span").class(format!("swatch {}", reasons::class(reason)));
-        let measured = if unit.is_empty() { String::new() } else { format!(", measured in {unit}") };
+        let measured = if unit.is_empty() { String::new() } else { format!(", threshold in {unit}") };
         let about = format!("{}{measured}", counted(moments.len(), "interval"));
         let title = node("h3")
             .class("rule")

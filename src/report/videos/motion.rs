@@ -22,7 +22,7 @@ pub fn motion(movement: &MovementCounts) -> Vec<Node> {
     }
     let about = format!(
         "{} in accepted intervals: arm joints relative to the neck, fingertips relative to the wrist, in metres. Line: \
-         minimum to maximum; box: 5 % to 95 % of the positions; notch: median.",
+         minimum to maximum; box: 5th to 95th percentile; notch: median.",
         counted(movement.n_frames, "frame")
     );
     let legend = legend(SIDES.map(|side| (format!("side {side}"), format!("speaker's {side}"))));

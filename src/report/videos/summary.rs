@@ -140,11 +140,11 @@ fn by_speaker(videos: &[VideoSummary]) -> Option<Node> {
         let sums = ReportTotals::sum(videos);
         node("tr")
             .child(node("th").attr("scope", "row").class("name").text(speaker))
-            .child(node("td").class("num").text(counted(videos.len(), "video")))
+            .child(node("td").class("num").text(videos.len()))
             .children([sums.total, sums.accepted].map(|secs| node("td").class("num").text(length(secs))))
             .child(node("td").class("num").text(percent(sums.accepted, sums.total)))
     };
-    let heads = [("Speaker", ""), ("", "num"), ("Length", "num"), ("Accepted", "num"), ("", "num")];
+    let heads = [("Speaker", ""), ("Videos", "num"), ("Length", "num"), ("Accepted", "num"), ("Share", "num")];
     (of_speakers.len() > 1).then(|| html::table("speakers", heads.map(head), of_speakers.iter().map(row)))
 }
 
@@ -158,7 +158,7 @@ pub fn table(videos: &[VideoSummary], splits: &VideoSplits) -> Vec<Node> {
         ("Video", ""),
         ("Length", "num"),
         ("Accepted", "num"),
-        ("", "num"),
+        ("Share", "num"),
         ("Split", ""),
         ("Main reasons for rejection", ""),
     ];

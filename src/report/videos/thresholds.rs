@@ -10,7 +10,7 @@ pub struct ThresholdGrid {
     /// Key in `[segment]`.
     pub key: &'static str,
     pub description: &'static str,
-    /// Unit; empty for a score or share in 0..1.
+    /// Unit; empty for a score or share in 0..1 and for a count that the description names.
     pub unit: &'static str,
     /// Ends of the grid.
     pub low: f64,
@@ -53,19 +53,31 @@ pub const THRESHOLDS: [ThresholdGrid; 19] = [
     row!(min_speech, "minimum share of speech in the 4 s around a frame", "", 0.0, 1.0),
     row!(min_lip_sync, "minimum correlation of mouth and voice in the 8 s around a frame", "", -0.5, 0.5),
     row!(max_quiet_secs, "longest accepted pause in speech", "s", 0.0, 10.0),
-    row!(min_change, "minimum picture change; below it the picture is static", "8-bit levels", 0.0, 1.0),
+    row!(
+        min_change,
+        "minimum picture change between frames; below it the picture is static",
+        "levels (8-bit)",
+        0.0,
+        1.0
+    ),
     row!(max_static_secs, "longest accepted static picture", "s", 0.0, 1.0),
     row!(joint_score, "minimum score of a visible face, arm or hand keypoint", "", 0.0, 1.0),
     row!(min_shoulder_px, "minimum distance between the shoulders", "px", 10.0, 210.0),
-    row!(min_facing, "minimum shoulder width: 2 from the front, 0 from the side", "neck-nose distances", -1.0, 3.0),
-    row!(max_nose_off, "maximum horizontal distance from nose to neck", "half shoulder widths", 0.0, 4.0),
+    row!(
+        min_facing,
+        "minimum shoulder width: 2 from the front, 0 from the side",
+        "\u{d7} neck-nose distance",
+        -1.0,
+        3.0
+    ),
+    row!(max_nose_off, "maximum horizontal distance from nose to neck", "\u{d7} half shoulder width", 0.0, 4.0),
     row!(max_body_gap_secs, "longest gap of face or arms that is filled", "s", 0.0, 1.0),
     row!(max_hand_gap_secs, "longest gap of a hand that is masked", "s", 0.0, 1.0),
     row!(min_hand_share, "minimum share of an interval in which each hand is visible", "", 0.0, 1.0),
-    row!(max_rest_move, "maximum wrist movement of resting hands within a second", "shoulder widths", 0.0, 0.4),
-    row!(max_jump, "maximum neck movement between two frames", "shoulder widths", 0.1, 2.1),
+    row!(max_rest_move, "maximum wrist movement of resting hands within a second", "\u{d7} shoulder width", 0.0, 0.4),
+    row!(max_jump, "maximum neck movement between two frames", "\u{d7} shoulder width", 0.1, 2.1),
     row!(shot_threshold, "minimum shot score of the first frame of a shot", "", 0.0, 1.0),
-    row!(max_persons, "maximum number of persons in view", "persons", 1.0, 21.0, u32),
+    row!(max_persons, "maximum number of persons in view", "", 1.0, 21.0, u32),
     row!(max_crowd_share, "maximum share of an interval with more persons", "", 0.0, 1.0),
     row!(min_frames, "minimum length of an accepted interval", "frames", 16.0, 176.0, usize),
 ];

@@ -58,7 +58,7 @@ fn exclusions(summary: &ExclusionSummary) -> String {
         false => "Exclusion rules were applied that do not count as registered in advance",
     };
     format!(
-        "{applied}: {}; {} of {} remain. ",
+        "{applied}: {}; {} from {} remain. ",
         list(&summary.rules.iter().map(rule).collect::<Vec<_>>()),
         counted(summary.n_votes_analysed, "vote"),
         counted(summary.n_participants_analysed, "participant")
@@ -70,7 +70,7 @@ fn of_task(task: &TaskAnalysis) -> String {
         TaskDesign::Turing => {
             "participants saw a real and a generated motion for the same speech side by side and chose the real one"
         }
-        TaskDesign::TuringSingle => "participants saw one film at a time and judged whether its motion was real",
+        TaskDesign::TuringSingle => "participants saw one video at a time and judged whether its motion was real",
         TaskDesign::Preference => {
             "participants saw two motions for the same speech side by side and rated their preference in five steps"
         }
@@ -78,7 +78,7 @@ fn of_task(task: &TaskAnalysis) -> String {
             "participants rated all conditions of a speech on one page from 0 to 100 (Jonell et al. 2021)"
         }
         TaskDesign::Mismatch => {
-            "participants saw two motions, one of which belonged to the speech in the film, and chose the matching one"
+            "participants saw two motions, one of which belonged to the speech in the video, and chose the matching one"
         }
     };
     let speakers = match task.speakers.len() {
@@ -86,7 +86,7 @@ fn of_task(task: &TaskAnalysis) -> String {
         n => format!(" of {n} speakers"),
     };
     format!(
-        "In the task {}, {procedure} ({} of {} on {}{speakers}). ",
+        "In the task {}, {procedure} ({} from {} on {}{speakers}). ",
         task.task,
         counted(task.n_votes, "vote"),
         counted(task.n_participants, "participant"),
@@ -118,7 +118,7 @@ fn statistics(analysis: &StudyAnalysis) -> String {
             distribution (MacKinnon et al. 2021). ";
     }
     if is_used(StatisticMethod::Sides) {
-        text += "The permutation test of sides is exact, over all assignments of the real film to left and right \
+        text += "The permutation test of sides is exact, over all assignments of the real motion to left and right \
             within a participant. ";
     }
     if analysis.tasks.iter().flat_map(|task| &task.shares).any(|share| share.model.is_some()) {
@@ -181,9 +181,15 @@ fn results(analysis: &StudyAnalysis) -> String {
             let equivalence = statistics.equivalence(StatisticMethod::Crossed).map(|test| {
                 format!("; equivalence within \u{b1}{} percentage points: {}", points(test.bound), p_value(test.p))
             });
+            let chosen = match share.measure {
+                ShareMeasure::GeneratedChosen => "generated motion chosen",
+                ShareMeasure::MatchedChosen => "matching motion chosen",
+                ShareMeasure::Correct => "correct",
+                ShareMeasure::JudgedReal => "judged real",
+            };
             let _ = write!(
                 text,
-                "{}, {}: {} [{}], {statistic}{}{adjusted}{}. ",
+                "{}, {}: {chosen} in {} of the votes [{}], {statistic}{}{adjusted}{}. ",
                 task.task,
                 super::conclusions::scope(share),
                 percent(share.share),
@@ -221,7 +227,7 @@ mod tests {
             text.contains("fixed before the study were applied: failed 1 check (1 participant, 2 votes)"),
             "{text}"
         );
-        assert!(text.contains("3 votes of 1 participant remain"), "{text}");
+        assert!(text.contains("3 votes from 1 participant remain"), "{text}");
         summary.registered = false;
         let text = exclusions(&summary);
         assert!(text.contains("do not count as registered") && !text.contains("before the study"), "{text}");

@@ -16,7 +16,7 @@ pub fn text(analysis: &StudyAnalysis) -> String {
     let summary = &analysis.exclusions;
     let votes = counted(summary.n_votes_analysed, "vote");
     let participants = counted(summary.n_participants_analysed, "participant");
-    let _ = writeln!(text, "{}: {votes} of {participants}", analysis.title);
+    let _ = writeln!(text, "{}: {votes} from {participants}", analysis.title);
     if !analysis.hypotheses.is_empty() {
         text += "\nregistered hypotheses\n";
         for hypothesis in &analysis.hypotheses {

@@ -71,7 +71,7 @@ fn captures_need_an_output_folder_and_have_a_page_without_poses() {
     let set = "--set seq2seq.batch=3 --set seq2seq.hidden=8 --set seq2seq.epoch_steps=4";
     answer(dir, &format!("train seq2seq --captures takes --steps 8 --out model {set}"));
     let page = std::fs::read_to_string(dir.join("model/training.html")).unwrap();
-    assert!(page.contains("Training of takes") && page.contains("No held-out interval with the 49 joints to show"));
+    assert!(page.contains("Training of takes") && page.contains("No validation interval with the 49 joints to show"));
     let output = orator(dir, "generate --checkpoint model --audio takes/a.wav --transcript takes/a.tsv --out a.bvh");
     assert!(output.status.success() && dir.join("a.bvh").is_file());
 }

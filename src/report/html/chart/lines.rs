@@ -48,13 +48,14 @@ impl LineChart {
         self.points().next().is_none()
     }
 
-    /// Ranges of the axes: first to last step, and 0 (or the smallest value below it) to the largest value.
+    /// Ranges of the axes: first to last step including the marked one, and 0 (or the smallest value below it) to the
+    /// largest value.
     fn ranges(&self) -> [[f64; 2]; 2] {
         let levels = self.levels.iter().map(|level| level.value).filter(|value| value.is_finite());
         let range_of = |values: &mut dyn Iterator<Item = f64>, low: f64| {
             values.fold([low, f64::NEG_INFINITY], |[low, high], value| [low.min(value), high.max(value)])
         };
-        let steps = range_of(&mut self.points().map(|[step, _]| step), f64::INFINITY);
+        let steps = range_of(&mut self.points().map(|[step, _]| step).chain(self.marked), f64::INFINITY);
         let values = range_of(&mut self.points().map(|[_, value]| value).chain(levels), 0.0);
         [steps, values]
             .map(|[low, high]| if high > low { [low, high] } else { [low.min(0.0), low.max(0.0) + 1.0] })
@@ -105,7 +106,7 @@ impl LineChart {
                 svg = svg.child(stroke(&format!("colour-{}", drawn.colour), points.iter().copied()));
             }
             if let ([only], 1) = (&points[..], drawn.points.len()) {
-                svg = svg.child(circle("dot", *only, 3.0));
+                svg = svg.child(circle(&format!("dot colour-{}", drawn.colour), *only, 3.0));
             }
         }
         svg

@@ -32,7 +32,7 @@ pub fn tracks(label: &str, secs: f64, tracks: &[Track]) -> Node {
     for (i, track) in tracks.iter().enumerate() {
         let top = i as f64 * (TRACK + GAP) + GAP;
         let floor = top + TRACK;
-        svg = svg.child(text_at("name", [LEFT, top - 6.0], "start", &track.name));
+        svg = svg.child(text_at("name", [LEFT + 6.0, top - 6.0], "start", &track.name));
         svg = svg.child(line("grid", [LEFT, floor], [RIGHT, floor]));
         let values = track.lines.iter().flat_map(|(_, points)| points.iter().map(|point| point[1]));
         let [low, high] = values

@@ -95,7 +95,7 @@ fn shares(task: &TaskAnalysis, analysis: &StudyAnalysis) -> Vec<Node> {
         .collect();
     if !single.is_empty() {
         let scale = ForestScale { low: 0.0, high: 100.0, middle: None, band: None, unit: "% of votes" };
-        body.push(node("p").text("Share of votes that judged the films of each condition real."));
+        body.push(node("p").text("Share of votes that judged the motion of each condition real."));
         body.push(card(forest("Judged real", &single, &scale)));
     }
     body

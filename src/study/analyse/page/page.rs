@@ -38,9 +38,10 @@ fn lead(analysis: &StudyAnalysis) -> String {
         false => String::new(),
     };
     format!(
-        "{} of {}{left_out}: {}.",
+        "{} from {}{left_out}. {}: {}.",
         counted(summary.n_votes_analysed, "vote"),
         counted(summary.n_participants_analysed, "participant"),
+        if tasks.len() == 1 { "Task" } else { "Tasks" },
         list(&tasks)
     )
 }

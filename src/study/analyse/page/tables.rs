@@ -10,7 +10,7 @@ use orator_base::text::number;
 use orator_report::html::{Node, node, table};
 
 /// Columns of the table of statistics.
-const COLUMNS: [&str; 6] = ["Method", "Interval", "Statistic", "p", "p after Holm", "Status"];
+const COLUMNS: [&str; 6] = ["Method", "Interval", "Statistic (df)", "p", "p after Holm", "Status"];
 
 /// Table of a task's statistics, grouped by quantity.
 pub(super) fn task(task: &TaskAnalysis) -> Vec<Node> {
@@ -20,7 +20,7 @@ pub(super) fn task(task: &TaskAnalysis) -> Vec<Node> {
         rows.extend(statistic_rows(&share.statistics, 100.0, " %"));
         rows.extend(share.model.as_ref().map(|model| {
             let details = format!(
-                "log odds {:.3} \u{b1} {:.3}; standard deviations of participants {:.2}, of clips {:.2}",
+                "log odds {:.3}, standard error {:.3}; standard deviations: participants {:.2}, clips {:.2}",
                 model.log_odds, model.standard_error, model.sd_participants, model.sd_clips
             );
             let name = node("th").attr("scope", "row").text("estimates of the mixed model");
@@ -68,8 +68,8 @@ pub(super) fn task(task: &TaskAnalysis) -> Vec<Node> {
 
 fn share_title(share: &ShareAnalysis) -> String {
     let what = match share.measure {
-        ShareMeasure::GeneratedChosen => "generated film chosen",
-        ShareMeasure::MatchedChosen => "matching film chosen",
+        ShareMeasure::GeneratedChosen => "generated motion chosen",
+        ShareMeasure::MatchedChosen => "matching motion chosen",
         ShareMeasure::Correct => "correct",
         ShareMeasure::JudgedReal => "judged real",
     };
