@@ -34,21 +34,34 @@ enum SubmitTarget {
 /// Default time limit of a worker if the work was not timed, hours.
 const UNKNOWN_HOURS: f64 = 12.0;
 
-/// Options of every kind of job.
+/// Options of every kind of worker.
 #[derive(clap::Args)]
-struct JobArgs {
+struct WorkerArgs {
     /// Plan written by `orator plan`.
     #[arg(long, value_name = "FILE")]
     plan: PathBuf,
+    /// CPU cores per worker; each core processes one video.
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    cores: usize,
+    /// Path of the program on the machines of the cluster; defaults to the path of this program.
+    #[arg(long, value_name = "FILE")]
+    program: Option<PathBuf>,
+    /// Write and print the jobs, but do not submit them.
+    #[arg(long)]
+    dry_run: bool,
+}
+
+/// Options of the jobs of a scheduler.
+#[derive(clap::Args)]
+struct JobArgs {
+    #[command(flatten)]
+    worker: WorkerArgs,
     /// Number of workers.
     #[arg(long, value_name = "N", default_value_t = 16)]
     tasks: usize,
     /// Maximum number of workers that run at the same time; defaults to all.
     #[arg(long, value_name = "N")]
     at_once: Option<usize>,
-    /// CPU cores per worker; each core processes one video.
-    #[arg(long, value_name = "N", default_value_t = 1)]
-    cores: usize,
     /// Memory per worker, GiB; defaults to 1.5 per core.
     #[arg(long, value_name = "GIB")]
     memory: Option<f64>,
@@ -56,12 +69,6 @@ struct JobArgs {
     /// an estimate.
     #[arg(long, value_name = "HOURS")]
     hours: Option<f64>,
-    /// Path of the program on the machines of the cluster; defaults to the path of this program.
-    #[arg(long, value_name = "FILE")]
-    program: Option<PathBuf>,
-    /// Write and print the jobs, but do not submit them.
-    #[arg(long)]
-    dry_run: bool,
 }
 
 /// Submit a Slurm job array of workers.
@@ -118,12 +125,11 @@ struct KubernetesArgs {
 
 /// Start a worker on each host over SSH.
 ///
-/// The command waits until all workers have ended. The options --tasks, --at-once, --memory and --hours have no effect:
-/// one worker without a time limit is started on each host.
+/// The command waits until all workers have ended. One worker without a time limit is started on each host.
 #[derive(clap::Args)]
 struct SshArgs {
     #[command(flatten)]
-    job: JobArgs,
+    worker: WorkerArgs,
     /// Host names, as passed to ssh.
     #[arg(required = true, value_name = "HOST")]
     hosts: Vec<String>,
@@ -137,16 +143,18 @@ pub(crate) fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     }
 }
 
-impl JobArgs {
-    /// Reads the plan; returns it with its work folder and the request for its jobs.
-    fn request(&self) -> Result<(ClusterPlan, PathBuf, JobRequest)> {
+impl WorkerArgs {
+    /// Reads the plan; returns it with its work folder and the request for its jobs. `job` has the options of a
+    /// scheduler.
+    fn request(&self, job: Option<&JobArgs>) -> Result<(ClusterPlan, PathBuf, JobRequest)> {
         let (plan, pipeline) = open(&self.plan)?;
         let work = pipeline.config().settings.work.dir.clone();
-        ensure!(self.tasks > 0 && self.cores > 0, "--tasks and --cores: expected at least 1");
-        let n_at_once = self.at_once.unwrap_or(self.tasks);
+        let tasks = job.map_or(1, |job| job.tasks);
+        ensure!(tasks > 0 && self.cores > 0, "--tasks and --cores: expected at least 1");
+        let n_at_once = job.and_then(|job| job.at_once).unwrap_or(tasks);
         let lengths: Vec<f64> = plan.videos().iter().filter_map(|video| video.secs).collect();
         let predicted = StageTimes::read(&work).map(|times| times.limit_hours(&lengths, n_at_once * self.cores));
-        let hours = self.hours.or(predicted).unwrap_or(UNKNOWN_HOURS);
+        let hours = job.and_then(|job| job.hours).or(predicted).unwrap_or(UNKNOWN_HOURS);
         ensure!(hours > 0.0, "--hours: expected more than 0");
         let program = match &self.program {
             Some(program) => program.clone(),
@@ -155,11 +163,11 @@ impl JobArgs {
         let request = JobRequest {
             program,
             plan: absolute(&self.plan)?,
-            n_tasks: self.tasks.min(plan.units.len().max(1)),
+            n_tasks: tasks.min(plan.units.len().max(1)),
             n_at_once,
             worker_limits: TaskLimits {
                 cores: self.cores,
-                memory_gib: self.memory.unwrap_or(1.5 * self.cores as f64),
+                memory_gib: job.and_then(|job| job.memory).unwrap_or(1.5 * self.cores as f64),
                 hours,
             },
         };
@@ -185,8 +193,8 @@ impl SlurmArgs {
 }
 
 fn to_slurm(args: &SlurmArgs, ui: &Ui) -> Result<Outcome> {
-    let (plan, work, request) = args.job.request()?;
-    let folder = args.job.jobs_folder(&plan)?;
+    let (plan, work, request) = args.job.worker.request(Some(&args.job))?;
+    let folder = args.job.worker.jobs_folder(&plan)?;
     let max_array = match args.max_array {
         Some(max) => max,
         None => max_array_size().unwrap_or(1001),
@@ -206,7 +214,7 @@ fn to_slurm(args: &SlurmArgs, ui: &Ui) -> Result<Outcome> {
     let last = write("last.sh".to_owned(), &scripts.last)?;
     let trainings = numbered("train", &scripts.trainings)?;
     let mut ids = Vec::new();
-    if !args.job.dry_run {
+    if !args.job.worker.dry_run {
         for file in &arrays {
             ids.push(sbatch(&[], file)?);
         }
@@ -220,7 +228,7 @@ fn to_slurm(args: &SlurmArgs, ui: &Ui) -> Result<Outcome> {
         }
     }
     let files: Vec<PathBuf> = arrays.into_iter().chain([last]).chain(trainings).collect();
-    let text = match args.job.dry_run {
+    let text = match args.job.worker.dry_run {
         true => scripts
             .arrays
             .iter()
@@ -235,7 +243,7 @@ fn to_slurm(args: &SlurmArgs, ui: &Ui) -> Result<Outcome> {
             format!("submitted {workers}, a final job{trainings}: {}", ids.join(", "))
         }
     };
-    let next = args.job.next();
+    let next = args.job.worker.next();
     ui.summary(&text, Some(&next), json!({ "scripts": files, "jobs": ids, "next": next }));
     Ok(Outcome::Done)
 }
@@ -271,7 +279,7 @@ fn sbatch(options: &[&str], script: &Path) -> Result<String> {
 }
 
 fn to_kubernetes(args: &KubernetesArgs, ui: &Ui) -> Result<Outcome> {
-    let (plan, work, request) = args.job.request()?;
+    let (plan, work, request) = args.job.worker.request(Some(&args.job))?;
     let target = KubernetesTarget {
         image: args.image.clone(),
         namespace: args.namespace.clone(),
@@ -279,12 +287,12 @@ fn to_kubernetes(args: &KubernetesArgs, ui: &Ui) -> Result<Outcome> {
         claim_gib: args.claim_size,
         mount: args.mount.clone(),
     };
-    let file = args.job.jobs_folder(&plan)?.join("kubernetes.json");
+    let file = args.job.worker.jobs_folder(&plan)?.join("kubernetes.json");
     let manifests = manifests(&request, &plan, &work, &target);
     let text = serde_json::to_string_pretty(&manifests)?;
     workdir::write_file(&file, text.as_bytes())?;
-    let next = args.job.next();
-    if args.job.dry_run {
+    let next = args.job.worker.next();
+    if args.job.worker.dry_run {
         ui.summary(&text, Some(&next), json!({ "manifests": file, "next": next }));
         return Ok(Outcome::Done);
     }
@@ -303,10 +311,10 @@ fn to_kubernetes(args: &KubernetesArgs, ui: &Ui) -> Result<Outcome> {
 }
 
 fn to_ssh(args: &SshArgs, ui: &Ui) -> Result<Outcome> {
-    let (_, _, request) = args.job.request()?;
+    let (_, _, request) = args.worker.request(None)?;
     let line = shell(&request.last_worker());
-    let next = args.job.next();
-    if args.job.dry_run {
+    let next = args.worker.next();
+    if args.worker.dry_run {
         let lines: Vec<String> =
             args.hosts.iter().map(|host| format!("ssh {host} {}", shell(std::slice::from_ref(&line)))).collect();
         ui.summary(&lines.join("\n"), Some(&next), json!({ "commands": lines, "next": next }));

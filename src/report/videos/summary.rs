@@ -198,12 +198,22 @@ pub type VideoSplits = BTreeMap<String, String>;
 /// Splits of all videos that are in a dataset; a speaker without a dataset has none.
 pub fn video_splits(settings: &Settings, videos: &[Videos]) -> VideoSplits {
     let mut splits = VideoSplits::new();
-    for Videos { speaker, .. } in videos {
+    for Videos { speaker, units, .. } in videos {
         // A single file is read, which is consistent even while a run replaces the dataset.
         let info = std::fs::read(speaker_dir(&settings.work.dir, StageName::Dataset, speaker).join(INFO));
         let info: Option<DatasetInfo> = info.ok().and_then(|bytes| serde_json::from_slice(&bytes).ok());
-        let named = info.iter().flat_map(|info| &info.videos).filter(|video| video.samples > 0);
-        splits.extend(named.map(|video| (format!("{speaker}/{}", video.name), split_names(video))));
+        // The dataset names videos by their content, the work folder by their path; both have the file name.
+        let videos: Vec<&DatasetVideo> = info.iter().flat_map(|info| &info.videos).collect();
+        for unit in units {
+            let is_of =
+                |video: &&&DatasetVideo| unit.source.file_name().is_some_and(|name| name == video.file.as_str());
+            let mut named = videos.iter().filter(is_of);
+            if let (Some(video), None) = (named.next(), named.next())
+                && video.samples > 0
+            {
+                splits.insert(unit.to_string(), split_names(video));
+            }
+        }
     }
     splits
 }

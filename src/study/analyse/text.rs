@@ -40,8 +40,8 @@ pub fn text(analysis: &StudyAnalysis) -> String {
     if summary.any_excluded() {
         text += "\nexcluded by each rule alone\n";
         for rule in &summary.rules {
-            let _ =
-                writeln!(text, "  {:<44} {:>6} participants {:>8} votes", rule.rule, rule.n_participants, rule.n_votes);
+            let (participants, votes) = (counted(rule.n_participants, "participant"), counted(rule.n_votes, "vote"));
+            let _ = writeln!(text, "  {:<44} {participants:>19} {votes:>14}", rule.rule);
         }
         for (task, all) in analysis.tasks.iter().zip(&analysis.without_exclusions) {
             if let Some((analysed, all)) = task.pooled().zip(all.pooled()) {

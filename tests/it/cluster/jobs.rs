@@ -51,7 +51,9 @@ fn jobs_are_written_for_slurm_kubernetes_and_ssh() {
         (Some("Never"), Some("registry/orator:1"))
     );
 
-    let ssh = project.answer(&[&["submit", "ssh"], &job[..], &["a", "b"]].concat());
+    let ssh = project.answer(&["submit", "ssh", "--plan", "work/plan.json", "--dry-run", "a", "b"]);
     let lines = ssh.json["commands"].as_array().unwrap();
     assert!(ssh.code == 0 && lines.len() == 2 && lines[1].as_str().unwrap().starts_with("ssh b "), "{}", ssh.errors);
+    let no_effect = project.answer(&["submit", "ssh", "--plan", "work/plan.json", "--hours", "2", "--dry-run", "a"]);
+    assert!(no_effect.code == 1 && no_effect.errors.contains("--hours"), "{}", no_effect.errors);
 }

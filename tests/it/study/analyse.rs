@@ -254,8 +254,10 @@ fn damaged_tables_are_reported_by_line_without_a_panic() {
         let answer = project.answer(&["study", "analyse", "fuzz.csv", "--draws", "100"]);
         assert!([0, 1, 2].contains(&answer.code) && !answer.errors.contains("panicked"), "{round}: {}", answer.errors);
     }
+    std::fs::write(project.dir().join("motion.npy"), b"\x93NUMPY\x01\x00v\x00{'descr': '<f4'}\n").unwrap();
     for (args, expected) in [
         (vec!["study", "analyse", "none.csv"], "none.csv"),
+        (vec!["study", "analyse", "motion.npy"], "the file is binary"),
         (vec!["study", "analyse", "bad.csv", "--columns", "who=x"], "unknown field \"who\""),
         (vec!["study", "analyse", "bad.csv", "--columns", "clip=film"], "column \"film\" not found"),
         (vec!["study", "analyse", "bad.csv", "--bound", "70"], "--bound 70:"),

@@ -118,12 +118,13 @@ pub type NumberedRows = Vec<(u64, std::result::Result<RowCells, String>)>;
 /// returned with the reason.
 ///
 /// # Errors
-/// The text is UTF-16 or empty, required columns are missing, or there are too many rows.
+/// The text is UTF-16, binary or empty, required columns are missing, or there are too many rows.
 pub fn delimited_rows(bytes: &[u8], names: &ColumnNames) -> Result<NumberedRows> {
     ensure!(
         !bytes.starts_with(&[0xff, 0xfe]) && !bytes.starts_with(&[0xfe, 0xff]),
         "the file is UTF-16: save it as UTF-8"
     );
+    ensure!(!bytes.iter().take(512).any(|byte| *byte == 0), "the file is binary: expected CSV, TSV or JSON Lines");
     let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
     let delimiter = delimiter(bytes);
     let mut reader = csv::ReaderBuilder::new();
