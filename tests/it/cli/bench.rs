@@ -57,7 +57,7 @@ fn a_training_step_is_measured() {
     assert!(facts["secs_a_step"].as_f64().unwrap() > 0.0, "{facts}");
     assert_eq!(facts["parts"].as_object().unwrap().len(), 5, "{facts}");
     fails("train --batch 1", "two windows");
-    fails("train --preset large", "`light` or `paper`");
+    fails("train --preset large", "`light`, `paper`");
 }
 
 #[test]

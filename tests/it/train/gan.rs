@@ -151,13 +151,13 @@ fn windows_of_60_frames_are_trained_with_all_losses_of_rebol2021() {
         preset: NetworkPreset::Light,
         window_frames: 60,
         batch: 2.into(),
-        steps: 3.into(),
-        epoch_steps: 3.into(),
+        steps: 10.into(),
+        epoch_steps: 10.into(),
         ..GanConfig::default()
     };
     let out = folder.path().join("out");
     let outcome = train(&dataset, &settings, &out, &Silent).unwrap();
-    assert_eq!((outcome.steps, outcome.n_examples), (3, 8));
+    assert_eq!((outcome.steps, outcome.n_examples), (10, 8));
     let log = std::fs::read_to_string(out.join("metrics.jsonl")).unwrap();
     let lines = log.lines().map(|line| serde_json::from_str::<serde_json::Value>(line).unwrap());
     let step = lines.into_iter().find(|line| line["l1"].is_number()).unwrap_or_else(|| panic!("{log}"));

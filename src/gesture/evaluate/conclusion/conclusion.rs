@@ -124,7 +124,13 @@ pub fn against_constant_pose(table: &Table, own: &PredictorRow, index: usize) ->
     (tested.mean.value.is_finite() && table.n_blocks >= MIN_BLOCKS).then(|| answer(&tested))
 }
 
+/// Differences below this are rounding errors of f32 positions, in any unit of a metric (mm, %, shares).
+const NEGLIGIBLE: f64 = 1e-4;
+
 fn answer(tested: &TestedDifference) -> Answer {
+    if tested.mean.value.abs() < NEGLIGIBLE {
+        return Answer::Inconclusive;
+    }
     match (tested.mean.interval.excludes_zero(), tested.mean.value > 0.0) {
         (true, true) => Answer::Yes,
         (true, false) => Answer::No,
