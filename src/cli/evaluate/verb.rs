@@ -1,7 +1,8 @@
 //! `orator evaluate`, and its verb `compare` for two results.
 
+use super::speakers;
 use crate::cli::Outcome;
-use crate::cli::config_args::split;
+use crate::cli::config_args::{ConfigArgs, split};
 use crate::cli::moved::MovedVerb;
 use crate::cli::sandbox::enter_sandbox;
 use crate::cli::train::stopped::same_command;
@@ -73,6 +74,12 @@ struct MotionArgs {
     /// else the newest); all are reported in one table.
     #[arg(long, value_name = "FILE|DIR", requires = "dataset", num_args = 1..)]
     checkpoint: Vec<PathBuf>,
+    /// Configured speaker, or `all`: prints the PCK of each speaker's model on its own dataset.
+    #[arg(long, value_name = "NAME|all", conflicts_with_all = ["truth", "dataset", "report", "all"])]
+    speaker: Option<String>,
+    /// Configuration file with the speakers of --speaker.
+    #[arg(short, long, value_name = "FILE", default_value = "pipeline.toml", requires = "speaker")]
+    config: PathBuf,
     /// Split of the dataset: train, validation or test.
     #[arg(long, value_name = "SPLIT", default_value = "validation", value_parser = split)]
     split: Split,
@@ -94,7 +101,12 @@ struct MotionArgs {
 }
 
 pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
-    let MotionArgs { report, dataset, checkpoint, .. } = &args.motion;
+    let MotionArgs { report, dataset, checkpoint, speaker, config, split, .. } = &args.motion;
+    if let Some(which) = speaker {
+        let folders = speakers::folders(&ConfigArgs { config: config.clone(), set: Vec::new() }, which)?;
+        enter_sandbox(None, speakers::locked(&folders));
+        return speakers::run(&folders, *split, &settings(&args.motion), ui);
+    }
     enter_sandbox(report.as_deref(), dataset.iter().chain(checkpoint).map(PathBuf::as_path));
     match args.mode {
         Some(EvaluateMode::Lifter(args)) => args.fail("evaluate lifter"),
@@ -123,17 +135,11 @@ fn motion(args: &MotionArgs, ui: &Ui) -> Result<Outcome> {
     // The folder of a dataset is writable in the sandbox because it contains the dataset's lock.
     let in_dataset = |folder: &PathBuf| MotionStore::in_folder(folder, MEMORY_BYTES);
     let store = args.dataset.as_ref().map_or_else(MotionStore::in_memory, in_dataset);
-    let settings = MetricSettings {
-        convention: args.convention,
-        alphas: args.alpha.clone(),
-        with_neck: args.with_neck,
-        ..MetricSettings::default()
-    };
     // The page lists its inputs, so the locks prevent `orator forget` from removing them before the page is written.
     let _dataset = args.dataset.as_deref().map(FolderLock::shared).transpose()?;
     let _models: Vec<FolderLock> = args.checkpoint.iter().map(|path| model_lock(path)).collect::<Result<_>>()?;
     let evaluation = evaluation(args, &store, ui)?;
-    let table = evaluation.measure(&settings, ui)?;
+    let table = evaluation.measure(&settings(args), ui)?;
     let mut facts: Value = result::json(&table);
     let mut text = text::text(&table, args.all);
     if let Some(path) = &args.report {
@@ -149,6 +155,15 @@ fn motion(args: &MotionArgs, ui: &Ui) -> Result<Outcome> {
     };
     ui.summary(&text, Some(&next), facts);
     Ok(Outcome::Done)
+}
+
+fn settings(args: &MotionArgs) -> MetricSettings {
+    MetricSettings {
+        convention: args.convention,
+        alphas: args.alpha.clone(),
+        with_neck: args.with_neck,
+        ..MetricSettings::default()
+    }
 }
 
 /// Title of the evaluation: names of the inputs without folders of this machine.
@@ -171,7 +186,7 @@ fn evaluation(args: &MotionArgs, store: &MotionStore, ui: &Ui) -> Result<Evaluat
         return Evaluation::of_generators(&dataset, &checkpoints, args.split, store, ui);
     }
     let (Some(truth), Some(prediction)) = (&args.truth, &args.prediction) else {
-        bail!("nothing to measure: give --truth and --prediction, or --dataset and --checkpoint")
+        bail!("nothing to measure: give --truth and --prediction, --dataset and --checkpoint, or --speaker")
     };
     Evaluation::from_files(truth, prediction, args.audio.as_deref(), args.input_fps, store, ui)
 }

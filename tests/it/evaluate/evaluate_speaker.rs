@@ -18,6 +18,40 @@ use orator_test_support::project::Project;
 use std::path::Path;
 
 #[test]
+fn configured_speakers_are_evaluated_by_one_command() {
+    let project = Project::with_clips("all-speakers", 0, 1.0);
+    let data = project.work().join("dataset/host");
+    std::fs::create_dir_all(&data).unwrap();
+    dataset(&data);
+    let sets = ["gan.batch=2", "gan.epoch_steps=2", "gan.checkpoint_every=2"].map(|set| ["--set", set]).concat();
+    let answer = project.answer(&[&["train", "gan", "--steps", "4"], &sets[..]].concat());
+    assert_eq!(answer.code, 0, "{}", answer.errors);
+    let all = project.answer(&["evaluate", "--speaker", "all", "--split", "validation", "--alpha", "0.2"]);
+    assert_eq!(all.code, 0, "{}", all.errors);
+    let row = &all.json["speakers"][0];
+    let one = project.answer(&[
+        "evaluate",
+        "--dataset",
+        "work/dataset/host",
+        "--checkpoint",
+        "work/gan/host",
+        "--alpha",
+        "0.2",
+    ]);
+    let metrics = one.json["metrics"].as_array().unwrap();
+    let is_pck =
+        |metric: &&serde_json::Value| metric["name"].as_str().unwrap().starts_with("pck") && metric["part"] == "all";
+    let values = &metrics.iter().find(is_pck).unwrap()["values"];
+    for (key, predictor) in [("pck", "prediction"), ("pck_of_mean_pose", "mean_pose")] {
+        assert_eq!(row[key].as_array().unwrap().len(), 1, "{row}");
+        assert_eq!(row[key][0]["value"], values[predictor]["value"], "{row}");
+    }
+    assert_eq!((&row["speaker"], &row["pck"][0]["alpha"]), (&"host".into(), &0.2.into()));
+    let unknown = project.answer(&["evaluate", "--speaker", "nobody"]);
+    assert!(unknown.code == 1 && unknown.errors.contains("expected all or one of host"), "{}", unknown.errors);
+}
+
+#[test]
 fn a_training_writes_a_page_and_its_speaker_is_evaluated() {
     let project = Project::with_clips("measured", 0, 1.0);
     let (data, out) = (project.dir().join("data"), project.dir().join("gan"));
