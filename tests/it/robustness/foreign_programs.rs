@@ -238,14 +238,13 @@ fn cluster_clients_are_the_installed_ones_and_find_named_files() {
         log.display()
     );
     ["scontrol", "sbatch", "kubectl", "ssh"].iter().for_each(|name| script(&bin.path().join(name), &lines));
-    let job = ["--plan", "work/plan.json", "--tasks", "1", "--hours", "1"];
     let kubernetes = ["kubernetes", "--image", "registry/orator:1", "--claim", "project", "--mount", "/project"];
     for (to, programs) in [
-        (&["slurm"][..], &["scontrol", "sbatch", "sbatch"][..]),
+        (&["slurm", "--tasks", "1", "--hours", "1"][..], &["scontrol", "sbatch", "sbatch"][..]),
         (&kubernetes, &["kubectl"]),
         (&["ssh", "a"], &["ssh"]),
     ] {
-        let mut command = project.command(&[&["submit"], to, &job].concat());
+        let mut command = project.command(&[&["submit"], to, &["--plan", "work/plan.json"]].concat());
         command.env("PATH", path_after_working_directory(Some(bin.path()))).env("KUBECONFIG", "kube/config:/etc/other");
         let output = command.output().unwrap();
         assert!(output.status.success(), "{}", text_of(&output));
