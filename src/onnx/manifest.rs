@@ -121,7 +121,7 @@ mod tests {
         assert!(message("sha256 = \"4720", "sha256 = \"x720").contains("64 hex"));
         assert!(message("[1, 3, 320, 320]", "[1, 320, 320]").contains("shape"));
         assert!(message("body = [0, ", "body = [99, ").contains("index 99"));
-        assert!(message("file = \"wink", "file = \"../wink").contains("plain name"));
+        assert!(message("file = \"wink", "file = \"../wink").contains("plain file name"));
         assert!(message("margin = 1.25", "margin = 0.0").contains("incompatible"));
         assert!(message("person-yolox-nano", "person-rtmdet-nano").contains("duplicate"));
     }

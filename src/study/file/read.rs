@@ -203,7 +203,7 @@ mod tests {
                             (did you mean appropriateness?)"]
         );
         let wrong = one("[[task]]\nname = \"x\"\ndesign = \"turin\"\ntrials = 3\n");
-        assert!(wrong[0].starts_with("line 12: task[x].design: \"turin\" is not known"), "{wrong:?}");
+        assert!(wrong[0].starts_with("line 12: task[x].design: unknown value \"turin\""), "{wrong:?}");
         assert!(wrong[0].ends_with("(did you mean turing?)"), "{wrong:?}");
         assert_eq!(
             one("[[condition]]\nname = \"b\"\nkind = \"files\"\n"),
