@@ -106,10 +106,12 @@ fn heading(split: Split, settings: &MetricSettings) -> String {
     )
 }
 
-/// Indices of the PCK metrics of all joints.
+/// Indices of the PCK of all joints, one per alpha: in 3D if the convention has it.
 fn pck(table: &Table) -> impl Iterator<Item = usize> {
-    let is_pck = |definition: &Definition| definition.name.starts_with("pck") && definition.part == "all";
-    table.definitions.iter().enumerate().filter(move |(_, definition)| is_pck(definition)).map(|(index, _)| index)
+    let all = || table.definitions.iter().filter(|of| of.name.starts_with("pck") && of.part == "all");
+    let name = all().map(|of| of.name).find(|name| *name == "pck_3d").or_else(|| Some(all().next()?.name));
+    let is_chosen = move |of: &Definition| Some(of.name) == name && of.part == "all";
+    table.definitions.iter().enumerate().filter(move |(_, of)| is_chosen(of)).map(|(index, _)| index)
 }
 
 /// Values of a predictor in percent with intervals, one per alpha.

@@ -39,8 +39,7 @@ fn configured_speakers_are_evaluated_by_one_command() {
         "0.2",
     ]);
     let metrics = one.json["metrics"].as_array().unwrap();
-    let is_pck =
-        |metric: &&serde_json::Value| metric["name"].as_str().unwrap().starts_with("pck") && metric["part"] == "all";
+    let is_pck = |metric: &&serde_json::Value| metric["name"] == "pck_3d" && metric["part"] == "all";
     let values = &metrics.iter().find(is_pck).unwrap()["values"];
     for (key, predictor) in [("pck", "prediction"), ("pck_of_mean_pose", "mean_pose")] {
         assert_eq!(row[key].as_array().unwrap().len(), 1, "{row}");
