@@ -29,7 +29,7 @@ fn a_speaker_without_visible_hands_is_rejected_without_a_failure() {
     assert!(line.contains("hands"), "{line}");
     let answer = project.run(&[]);
     assert_eq!(answer.code, 2, "a speaker without an interval");
-    assert!(answer.errors.contains("hands"), "{}", answer.errors);
+    assert!(answer.errors.contains("hand not visible"), "{}", answer.errors);
 }
 
 #[test]
