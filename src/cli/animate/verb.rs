@@ -161,7 +161,9 @@ fn animate_folder(
     let [folder] = args.out.as_slice() else { bail!("--format: expected exactly one --out, a folder") };
     ensure!(!folder.is_file(), "output {} is a file; --format expects a folder as --out", folder.display());
     let endings: Vec<&str> = args.format.iter().map(|ending| ending.trim_start_matches('.')).collect();
-    endings.iter().try_for_each(|ending| ExportFormat::from_path(&folder.join(format!("x.{ending}"))).map(drop))?;
+    for ending in &endings {
+        ExportFormat::from_path(Path::new(&format!("--format .{ending}")))?;
+    }
     let task = ui.begin("animating", inputs.len() as u64);
     let (mut text, mut facts, mut n_failed, mut n_files) = (String::new(), Vec::new(), 0, 0);
     for input in inputs {

@@ -1,6 +1,6 @@
 //! `orator train gan`.
 
-use super::training::{ALL, TrainingFolders, TrainingPage, middle, page_samples};
+use super::training::{ALL, TrainingFolders, TrainingPage, middle, page_samples, speed};
 use crate::cli::Outcome;
 use crate::cli::config_args::ConfigArgs;
 use crate::cli::ui::Ui;
@@ -139,10 +139,10 @@ fn train_one(args: &Args, speaker: Option<&String>, config: &Config, ui: &Ui) ->
     let mut page = TrainingPage::new(&out, names.clone(), Box::new(poses), ui);
     let validated = &mut |at| page.update(at);
     let outcome = train::train_with_callback(&datasets, &settings, args.from.as_deref(), &out, ui, validated)?;
-    let steps_per_sec = (outcome.steps - outcome.began_at) as f64 / start.elapsed().as_secs_f64().max(1e-9);
+    let (speed, steps_per_sec) = speed(outcome.began_at, outcome.steps, start.elapsed().as_secs_f64());
     let page = page.finish(ValidatedStep { step: outcome.steps, best_step: outcome.best_step });
     let text = format!(
-        "{}: {}{} ({steps_per_sec:.2} steps/s, {:.1} % of the time waiting for data) on {}, {} parameters\n\
+        "{}: {}{} ({speed}, {:.1} % of the time waiting for data) on {}, {} parameters\n\
          {}\nnewest checkpoint  {}\nbest (step {}{})  {}{}",
         names,
         counted(outcome.steps, "step"),

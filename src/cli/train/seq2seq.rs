@@ -1,6 +1,6 @@
 //! `orator train seq2seq`.
 
-use super::training::{TrainingFolders, TrainingPage, middle, page_samples};
+use super::training::{TrainingFolders, TrainingPage, middle, page_samples, speed};
 use crate::cli::Outcome;
 use crate::cli::config_args::ConfigArgs;
 use crate::cli::ui::Ui;
@@ -90,10 +90,10 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
             train(TrainingSource::Dataset(&dataset), &out, Box::new(poses))?
         }
     };
-    let steps_per_sec = (outcome.steps - outcome.began_at) as f64 / start.elapsed().as_secs_f64().max(1e-9);
+    let (speed, steps_per_sec) = speed(outcome.began_at, outcome.steps, start.elapsed().as_secs_f64());
     let validation = &outcome.validation;
     let mut text = format!(
-        "{}{} ({steps_per_sec:.2} steps/s) on {}, {}, {} parameters\n\
+        "{}{} ({speed}) on {}, {}, {} parameters\n\
          on {}: L1 {:.3} (mean pose {:.3}), motion energy / truth {:.2}\n\
          newest checkpoint  {}\nbest (step {})  {}{}",
         counted(outcome.steps, "step"),

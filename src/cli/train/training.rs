@@ -79,6 +79,13 @@ fn speaker(given: Option<&String>, config: &Config) -> Result<String> {
     }
 }
 
+/// Steps per second of a call that trained from step `began_at` to `steps` in `secs`, as text and number.
+pub(super) fn speed(began_at: usize, steps: usize, secs: f64) -> (String, f64) {
+    let per_sec = (steps - began_at) as f64 / secs.max(1e-9);
+    let text = if steps == began_at { "no step left to train".to_owned() } else { format!("{per_sec:.2} steps/s") };
+    (text, per_sec)
+}
+
 /// The page of a training. Failing to write it is reported once and does not stop the training.
 pub(super) struct TrainingPage<'a> {
     page: LivePage<'a>,
