@@ -30,7 +30,8 @@ export ORATOR_DRIVER ?= $(abspath $(TARGET)/driver)
 
 setup: ; @.ci/setup/system.sh
 runtime: ; @.ci/setup/onnxruntime.sh
-readers aligner browser blender validator vrm driver loader spelling: ; @.ci/setup/$@.sh
+readers spelling: ; @.ci/setup/python.sh $@
+aligner browser blender validator vrm driver loader: ; @.ci/setup/$@.sh
 models: build ; @.ci/setup/models.sh
 
 build: setup runtime

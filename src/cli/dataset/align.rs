@@ -23,8 +23,8 @@ const SHOWN: usize = 8;
 /// the Python package pocketsphinx; `orator doctor` prints how to install it.
 ///
 /// A word that does not match the audio (not spoken, pronounced differently, in another language) keeps its position
-/// in the text and is marked: `source` is `interpolated`, `confidence` is 0. A transcript of which less than a
-/// quarter matches is rejected.
+/// in the text and is marked: `source` is `interpolated`, `confidence` is 0. A transcript is rejected if less than a
+/// quarter of its words match.
 #[derive(clap::Args)]
 pub struct Args {
     /// Audio file: wav, flac, mp3, or a video.
