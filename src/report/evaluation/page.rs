@@ -72,7 +72,7 @@ fn conclusions(table: &Table) -> Vec<Node> {
             let (class, outcome) = match vote.answer {
                 Answer::Yes => ("better", "better than"),
                 Answer::No => ("worse", "worse than"),
-                Answer::Inconclusive => ("undecided", "no significant difference to"),
+                Answer::Inconclusive => ("undecided", "no significant difference from"),
             };
             let description = format!("{}: {outcome} {}", vote.metric, vote.against.name());
             node("li").class(format!("vote {class}")).text(description)

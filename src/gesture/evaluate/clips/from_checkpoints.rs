@@ -108,7 +108,7 @@ pub fn prepare(
     }
     for (at, (of, intervals)) in checkpoints.iter().zip(generated).enumerate() {
         let with_words = if of.speaker.n_words() > 0 { " and its words" } else { "" };
-        let description = format!("the same model with other audio{with_words}, taken from half of the split later");
+        let description = format!("the same model with other audio{with_words}, from half a split later");
         let motions = intervals.mismatched.into_iter().map(ClipMotion::Motion).collect();
         let predictor = Predictor::new(PredictorKind::MismatchedPrediction, description, motions);
         all.push(Predictor { checkpoint: numbered(at), ..predictor });
