@@ -112,21 +112,33 @@ async function participate(browser, seed) {
         return Promise.reject(new DOMException("stopped", "AbortError"));
       };
     });
+  // Waits for `seen` after a press of the play button, and presses again whenever the page reports a failed load.
+  const seenAfter = async (button, seen) => {
+    const isSettled = (button, seen) => document.querySelector(seen) ?? document.querySelector(`${button}:not(:disabled)`);
+    for (let presses = 1; ; presses += 1) {
+      await page.waitForFunction(isSettled, {}, button, seen);
+      if ((await page.$(seen)) || presses === 20) break;
+      await input.press(button);
+    }
+    await page.waitForSelector(seen);
+  };
   const watchTogether = async () => {
     if (position === at("interrupt-at")) await interrupt();
-    await input.press("main form button[type=button]");
+    const play = "main form button[type=button]";
+    await input.press(play);
     if (position === at("away-at")) {
       await page.waitForFunction(() => document.querySelector("video").currentTime > 0);
       await hidePage(1000);
     }
-    await isOpen("main form fieldset");
+    await seenAfter(play, "main form fieldset:not(:disabled)");
     const { startOffsetMs, maxOffsetMs } = await page.$eval(".films", (stage) => ({ ...stage.dataset }));
     report.offsets_ms.push([Number(startOffsetMs), Number(maxOffsetMs)]);
   };
   const watchInTurn = async (n, after) => {
     for (let k = 0; k < n; k += 1) {
-      await input.press(`.score:nth-child(${k + 1}) button`);
-      await page.waitForSelector(`.score:nth-child(${k + 1}) button[data-seen]`);
+      const play = `.score:nth-child(${k + 1}) button`;
+      await input.press(play);
+      await seenAfter(play, `${play}[data-seen]`);
       await after(k);
     }
   };
