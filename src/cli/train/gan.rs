@@ -1,12 +1,10 @@
 //! `orator train gan`.
 
-use super::training::{ALL, TrainingFolders, TrainingPage, middle, page_samples, speed};
+use super::training::{ALL, TrainedModel, TrainingFolders, TrainingPage, middle, page_samples, speed, train_all};
 use crate::cli::Outcome;
 use crate::cli::config_args::ConfigArgs;
 use crate::cli::ui::Ui;
 use anyhow::Result;
-use orator_base::stage::progress::Progress;
-use orator_base::stage::workdir::BusyFolder;
 use orator_base::text::counted;
 use orator_dataset::Dataset;
 use orator_dataset::config::Config;
@@ -15,7 +13,6 @@ use orator_gesture::evaluate::clips::held_out;
 use orator_gesture::evaluate::clips::held_out::HeldOutInterval;
 use orator_gesture::generate::GestureGenerator;
 use orator_gesture::generate::model::GenerationChoice;
-use orator_gesture::train::epochs::StoppedTraining;
 use orator_gesture::train::epochs::ValidatedStep;
 use orator_gesture::train::gan::score::{Validation, ValidationMetrics, below_mean_pose};
 use orator_gesture::train::gan::train;
@@ -63,48 +60,9 @@ pub struct Args {
 pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     let config = if args.dataset.is_empty() { args.config.load()? } else { args.config.load_or_default()? };
     if args.all {
-        return run_all(&args, &config, ui);
+        return train_all(&config, ui, |speaker| train_one(&args, Some(speaker), &config, ui));
     }
-    let trained = train_one(&args, args.speaker.as_ref(), &config, ui)?;
-    ui.summary(&trained.text, Some(&trained.next), trained.facts);
-    Ok(if trained.has_page { Outcome::Done } else { Outcome::SomeFailed })
-}
-
-/// Trains a model for each speaker of the configuration.
-fn run_all(args: &Args, config: &Config, ui: &Ui) -> Result<Outcome> {
-    let (mut text, mut facts, mut next, mut n_failed) = (String::new(), Vec::new(), None, 0);
-    for speaker in config.settings.speaker.iter().map(|speaker| &speaker.name) {
-        if ui.is_to_stop() {
-            break;
-        }
-        match train_one(args, Some(speaker), config, ui) {
-            Ok(trained) => {
-                text += &format!("{}\n", trained.text);
-                n_failed += usize::from(!trained.has_page);
-                facts.push(trained.facts);
-                next.get_or_insert(trained.next);
-            }
-            Err(error) if error.is::<StoppedTraining>() => return Err(error),
-            Err(error) => {
-                let is_busy = error.is::<BusyFolder>();
-                n_failed += usize::from(!is_busy);
-                let word = if is_busy { "skipped" } else { "failed" };
-                text += &format!("{speaker}: {word}: {error:#}\n");
-                facts.push(json!({ "speaker": speaker, "busy": is_busy, "error": format!("{error:#}") }));
-            }
-        }
-    }
-    ui.summary(&text, next.as_deref(), json!({ "speakers": facts, "next": next }));
-    Ok(if n_failed == 0 { Outcome::Done } else { Outcome::SomeFailed })
-}
-
-/// Result of a completed training.
-struct TrainedModel {
-    text: String,
-    next: String,
-    facts: serde_json::Value,
-    /// Whether its page could be written.
-    has_page: bool,
+    Ok(train_one(&args, args.speaker.as_ref(), &config, ui)?.report(ui))
 }
 
 fn train_one(args: &Args, speaker: Option<&String>, config: &Config, ui: &Ui) -> Result<TrainedModel> {

@@ -1,6 +1,6 @@
 //! `orator train seq2seq`.
 
-use super::training::{TrainingFolders, TrainingPage, middle, page_samples, speed};
+use super::training::{TrainedModel, TrainingFolders, TrainingPage, middle, page_samples, speed, train_all};
 use crate::cli::Outcome;
 use crate::cli::config_args::ConfigArgs;
 use crate::cli::ui::Ui;
@@ -9,6 +9,7 @@ use ndarray::s;
 use orator_base::text::counted;
 use orator_base::types::pose3d::Motion;
 use orator_dataset::Dataset;
+use orator_dataset::config::{Auto, Config};
 use orator_formats::bvh::exponential_maps::JointMapping;
 use orator_formats::word_vectors::WordVectors;
 use orator_gesture::evaluate::clips::held_out;
@@ -40,6 +41,10 @@ pub struct Args {
     /// Speaker to train; optional if the configuration names a single speaker.
     #[arg(long, value_name = "NAME", conflicts_with = "captures")]
     speaker: Option<String>,
+    /// Train one model per speaker, one after another. Speakers that another process trains at the moment, on any
+    /// machine, are skipped; a failure does not stop the others.
+    #[arg(long, conflicts_with_all = ["speaker", "out", "dataset", "captures"])]
+    all: bool,
     /// Dataset folder; defaults to dataset/SPEAKER in the work folder.
     #[arg(long, value_name = "DIR", conflicts_with = "captures")]
     dataset: Option<PathBuf>,
@@ -55,7 +60,7 @@ pub struct Args {
     /// Table of word vectors that initialise the word embeddings.
     #[arg(long, value_name = "FILE")]
     words: Option<PathBuf>,
-    /// Total number of training steps; defaults to `seq2seq.steps` of the configuration.
+    /// Total number of training steps; defaults to those of `seq2seq.epochs`.
     #[arg(long, value_name = "N")]
     steps: Option<usize>,
     /// Folder of the checkpoints; defaults to seq2seq/SPEAKER in the work folder.
@@ -66,14 +71,29 @@ pub struct Args {
 pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     let is_named = args.dataset.is_some() || args.captures.is_some();
     let config = if is_named { args.config.load_or_default()? } else { args.config.load()? };
-    let mut settings = config.settings.seq2seq.clone();
-    settings.steps = args.steps.unwrap_or(settings.steps);
     let vectors = args.words.as_deref().map(WordVectors::open).transpose()?;
+    if args.all {
+        return train_all(&config, ui, |speaker| train_one(&args, Some(speaker), &config, vectors.as_ref(), ui));
+    }
+    Ok(train_one(&args, args.speaker.as_ref(), &config, vectors.as_ref(), ui)?.report(ui))
+}
+
+fn train_one(
+    args: &Args,
+    speaker: Option<&String>,
+    config: &Config,
+    vectors: Option<&WordVectors>,
+    ui: &Ui,
+) -> Result<TrainedModel> {
+    let mut settings = config.settings.seq2seq.clone();
+    if let Some(steps) = args.steps {
+        (settings.steps, settings.epochs) = (steps.into(), Auto::Chosen);
+    }
     let start = Instant::now();
     let train = |source: TrainingSource, out: &Path, poses| {
         let mut page = TrainingPage::new(out, source.name(), poses, ui);
         let validated = &mut |at| page.update(at);
-        let outcome = train::train_with_callback(source, vectors.as_ref(), &settings, out, ui, validated)?;
+        let outcome = train::train_with_callback(source, vectors, &settings, out, ui, validated)?;
         let page = page.finish(ValidatedStep { step: outcome.steps, best_step: outcome.best_step });
         anyhow::Ok((outcome, page))
     };
@@ -83,17 +103,17 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
             train(TrainingSource::Captures(&captures), out, Box::new(|| Ok(Vec::new())))?
         }
         _ => {
-            let Args { speaker, dataset, out, .. } = &args;
-            let (speaker, dataset, out) = (speaker.as_ref(), dataset.as_ref(), out.as_ref());
-            let (dataset, out) = TrainingFolders { config: &config, speaker, dataset, out }.open("seq2seq")?;
+            let (dataset, out) = (args.dataset.as_ref(), args.out.as_ref());
+            let (dataset, out) = TrainingFolders { config, speaker, dataset, out }.open("seq2seq")?;
             let poses = || pairs(&dataset, &SequenceGenerator::open(&out.join(train::BEST))?);
             train(TrainingSource::Dataset(&dataset), &out, Box::new(poses))?
         }
     };
     let (speed, steps_per_sec) = speed(outcome.began_at, outcome.steps, start.elapsed().as_secs_f64());
     let validation = &outcome.validation;
+    let name = speaker.map_or_else(String::new, |name| format!("{name}: "));
     let mut text = format!(
-        "{}{} ({speed}) on {}, {}, {} parameters\n\
+        "{name}{}{} ({speed}) on {}, {}, {} parameters\n\
          on {}: L1 {:.3} (mean pose {:.3}), motion energy / truth {:.2}\n\
          newest checkpoint  {}\nbest (step {})  {}{}",
         counted(outcome.steps, "step"),
@@ -118,6 +138,7 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     }
     let next = format!("orator generate --checkpoint {} --audio speech.wav --out motion.bvh", outcome.best.display());
     let facts = json!({
+        "speaker": speaker,
         "steps": outcome.steps,
         "stopped_early": outcome.stopped_early,
         "steps_per_sec": steps_per_sec,
@@ -131,8 +152,7 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
         "page": page,
         "next": next,
     });
-    ui.summary(&text, Some(&next), facts);
-    Ok(if page.is_some() { Outcome::Done } else { Outcome::SomeFailed })
+    Ok(TrainedModel { text, next, facts, has_page: page.is_some() })
 }
 
 /// True and generated poses of a few intervals, from the middle of each.

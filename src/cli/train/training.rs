@@ -1,15 +1,18 @@
 //! Parts shared by `orator train gan` and `orator train seq2seq`: folders of a training, and its page during training.
 
+use crate::cli::Outcome;
 use crate::cli::ui::Ui;
 use anyhow::{Context, Result, bail};
 use orator_base::stage::progress::Progress as _;
+use orator_base::stage::workdir::BusyFolder;
 use orator_base::types::file_name::FileName;
 use orator_base::types::time::FrameRate;
 use orator_dataset::config::Config;
 use orator_dataset::index::SampleRef;
 use orator_dataset::{Dataset, Split};
-use orator_gesture::train::epochs::ValidatedStep;
+use orator_gesture::train::epochs::{StoppedTraining, ValidatedStep};
 use orator_report::training::live::{BestPosesFn, LivePage};
+use serde_json::{Value, json};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
@@ -77,6 +80,59 @@ fn speaker(given: Option<&String>, config: &Config) -> Result<String> {
         (None, []) => bail!("{} has no speaker; give --dataset", config.file.display()),
         (None, _) => bail!("several speakers are configured; select one with --speaker: {}", names.join(", ")),
     }
+}
+
+/// Result of a completed training.
+pub(super) struct TrainedModel {
+    pub text: String,
+    pub next: String,
+    pub facts: Value,
+    /// Whether its page could be written.
+    pub has_page: bool,
+}
+
+impl TrainedModel {
+    /// Prints the result.
+    pub(super) fn report(self, ui: &Ui) -> Outcome {
+        ui.summary(&self.text, Some(&self.next), self.facts);
+        if self.has_page { Outcome::Done } else { Outcome::SomeFailed }
+    }
+}
+
+/// Trains a model for each speaker of the configuration by `train_one`, and prints the results. Speakers that another
+/// process trains are skipped; a failure does not stop the others.
+///
+/// # Errors
+/// A training that was stopped on request.
+pub(super) fn train_all(
+    config: &Config,
+    ui: &Ui,
+    train_one: impl Fn(&String) -> Result<TrainedModel>,
+) -> Result<Outcome> {
+    let (mut text, mut facts, mut next, mut n_failed) = (String::new(), Vec::new(), None, 0);
+    for speaker in config.settings.speaker.iter().map(|speaker| &speaker.name) {
+        if ui.is_to_stop() {
+            break;
+        }
+        match train_one(speaker) {
+            Ok(trained) => {
+                text += &format!("{}\n", trained.text);
+                n_failed += usize::from(!trained.has_page);
+                facts.push(trained.facts);
+                next.get_or_insert(trained.next);
+            }
+            Err(error) if error.is::<StoppedTraining>() => return Err(error),
+            Err(error) => {
+                let is_busy = error.is::<BusyFolder>();
+                n_failed += usize::from(!is_busy);
+                let word = if is_busy { "skipped" } else { "failed" };
+                text += &format!("{speaker}: {word}: {error:#}\n");
+                facts.push(json!({ "speaker": speaker, "busy": is_busy, "error": format!("{error:#}") }));
+            }
+        }
+    }
+    ui.summary(&text, next.as_deref(), json!({ "speakers": facts, "next": next }));
+    Ok(if n_failed == 0 { Outcome::Done } else { Outcome::SomeFailed })
 }
 
 /// Steps per second of a call that trained from step `began_at` to `steps` in `secs`, as text and number.

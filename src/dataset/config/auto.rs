@@ -1,7 +1,8 @@
 //! Type of numeric settings that the program may choose: `"auto"`, or a number.
 
-use serde::de::Error;
+use serde::de::{DeserializeOwned, Error};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
+use serde_json::{Value, json};
 
 /// Configuration value that leaves a number to the program.
 pub const AUTO: &str = "auto";
@@ -41,10 +42,33 @@ impl<T> From<T> for Auto<T> {
     }
 }
 
+/// Settings in which every `"auto"` of `given` is replaced by the value that `choose` returns for its key.
+///
+/// # Errors
+/// An `"auto"` for which there is no value, or a value of another type, such as a fraction for a count.
+pub fn filled<T: DeserializeOwned>(
+    given: &impl Serialize,
+    choose: impl Fn(&str) -> Option<Value>,
+) -> serde_json::Result<T> {
+    let mut values = serde_json::to_value(given)?;
+    for (key, value) in values.as_object_mut().into_iter().flatten() {
+        if *value == AUTO
+            && let Some(chosen) = choose(key)
+        {
+            *value = chosen;
+        }
+    }
+    serde_json::from_value(values)
+}
+
+/// JSON number; a non-negative value without fraction becomes an integer, so that it is accepted for a count.
+pub fn number(value: f64) -> Value {
+    if value.fract() == 0.0 && value >= 0.0 { json!(value as u64) } else { json!(value) }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use serde_json::json;
 
     #[test]
     fn auto_and_numbers_are_parsed() {

@@ -80,6 +80,8 @@ pub enum SequenceNetwork {
     Contextual,
     /// Input: the sound of each pose and the words of the segment.
     Words,
+    /// Input: the sound of each pose (FineMotion 2020, section 4.1, without the word encoder).
+    Audio,
     /// Input: sound only; trained against a discriminator.
     Adversarial,
     /// Input: sound only; predicts the codes of a pose autoencoder.
@@ -90,7 +92,9 @@ pub enum SequenceNetwork {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum DistanceLoss {
+    /// Chosen by the reading; replaced before training.
     #[default]
+    Auto,
     L1,
     Mse,
 }
@@ -99,7 +103,9 @@ pub enum DistanceLoss {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum ContinuityLoss {
+    /// Chosen by the reading; replaced before training.
     #[default]
+    Auto,
     Numbers,
     Poses,
 }
@@ -108,12 +114,40 @@ pub enum ContinuityLoss {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum VarianceLoss {
-    /// Norm over time of each coordinate (code of the authors).
+    /// Chosen by the reading; replaced before training.
     #[default]
+    Auto,
+    /// Norm over time of each coordinate (code of the authors).
     #[serde(rename(serialize = "excursion"), alias = "excursion")]
     Norm,
     /// Variance over time of each coordinate (paper).
     Variance,
+}
+
+/// State of the decoder at the start of each generated segment except the first.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum SeamState {
+    /// Chosen by the reading; replaced before training.
+    #[default]
+    Auto,
+    /// Computed from the encoder.
+    Renewed,
+    /// State after the previous segment.
+    Carried,
+}
+
+/// Source of the settings of FineMotion's networks that are `"auto"`, where their paper and their code differ.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum FineMotionReading {
+    /// Values of the code; the number of epochs depends on the minutes of motion.
+    #[default]
+    Auto,
+    /// FineMotion's paper on its entry to GENEA 2020; its code where the paper states nothing.
+    Paper,
+    /// FineMotion's published code.
+    Code,
 }
 
 /// Method that distinguishes speech from other sound.

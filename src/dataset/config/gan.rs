@@ -2,76 +2,57 @@
 //! may be `"auto"`; in a [`GanSettings`] a recipe has filled in every number, and checkpoints store it. `pipeline.toml`
 //! and the guide (`configuration`) document the keys.
 
-use super::auto::{AUTO, Auto};
+use super::auto::{Auto, filled};
 use super::choices::{AdversarialLoss, BoneLoss, ComputeDevice, GanRecipe, MotionRepresentation, NetworkPreset};
-use super::sections::KeyRanges;
+use super::sections::auto_section;
 use orator_base::types::posture::PostureChannel;
 use serde::{Deserialize, Serialize};
-use serde_json::{Value, json};
+use serde_json::Value;
 
-/// Defines [`GanValues`] with defaults and ranges. `$number` and `$count` name the parameters of `with` that initialise
-/// the settings that a recipe may choose.
-macro_rules! gan_values {
-    (|$number:ident, $count:ident| $($(#[$alias:meta])* $key:ident: $type:ty = $default:expr $(=> $range:expr)?,)*) => {
-        /// Keys of `[gan]`; `N` and `C` are the types of the numbers and counts that a recipe may choose.
-        #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-        #[serde(default)]
-        pub struct GanValues<N, C> {
-            $($(#[$alias])* pub $key: $type,)*
-        }
-
-        impl<N: Copy, C: Copy> GanValues<N, C> {
-            pub(super) const RANGES: KeyRanges = &[$($((stringify!($key), $range),)?)*];
-
-            /// Defaults, with the given number and count for all settings that a recipe may choose.
-            fn with($number: N, $count: C) -> Self {
-                Self { $($key: $default,)* }
-            }
-        }
-    };
-}
-
-gan_values! { |number, count|
-    recipe: GanRecipe = GanRecipe::Auto,
-    preset: NetworkPreset = NetworkPreset::Auto,
-    representation: MotionRepresentation = MotionRepresentation::Auto,
-    channels: Vec<PostureChannel> = Vec::new(),
-    window_frames: usize = 64 => (32.0, 4096.0, "frames"),
-    stride_frames: usize = 5 => (1.0, 4096.0, "frames"),
-    batch: C = count => (2.0, 4096.0, "windows"),
-    steps: C = count => (1.0, 1e9, "steps"),
-    learning_rate: N = number => (1e-9, 1.0, ""),
-    shared_rate: N = number => (0.0, 1.0, ""),
-    warmup_steps: C = count => (0.0, 1e9, "steps"),
-    #[serde(alias = "fade_to")]
-    final_lr_ratio: N = number => (0.0, 1.0, ""),
-    adversarial: AdversarialLoss = AdversarialLoss::Auto,
-    lambda_l1: f64 = 1.0 => (0.0, 1e4, ""),
-    lambda_speed: N = number => (0.0, 1e4, ""),
-    lambda_energy: N = number => (0.0, 1e4, ""),
-    lambda_velocity: f64 = 0.0 => (0.0, 1e4, ""),
-    lambda_gan: N = number => (0.0, 1e4, ""),
-    lambda_bone: N = number => (0.0, 1e4, ""),
-    bone_loss: BoneLoss = BoneLoss::Auto,
-    adversarial_from: C = count => (0.0, 1e9, "steps"),
-    adversarial_ramp: C = count => (0.0, 1e9, "steps"),
-    ema_decay: N = number => (0.0, 0.999_999, ""),
-    dropout: N = number => (0.0, 0.9, ""),
-    weight_decay: N = number => (0.0, 10.0, ""),
-    augment_speed: N = number => (0.0, 0.5, ""),
-    augment_pitch: N = number => (0.0, 16.0, "bands"),
-    augment_gain_db: N = number => (0.0, 40.0, "dB"),
-    augment_noise_db: N = number => (-120.0, 20.0, "dB"),
-    augment_mask_bands: C = count => (0.0, 32.0, "bands"),
-    augment_mask_secs: N = number => (0.0, 2.0, "seconds"),
-    augment_pose_noise: N = number => (0.0, 2.0, "deviations"),
-    augment_mirror: f64 = 0.0 => (0.0, 1.0, ""),
-    seed: u64 = 1337,
-    epoch_steps: C = count => (1.0, 1e9, "steps"),
-    patience: C = count => (0.0, 1e9, "epochs"),
-    checkpoint_every: usize = 100 => (1.0, 1e9, "steps"),
-    keep_checkpoints: usize = 3 => (1.0, 1e6, "checkpoints"),
-    device: ComputeDevice = ComputeDevice::Cpu,
+auto_section! {
+    /// Keys of `[gan]`; `N` and `C` are the types of the numbers and counts that a recipe may choose.
+    GanValues |number, count| {
+        recipe: GanRecipe = GanRecipe::Auto,
+        preset: NetworkPreset = NetworkPreset::Auto,
+        representation: MotionRepresentation = MotionRepresentation::Auto,
+        channels: Vec<PostureChannel> = Vec::new(),
+        window_frames: usize = 64 => (32.0, 4096.0, "frames"),
+        stride_frames: usize = 5 => (1.0, 4096.0, "frames"),
+        batch: C = count => (2.0, 4096.0, "windows"),
+        steps: C = count => (1.0, 1e9, "steps"),
+        learning_rate: N = number => (1e-9, 1.0, ""),
+        shared_rate: N = number => (0.0, 1.0, ""),
+        warmup_steps: C = count => (0.0, 1e9, "steps"),
+        #[serde(alias = "fade_to")]
+        final_lr_ratio: N = number => (0.0, 1.0, ""),
+        adversarial: AdversarialLoss = AdversarialLoss::Auto,
+        lambda_l1: f64 = 1.0 => (0.0, 1e4, ""),
+        lambda_speed: N = number => (0.0, 1e4, ""),
+        lambda_energy: N = number => (0.0, 1e4, ""),
+        lambda_velocity: f64 = 0.0 => (0.0, 1e4, ""),
+        lambda_gan: N = number => (0.0, 1e4, ""),
+        lambda_bone: N = number => (0.0, 1e4, ""),
+        bone_loss: BoneLoss = BoneLoss::Auto,
+        adversarial_from: C = count => (0.0, 1e9, "steps"),
+        adversarial_ramp: C = count => (0.0, 1e9, "steps"),
+        ema_decay: N = number => (0.0, 0.999_999, ""),
+        dropout: N = number => (0.0, 0.9, ""),
+        weight_decay: N = number => (0.0, 10.0, ""),
+        augment_speed: N = number => (0.0, 0.5, ""),
+        augment_pitch: N = number => (0.0, 16.0, "bands"),
+        augment_gain_db: N = number => (0.0, 40.0, "dB"),
+        augment_noise_db: N = number => (-120.0, 20.0, "dB"),
+        augment_mask_bands: C = count => (0.0, 32.0, "bands"),
+        augment_mask_secs: N = number => (0.0, 2.0, "seconds"),
+        augment_pose_noise: N = number => (0.0, 2.0, "deviations"),
+        augment_mirror: f64 = 0.0 => (0.0, 1.0, ""),
+        seed: u64 = 1337,
+        epoch_steps: C = count => (1.0, 1e9, "steps"),
+        patience: C = count => (0.0, 1e9, "epochs"),
+        checkpoint_every: usize = 100 => (1.0, 1e9, "steps"),
+        keep_checkpoints: usize = 3 => (1.0, 1e6, "checkpoints"),
+        device: ComputeDevice = ComputeDevice::Cpu,
+    }
 }
 
 /// `[gan]` as given, with numbers that may be `"auto"`.
@@ -109,22 +90,8 @@ impl GanConfig {
     /// # Errors
     /// An `"auto"` key for which the recipe has no value, or a fraction for a count.
     pub fn filled(&self, recipe: impl Fn(&str) -> Option<Value>) -> serde_json::Result<GanSettings> {
-        let mut values = serde_json::to_value(self)?;
-        for (key, value) in values.as_object_mut().into_iter().flatten() {
-            if *value == AUTO
-                && key != "recipe"
-                && let Some(chosen) = recipe(key)
-            {
-                *value = chosen;
-            }
-        }
-        serde_json::from_value(values)
+        filled(self, |key| recipe(key).filter(|_| key != "recipe"))
     }
-}
-
-/// JSON number; a non-negative value without fraction becomes an integer, so that it is accepted for a count.
-pub fn number(value: f64) -> Value {
-    if value.fract() == 0.0 && value >= 0.0 { json!(value as u64) } else { json!(value) }
 }
 
 impl GanSettings {
@@ -153,6 +120,8 @@ impl GanSettings {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::config::number;
+    use serde_json::json;
 
     #[test]
     fn the_rate_has_a_linear_warm_up_and_a_cosine_decay() {

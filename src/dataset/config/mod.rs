@@ -16,15 +16,15 @@ pub mod seq2seq;
 pub mod transcripts;
 pub mod videos;
 
-pub use auto::Auto;
+pub use auto::{Auto, number};
 pub use choices::{
-    AdversarialLoss, BoneLoss, ComputeDevice, ContinuityLoss, DistanceLoss, FollowRule, GanRecipe,
-    MotionRepresentation, NetworkPreset, SequenceNetwork, SpeechRule, SplitUnit, VarianceLoss,
+    AdversarialLoss, BoneLoss, ComputeDevice, ContinuityLoss, DistanceLoss, FineMotionReading, FollowRule, GanRecipe,
+    MotionRepresentation, NetworkPreset, SeamState, SequenceNetwork, SpeechRule, SplitUnit, VarianceLoss,
 };
 pub use file::{Problem, SourceLocation};
 pub use former::to_stored;
-pub use gan::{GanConfig, GanSettings, number};
+pub use gan::{GanConfig, GanSettings};
 pub use keypoints::KeypointSource;
 pub use load::{Config, ConfigError, DEFAULT_FILE, load, load_default};
 pub use sections::*;
-pub use seq2seq::Seq2seqConfig;
+pub use seq2seq::{Seq2seqConfig, Seq2seqSettings};

@@ -37,7 +37,33 @@ macro_rules! section {
         }
     };
 }
-pub(super) use section;
+
+/// Defines the keys of a section in which the program may choose values. `N` and `C` are the types of the numbers and
+/// counts that may be `"auto"`; `$number` and `$count` name the parameters of `with` that initialise them.
+macro_rules! auto_section {
+    (
+        $(#[$doc:meta])* $name:ident |$number:ident, $count:ident| {
+            $($(#[$alias:meta])* $key:ident: $type:ty = $default:expr $(=> $range:expr)?,)*
+        }
+    ) => {
+        $(#[$doc])*
+        #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+        #[serde(default)]
+        pub struct $name<N, C> {
+            $($(#[$alias])* pub $key: $type,)*
+        }
+
+        impl<N: Copy, C: Copy> $name<N, C> {
+            pub(super) const RANGES: $crate::config::sections::KeyRanges = &[$($((stringify!($key), $range),)?)*];
+
+            /// Defaults, with the given number and count for all settings that the program may choose.
+            fn with($number: N, $count: C) -> Self {
+                Self { $($key: $default,)* }
+            }
+        }
+    };
+}
+pub(super) use auto_section;
 
 /// All settings of a run. Paths are absolute once resolved.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]

@@ -1,45 +1,96 @@
-//! `[seq2seq]`: training of the sequence-to-sequence networks. `pipeline.toml` and the guide (`configuration`) document
-//! the keys.
+//! `[seq2seq]`: training of the sequence-to-sequence networks. A [`Seq2seqConfig`] contains the settings as given, which
+//! may be `"auto"`; in [`Seq2seqSettings`] the reading has filled in every value, and checkpoints store it.
+//! `pipeline.toml` and the guide (`configuration`) document the keys.
 
-use super::choices::{ContinuityLoss, DistanceLoss, SequenceNetwork, VarianceLoss};
-use super::sections::section;
+use super::auto::{Auto, filled};
+use super::choices::{ContinuityLoss, DistanceLoss, FineMotionReading, SeamState, SequenceNetwork, VarianceLoss};
+use super::sections::auto_section;
 use serde::{Deserialize, Serialize};
+use serde_json::Value;
 
-section! {
-    /// `[seq2seq]`: the network, its losses and its training.
-    Seq2seqConfig {
+auto_section! {
+    /// Keys of `[seq2seq]`; `N` and `C` are the types of the numbers and counts that a reading may choose.
+    Seq2seqValues |number, count| {
         network: SequenceNetwork = SequenceNetwork::Contextual,
-        stride_frames: usize = 0 => (0.0, 4096.0, "frames"),
-        batch: usize = 50 => (2.0, 4096.0, "segments"),
-        steps: usize = 20_000 => (1.0, 1e9, "steps"),
-        learning_rate: f64 = 1e-3 => (1e-9, 1.0, ""),
+        reading: FineMotionReading = FineMotionReading::Auto,
+        stride_frames: C = count => (0.0, 4096.0, "frames"),
+        batch: C = count => (2.0, 4096.0, "segments"),
+        epochs: C = count => (1.0, 1e6, "epochs"),
+        steps: C = count => (1.0, 1e9, "steps"),
+        learning_rate: N = number => (1e-9, 1.0, ""),
         #[serde(alias = "fade_from")]
         decay_start: usize = 0 => (0.0, 1e9, "steps"),
-        distance: DistanceLoss = DistanceLoss::L1,
-        continuity: ContinuityLoss = ContinuityLoss::Numbers,
+        distance: DistanceLoss = DistanceLoss::Auto,
+        continuity: ContinuityLoss = ContinuityLoss::Auto,
         #[serde(alias = "reach")]
-        variance_loss: VarianceLoss = VarianceLoss::Norm,
+        variance_loss: VarianceLoss = VarianceLoss::Auto,
         lambda_continuity: f64 = 0.01 => (0.0, 1e4, ""),
         #[serde(alias = "lambda_reach")]
         lambda_variance: f64 = 1.0 => (0.0, 1e4, ""),
-        lambda_adversarial: f64 = 0.01 => (0.0, 1e4, ""),
-        words_around_secs: f64 = 2.0 => (0.0, 60.0, "s"),
+        lambda_adversarial: N = number => (0.0, 1e4, ""),
+        words_around_secs: N = number => (0.0, 60.0, "s"),
+        state_at_seams: SeamState = SeamState::Auto,
+        scheduled_sampling: f64 = 1.0 => (0.0, 1.0, ""),
         #[serde(alias = "own_previous")]
         rollout_previous: f64 = 0.0 => (0.0, 1.0, ""),
         word_dropout: f64 = 0.0 => (0.0, 0.95, ""),
         hidden: usize = 150 => (1.0, 4096.0, "numbers"),
         #[serde(alias = "hears_context")]
         audio_context: bool = false,
+        discriminator_blocks: usize = 2 => (2.0, 6.0, "blocks"),
         autoencoder_steps: usize = 2_000 => (0.0, 1e9, "steps"),
         seed: u64 = 1337,
-        epoch_steps: usize = 250 => (1.0, 1e9, "steps"),
+        epoch_steps: C = count => (1.0, 1e9, "steps"),
         patience: usize = 0,
         checkpoint_every: usize = 250 => (1.0, 1e9, "steps"),
         keep_checkpoints: usize = 3 => (1.0, 1e6, "checkpoints"),
     }
 }
 
+/// `[seq2seq]` as given, with values that may be `"auto"`.
+pub type Seq2seqConfig = Seq2seqValues<Auto<f64>, Auto<usize>>;
+/// `[seq2seq]` with all values filled in.
+pub type Seq2seqSettings = Seq2seqValues<f64, usize>;
+
+impl Default for Seq2seqConfig {
+    fn default() -> Self {
+        Self::with(Auto::Chosen, Auto::Chosen)
+    }
+}
+
+/// Values of keys that are missing in a checkpoint of an earlier program version.
+impl Default for Seq2seqSettings {
+    fn default() -> Self {
+        Self {
+            reading: FineMotionReading::Code,
+            distance: DistanceLoss::L1,
+            continuity: ContinuityLoss::Numbers,
+            variance_loss: VarianceLoss::Norm,
+            state_at_seams: SeamState::Renewed,
+            stride_frames: 0,
+            batch: 50,
+            epochs: 1,
+            steps: 20_000,
+            learning_rate: 1e-3,
+            lambda_adversarial: 0.01,
+            words_around_secs: 2.0,
+            epoch_steps: 250,
+            ..Self::with(0.0, 0)
+        }
+    }
+}
+
 impl Seq2seqConfig {
+    /// Settings in which every `"auto"` is replaced by the value that `reading` returns for its key.
+    ///
+    /// # Errors
+    /// An `"auto"` key for which there is no value, or a fraction for a count.
+    pub fn filled(&self, reading: impl Fn(&str) -> Option<Value>) -> serde_json::Result<Seq2seqSettings> {
+        filled(self, |key| reading(key).filter(|_| key != "reading"))
+    }
+}
+
+impl Seq2seqSettings {
     /// Learning rate of a step (counted from 0): constant, then linear decay from step `decay_start` on; `decay_start` 0:
     /// no decay.
     pub fn rate(&self, step: usize) -> f64 {
@@ -57,8 +108,8 @@ mod tests {
 
     #[test]
     fn the_learning_rate_decays_linearly_from_a_step_on() {
-        let settings = Seq2seqConfig { learning_rate: 1.0, decay_start: 6, steps: 10, ..Seq2seqConfig::default() };
+        let settings = Seq2seqSettings { learning_rate: 1.0, decay_start: 6, steps: 10, ..Default::default() };
         assert_eq!([0, 5, 6, 8, 9, 12].map(|step| settings.rate(step)), [1.0, 1.0, 1.0, 0.5, 0.25, 0.25]);
-        assert_eq!(Seq2seqConfig::default().rate(19_999), 1e-3);
+        assert_eq!(Seq2seqSettings::default().rate(19_999), 1e-3);
     }
 }

@@ -7,7 +7,7 @@ use super::super::report::{Report, median};
 use anyhow::{Context, Result, ensure};
 use candle_core::{DType, Device, Tensor};
 use orator_base::stage::progress::Progress;
-use orator_dataset::config::Seq2seqConfig;
+use orator_dataset::config::Seq2seqSettings;
 use orator_gesture::train::optim::adam::{self, Adam};
 use orator_gesture::train::seq2seq::losses;
 use orator_nn::Mode;
@@ -119,7 +119,7 @@ impl FixedBatch {
         let start = Instant::now();
         for _ in 0..steps {
             let poses = self.network.forward(&self.segment, &mut Mode::Train(&mut self.rng))?;
-            let loss = losses::total(&Seq2seqConfig::default(), &poses, &self.target, None)?;
+            let loss = losses::total(&Seq2seqSettings::default(), &poses, &self.target, None)?;
             self.adam.step(&loss.backward()?, LEARNING_RATE)?;
         }
         Ok(start.elapsed().as_secs_f64())

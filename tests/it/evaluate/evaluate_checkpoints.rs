@@ -30,9 +30,14 @@ use std::path::Path;
 
 /// Trains for a few steps.
 fn train_sequence(source: TrainingSource, network: SequenceNetwork, out: &Path) {
-    let schedule =
-        Seq2seqConfig { steps: 4, epoch_steps: 2, checkpoint_every: 2, keep_checkpoints: 2, ..Default::default() };
-    let settings = Seq2seqConfig { network, batch: 3, hidden: 8, stride_frames: 5, ..schedule };
+    let schedule = Seq2seqConfig {
+        steps: 4.into(),
+        epoch_steps: 2.into(),
+        checkpoint_every: 2,
+        keep_checkpoints: 2,
+        ..Default::default()
+    };
+    let settings = Seq2seqConfig { network, batch: 3.into(), hidden: 8, stride_frames: 5.into(), ..schedule };
     train(source, None, &settings, out, &Silent).unwrap();
 }
 

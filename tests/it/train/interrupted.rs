@@ -162,7 +162,8 @@ fn seq2seq_without_a_held_out_split_reports_the_reason() {
         cause.starts_with("the validation split is empty (train has 1 interval, 6.6 s, test has 0 intervals"),
         "{cause}"
     );
-    let settings = orator_dataset::config::Seq2seqConfig { steps: 0, batch: 3, hidden: 8, ..Default::default() };
+    let settings =
+        orator_dataset::config::Seq2seqConfig { steps: 0.into(), batch: 3.into(), hidden: 8, ..Default::default() };
     let out = folder.path().join("out");
     let result =
         orator_gesture::train::seq2seq::train::train(TrainingSource::Dataset(&dataset), None, &settings, &out, &Silent);

@@ -19,9 +19,20 @@ use std::panic::AssertUnwindSafe;
 use std::path::Path;
 
 fn settings(network: SequenceNetwork) -> Seq2seqConfig {
-    let schedule =
-        Seq2seqConfig { steps: 6, epoch_steps: 3, checkpoint_every: 2, keep_checkpoints: 2, ..Default::default() };
-    Seq2seqConfig { network, batch: 3, hidden: 8, stride_frames: 5, autoencoder_steps: 3, ..schedule }
+    let schedule = Seq2seqConfig {
+        steps: 6.into(),
+        epoch_steps: 3.into(),
+        checkpoint_every: 2,
+        keep_checkpoints: 2,
+        ..Default::default()
+    };
+    let settings = Seq2seqConfig { network, batch: 3.into(), hidden: 8, stride_frames: 5.into(), ..schedule };
+    match network {
+        SequenceNetwork::Audio => Seq2seqConfig { scheduled_sampling: 0.5, ..settings },
+        SequenceNetwork::Adversarial => Seq2seqConfig { discriminator_blocks: 3, ..settings },
+        SequenceNetwork::Autoencoder => Seq2seqConfig { autoencoder_steps: 3, ..settings },
+        SequenceNetwork::Contextual | SequenceNetwork::Words => settings,
+    }
 }
 
 fn open(dir: &Path, hold_out: &[&str]) -> anyhow::Result<CaptureFolder> {
@@ -37,6 +48,7 @@ fn a_training_stopped_at_a_step_resumes_to_identical_bytes() {
     for (network, stops) in [
         (SequenceNetwork::Contextual, vec![3, 4]),
         (SequenceNetwork::Words, vec![5]),
+        (SequenceNetwork::Audio, vec![4]),
         (SequenceNetwork::Adversarial, vec![3]),
         (SequenceNetwork::Autoencoder, vec![2, 5]),
     ] {
@@ -82,12 +94,12 @@ fn the_loss_falls_and_the_model_generates() {
     let folder = tempfile::tempdir().unwrap();
     let dataset = dataset(&folder.path().join("dataset"));
     let settings = Seq2seqConfig {
-        steps: 80,
-        batch: 8,
+        steps: 80.into(),
+        batch: 8.into(),
         hidden: 24,
-        learning_rate: 2e-3,
+        learning_rate: 2e-3.into(),
         lambda_variance: 0.0,
-        epoch_steps: 80,
+        epoch_steps: 80.into(),
         checkpoint_every: 80,
         ..settings(SequenceNetwork::Contextual)
     };

@@ -18,6 +18,8 @@ steps = 20
 epoch_steps = 10
 "#;
 
+const BEN: &str = "[[speaker]]\nname = \"ben\"\nvideos = [\"videos/ben/*.mp4\"]\n";
+
 fn orator(dir: &Path, args: &str) -> Output {
     let mut command = Command::new(env!("CARGO_BIN_EXE_orator"));
     command.args(args.split_whitespace()).current_dir(dir).output().unwrap()
@@ -57,6 +59,35 @@ fn a_training_is_saved_in_the_work_folder_with_its_page() {
     answer(dir, "train seq2seq");
     assert!(page() == written, "the same training has the same page");
     assert!(std::fs::read_dir(&out).unwrap().flatten().any(|e| e.file_name().to_string_lossy().contains("tfevents")));
+}
+
+#[test]
+fn all_speakers_are_trained_by_the_papers_reading() {
+    let folder = tempfile::tempdir().unwrap();
+    let dir = folder.path();
+    std::fs::write(dir.join("pipeline.toml"), CONFIG.replace("steps = 20\n", "") + BEN).unwrap();
+    for speaker in ["anna", "ben"] {
+        let samples = [(Split::Train, sample("a-00000000-000000", 99, 0.0))];
+        write_dataset(&dir.join("work/dataset").join(speaker), speaker, FPS, &samples).unwrap();
+    }
+    let trained = answer(dir, "train seq2seq --all --set seq2seq.reading=paper --set seq2seq.epochs=2");
+    let speakers = trained["speakers"].as_array().unwrap();
+    let of = |key: &str| speakers.iter().map(|trained| trained[key].clone()).collect::<Vec<_>>();
+    assert_eq!(of("speaker"), ["anna", "ben"]);
+    // 99 frames at 15 fps: five segments of one second, in batches of three.
+    assert_eq!((of("segments"), of("steps")), (vec![5.into(), 5.into()], vec![4.into(), 4.into()]));
+    let facts = orator_formats::checkpoint::facts(&dir.join("work/seq2seq/ben/best.safetensors")).unwrap();
+    let settings = &facts["settings"];
+    assert_eq!((&settings["distance"], &settings["continuity"]), (&"mse".into(), &"poses".into()));
+    assert_eq!((&settings["words_around_secs"], &facts["speaker"]["carries_state"]), (&0.5.into(), &true.into()));
+
+    let resumed = orator(dir, "train seq2seq --speaker ben --set seq2seq.reading=code --set seq2seq.epochs=3");
+    let said = String::from_utf8_lossy(&resumed.stderr).into_owned();
+    assert!(resumed.status.success() && said.contains("seq2seq.reading is \"code\", but \"paper\""), "{said}");
+    assert!(String::from_utf8_lossy(&resumed.stdout).contains("6 steps"), "{resumed:?}");
+    let rejected = orator(dir, "train seq2seq --speaker ben --set seq2seq.lambda_adversarial=0.5");
+    let said = String::from_utf8_lossy(&rejected.stderr).into_owned();
+    assert!(said.contains("seq2seq.lambda_adversarial has no effect on the network \"contextual\""), "{said}");
 }
 
 #[test]

@@ -48,6 +48,7 @@ pub fn network(of: Architecture, params: &mut Params, config: &Config) -> Result
     Ok(match of {
         Architecture::Contextual => Box::new(ContextSeq2Seq::new(params, config)?),
         Architecture::Words => Box::new(WordsSeq2Seq::new(params, config)?),
+        Architecture::Audio => Box::new(WordsSeq2Seq::audio_only(params, config)?),
         Architecture::Adversarial => Box::new(WordsSeq2Seq::without_words(params, config)?),
         Architecture::Autoencoder => Box::new(AudioBaseline::new(params, config)?),
     })
@@ -82,7 +83,7 @@ pub fn words(
             let (start, end) = (fps.secs(first), fps.secs(first + predicted));
             vec![within(start - around, end + around)]
         }
-        Architecture::Adversarial | Architecture::Autoencoder => Vec::new(),
+        Architecture::Audio | Architecture::Adversarial | Architecture::Autoencoder => Vec::new(),
     }
 }
 
@@ -99,7 +100,7 @@ pub fn words_tensor(of: Architecture, segments: &[Vec<Vec<u32>>]) -> Result<Opti
             Tensor::from_vec(indices, (segments.len(), n_rows, n_words), &Device::Cpu).map(Some)
         }
         Architecture::Words => Tensor::from_vec(indices, (segments.len(), n_words), &Device::Cpu).map(Some),
-        Architecture::Adversarial | Architecture::Autoencoder => Ok(None),
+        Architecture::Audio | Architecture::Adversarial | Architecture::Autoencoder => Ok(None),
     }
 }
 

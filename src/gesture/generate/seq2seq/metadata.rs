@@ -35,6 +35,9 @@ pub struct SequenceMetadata {
     /// Word context of the network `words` on either side of a segment, seconds.
     #[serde(default = "around_segment_secs")]
     pub words_around_secs: f64,
+    /// Whether the decoder's state is carried over segment seams unless the user requests otherwise.
+    #[serde(default)]
+    pub carries_state: bool,
     /// Hash of the training data.
     pub dataset: String,
 }

@@ -5,7 +5,7 @@
 use crate::train::gan::losses::{discriminator_loss, generator_loss};
 use candle_core::{Result, Tensor};
 use candle_nn::loss::mse;
-use orator_dataset::config::{AdversarialLoss, ContinuityLoss, DistanceLoss, Seq2seqConfig, VarianceLoss};
+use orator_dataset::config::{AdversarialLoss, ContinuityLoss, DistanceLoss, Seq2seqSettings, VarianceLoss};
 
 /// Added under a square root, whose derivative is infinite at 0.
 const TINY: f64 = 1e-12;
@@ -51,14 +51,14 @@ fn steps(poses: &Tensor) -> Result<Tensor> {
 }
 
 /// Loss settings of the adversarial network: mean squared error, no variance reward.
-pub fn adversarial_settings(settings: &Seq2seqConfig) -> Seq2seqConfig {
-    Seq2seqConfig { distance: DistanceLoss::Mse, lambda_variance: 0.0, ..settings.clone() }
+pub fn adversarial_settings(settings: &Seq2seqSettings) -> Seq2seqSettings {
+    Seq2seqSettings { distance: DistanceLoss::Mse, lambda_variance: 0.0, ..settings.clone() }
 }
 
 /// Weighted sum of all losses; `logits` are the discriminator's for the generated poses, if there is a discriminator.
-pub fn total(settings: &Seq2seqConfig, generated: &Tensor, real: &Tensor, logits: Option<&Tensor>) -> Result<Tensor> {
+pub fn total(settings: &Seq2seqSettings, generated: &Tensor, real: &Tensor, logits: Option<&Tensor>) -> Result<Tensor> {
     let mut total = match settings.distance {
-        DistanceLoss::L1 => l1(generated, real)?,
+        DistanceLoss::Auto | DistanceLoss::L1 => l1(generated, real)?,
         DistanceLoss::Mse => mse(generated, real)?,
     };
     let mut add = |part: Tensor, weight: f64| -> Result<()> {
@@ -67,14 +67,14 @@ pub fn total(settings: &Seq2seqConfig, generated: &Tensor, real: &Tensor, logits
     };
     if settings.lambda_continuity != 0.0 {
         let part = match settings.continuity {
-            ContinuityLoss::Numbers => continuity_of_numbers(generated)?,
+            ContinuityLoss::Auto | ContinuityLoss::Numbers => continuity_of_numbers(generated)?,
             ContinuityLoss::Poses => continuity_of_poses(generated)?,
         };
         add(part, settings.lambda_continuity)?;
     }
     if settings.lambda_variance != 0.0 {
         let part = match settings.variance_loss {
-            VarianceLoss::Norm => variance_loss_of_code(generated)?,
+            VarianceLoss::Auto | VarianceLoss::Norm => variance_loss_of_code(generated)?,
             VarianceLoss::Variance => variance_loss_of_paper(generated)?,
         };
         add(part, settings.lambda_variance)?;
@@ -113,7 +113,7 @@ mod tests {
         let expected = (entropy(2.0) + entropy(-1.0) + entropy(-0.5) + entropy(1.0)) / 4.0;
         assert!(near(discriminator(&logits(0.5, -1.0)?, &logits(2.0, -1.0)?), expected)?);
         assert!(near(generator_loss(AdversarialLoss::Log, &logits(0.5, -90.0)?), (entropy(0.5) + 90.0) / 2.0)?);
-        let settings = Seq2seqConfig::default();
+        let settings = Seq2seqSettings::default();
         let code_loss = total(&settings, &generated, &real, None);
         assert!(near(code_loss, 0.75 + 0.01 * 1.75 - 1.75)?);
         let gan_loss = total(&adversarial_settings(&settings), &generated, &real, Some(&logits(0.0, 0.0)?));
@@ -124,13 +124,13 @@ mod tests {
     #[test]
     fn gradients_match_finite_differences() -> Result<()> {
         let (generated, real) = (pattern(&[2, 4, 3], 0.0)?, pattern(&[2, 4, 3], 3.0)?);
-        let paper_settings = Seq2seqConfig {
+        let paper_settings = Seq2seqSettings {
             distance: DistanceLoss::Mse,
             continuity: ContinuityLoss::Poses,
             variance_loss: VarianceLoss::Variance,
-            ..Seq2seqConfig::default()
+            ..Seq2seqSettings::default()
         };
-        for settings in [Seq2seqConfig::default(), paper_settings] {
+        for settings in [Seq2seqSettings::default(), paper_settings] {
             assert!(worst(&[generated.clone(), real.clone()], |v| total(&settings, &v[0], &v[1], Some(&v[0])))? < 1e-7);
         }
         assert!(worst(&[generated, real], |v| discriminator(&v[0], &v[1]))? < 1e-7);

@@ -87,6 +87,7 @@ mod tests {
             poses: PoseFormat::Joints { normalisation, representation: Representation::Positions },
             vocabulary: Vocabulary::default(),
             words_around_secs: 2.0,
+            carries_state: false,
             dataset: String::new(),
         };
         let frames = Array2::from_shape_fn((60, 1), |(t, _)| t as f32);

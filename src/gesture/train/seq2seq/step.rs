@@ -12,13 +12,13 @@ use crate::train::optim::adam::{self, Adam};
 use crate::train::resume;
 use anyhow::{Context, Result, ensure};
 use candle_core::Tensor;
-use orator_dataset::config::{Seq2seqConfig, to_stored};
+use orator_dataset::config::{Seq2seqConfig, Seq2seqSettings, to_stored};
 use orator_formats::checkpoint;
 use orator_nn::Mode;
 use orator_nn::params::Params;
 use orator_nn::seq2seq::adversarial::SegmentDiscriminator;
 use orator_nn::seq2seq::config::Segment;
-use orator_nn::seq2seq::predict::GesturePredictor;
+use orator_nn::seq2seq::predict::{GesturePredictor, TruePoses};
 use orator_nn::weights::Contents;
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
@@ -32,7 +32,7 @@ const DISCRIMINATOR: &str = "discriminator.";
 const ADAM: &str = "adam.network.";
 const ADAM_D: &str = "adam.discriminator.";
 /// Settings that a resumed training takes from the configuration; all others come from the checkpoint.
-const OVERRIDABLE_ON_RESUME: [&str; 4] = ["steps", "patience", "checkpoint_every", "keep_checkpoints"];
+const OVERRIDABLE_ON_RESUME: [&str; 5] = ["epochs", "steps", "patience", "checkpoint_every", "keep_checkpoints"];
 
 /// Losses of one step: the weighted sum, some of its terms unweighted, and the gradient norm of the network.
 #[derive(Clone, Copy, Debug, Serialize)]
@@ -48,7 +48,7 @@ pub struct SequenceLosses {
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct SequenceState {
     pub speaker: SequenceMetadata,
-    pub settings: Seq2seqConfig,
+    pub settings: Seq2seqSettings,
     /// Number of completed steps.
     pub step: usize,
     /// Step and score of the best validation so far.
@@ -65,13 +65,13 @@ struct Adversary {
 /// Networks and optimisers of a training, with its step count.
 pub struct SequenceTrainer {
     pub metadata: SequenceMetadata,
-    pub settings: Seq2seqConfig,
+    pub settings: Seq2seqSettings,
     pub network: Box<dyn GesturePredictor>,
     params: Params,
     adam: Adam,
     adversary: Option<Adversary>,
     /// Settings of the loss, which differ from `settings` for the adversarial network.
-    loss: Seq2seqConfig,
+    loss: Seq2seqSettings,
     /// Number of completed steps.
     pub step: usize,
     /// Step and score of the best validation so far.
@@ -80,7 +80,7 @@ pub struct SequenceTrainer {
 
 impl SequenceTrainer {
     /// Networks with random initial weights, determined by the seed.
-    pub fn new(metadata: SequenceMetadata, settings: Seq2seqConfig) -> Result<Self> {
+    pub fn new(metadata: SequenceMetadata, settings: Seq2seqSettings) -> Result<Self> {
         let mut params = Params::new(settings.seed);
         let network = architecture::network(metadata.architecture, &mut params, &metadata.network)?;
         let is_adversarial = metadata.architecture == Architecture::Adversarial;
@@ -131,7 +131,7 @@ impl SequenceTrainer {
         let words = batch.segment.words.as_ref();
         let words = words.map(|words| drop_words(words, self.settings.word_dropout, &mut rng)).transpose()?;
         let segment = Segment { words, ..batch.segment.clone() };
-        let predicted = batch.completed(&self.network.forward(&segment, &mut Mode::Train(&mut rng))?)?;
+        let predicted = batch.completed(&self.predict(&segment, &batch.real, &mut rng)?)?;
         let (mut discriminator, mut logits) = (0.0, None);
         if let Some(Adversary { network, adam, .. }) = &mut self.adversary {
             let predicted_logits = network.forward(&predicted.detach(), true)?;
@@ -145,6 +145,19 @@ impl SequenceTrainer {
         self.step += 1;
         let l1 = Some(number(&losses::l1(&predicted, &batch.real)?)?);
         Ok(SequenceLosses { total: number(&total)?, l1, discriminator, gradient_norm })
+    }
+
+    /// Predicts the poses of a segment in training. Each decoder step reads the network's own previous pose with
+    /// probability `scheduled_sampling`, else the true one (FineMotion 2020, eq. 2).
+    fn predict(&self, segment: &Segment, real: &Tensor, rng: &mut ChaCha8Rng) -> Result<Tensor> {
+        let own = self.settings.scheduled_sampling;
+        if own >= 1.0 {
+            return Ok(self.network.forward(segment, &mut Mode::Train(rng))?);
+        }
+        let n_steps = real.dim(0)? * real.dim(1)?;
+        let taken: Vec<bool> = (0..n_steps).map(|_| rng.random_bool(1.0 - own)).collect();
+        let truth = TruePoses { poses: real, taken: &taken };
+        Ok(self.network.forward_with_truth(segment, &truth, &mut Mode::Train(rng))?)
     }
 
     /// Writes the checkpoint of this step, and deletes old ones beyond `keep_checkpoints`.
@@ -202,7 +215,7 @@ impl SequenceState {
     }
 
     /// Settings of the resumed training, and a message for each difference from `requested`.
-    pub fn settings(&self, requested: &Seq2seqConfig) -> Result<(Seq2seqConfig, Vec<String>)> {
+    pub fn settings(&self, requested: &Seq2seqConfig) -> Result<(Seq2seqSettings, Vec<String>)> {
         resume::settings(&self.settings, requested, "seq2seq", &OVERRIDABLE_ON_RESUME)
     }
 }

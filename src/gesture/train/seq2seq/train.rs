@@ -2,6 +2,7 @@
 //! training was interrupted: the segments and the dropout of a step depend only on the seed and the step, and
 //! everything else is stored in the checkpoint.
 
+use super::reading;
 use super::rollout_previous::roll_out_previous;
 use super::segments::SegmentLoader;
 use super::sequence::{PoseSequence, SequenceSplits};
@@ -22,7 +23,7 @@ use orator_base::stage::progress::Progress;
 use orator_base::stage::workdir::{self, FolderLock};
 use orator_base::text::counted;
 use orator_dataset::Split;
-use orator_dataset::config::Seq2seqConfig;
+use orator_dataset::config::{Auto, SeamState, Seq2seqConfig, Seq2seqSettings};
 use orator_formats::checkpoint;
 use orator_formats::word_vectors::WordVectors;
 use orator_nn::cpu::spin_pool::with_spinning_workers;
@@ -34,7 +35,7 @@ use std::path::Path;
 /// Dimension of the word embeddings if no word vectors are given.
 const WORD_DIM: usize = 100;
 
-/// Trains until `requested.steps`, resuming from the newest checkpoint in `folder` if there is one; then the settings
+/// Trains to the last step of `requested`, resuming from the newest checkpoint in `folder` if there is one; then the settings
 /// of that checkpoint apply, and differences are reported. `vectors` initialise the word embeddings; without them they
 /// are random.
 ///
@@ -104,6 +105,13 @@ pub fn train_with_callback(
     };
     splits.notes.iter().for_each(|note| progress.say(note));
     let train = SegmentLoader::new(splits.train, &trainer.metadata, trainer.settings.stride_frames);
+    if resumed.is_none() {
+        let Config { predicted, .. } = trainer.metadata.network;
+        reading::set_length(&mut trainer.settings, requested, train.len(), predicted, source.fps());
+        progress.say(&reading::line(&trainer.settings));
+    } else if let (Some(epochs), None) = (requested.epochs.given(), requested.steps.given()) {
+        trainer.settings.steps = epochs * reading::epoch_length(&trainer.settings, train.len());
+    }
     ensure!(
         !train.is_empty(),
         "{}: no training motion is as long as a segment ({} frames)",
@@ -137,12 +145,14 @@ pub fn train_with_callback(
 fn initialise(
     source: TrainingSource,
     vectors: Option<&WordVectors>,
-    settings: &Seq2seqConfig,
+    requested: &Seq2seqConfig,
 ) -> Result<(SequenceTrainer, SequenceSplits)> {
+    let settings = reading::settings(requested)?;
     let (fps, poses) = (source.fps(), source.pose_format()?);
     let word = vectors.map_or(WORD_DIM, WordVectors::dim);
     let sizes = |n_words| Config {
         audio_context: settings.audio_context,
+        score_blocks: settings.discriminator_blocks,
         ..network_config(fps, poses.n_features(), n_words, [settings.hidden, word])
     };
     let splits = source.sequences(&poses, sizes(0).context)?;
@@ -160,9 +170,10 @@ fn initialise(
         poses,
         vocabulary,
         words_around_secs: settings.words_around_secs,
+        carries_state: settings.state_at_seams == SeamState::Carried,
         dataset: source.hash()?,
     };
-    let trainer = SequenceTrainer::new(metadata, settings.clone())?;
+    let trainer = SequenceTrainer::new(metadata, settings)?;
     initialise_words(&trainer, vectors)?;
     initialise_scales(&trainer, &splits.train)?;
     Ok((trainer, splits))
@@ -225,7 +236,7 @@ impl ValidatedTraining for SequenceTraining<'_> {
     }
 
     fn schedule(&self) -> EpochSchedule {
-        let Seq2seqConfig { steps, epoch_steps, checkpoint_every, patience, .. } = self.trainer.settings;
+        let Seq2seqSettings { steps, epoch_steps, checkpoint_every, patience, .. } = self.trainer.settings;
         EpochSchedule { steps, epoch_steps, checkpoint_every, patience }
     }
 
@@ -238,7 +249,7 @@ impl ValidatedTraining for SequenceTraining<'_> {
     }
 
     fn step(&mut self) -> Result<StepReport> {
-        let Seq2seqConfig { seed, batch, rollout_previous, .. } = self.trainer.settings;
+        let Seq2seqSettings { seed, batch, rollout_previous, .. } = self.trainer.settings;
         let which = sample_windows(seed, self.trainer.step, batch, self.loader.len());
         let mut batch = self.loader.batch(&which)?;
         if rollout_previous > 0.0 {
@@ -307,10 +318,16 @@ fn resume(
     })
 }
 
-fn check(settings: &Seq2seqConfig) -> Result<()> {
-    ensure!(settings.batch > 1, "seq2seq.batch is {}: expected at least 2 (for batch norm)", settings.batch);
+fn check(requested: &Seq2seqConfig) -> Result<()> {
+    reading::check(requested)?;
+    let is_zero = |count: Auto<usize>| count.given() == Some(0);
     ensure!(
-        settings.checkpoint_every > 0 && settings.epoch_steps > 0 && settings.hidden > 0,
+        requested.batch.given().is_none_or(|batch| batch > 1),
+        "seq2seq.batch is {}: expected at least 2 (for batch norm)",
+        requested.batch.given().unwrap_or_default()
+    );
+    ensure!(
+        requested.checkpoint_every > 0 && !is_zero(requested.epoch_steps) && requested.hidden > 0,
         "seq2seq.checkpoint_every, seq2seq.epoch_steps and seq2seq.hidden must be at least 1"
     );
     Ok(())

@@ -1,0 +1,319 @@
+//! Readings: values for the keys of `[seq2seq]` that are `"auto"`. FineMotion's paper (GENEA 2020) and its published
+//! code differ in the losses, the words of a segment and the state at seams; [`FINEMOTION`] has both values of each key
+//! with their sources. The reading `auto` uses those of the code and chooses the number of epochs by the minutes of
+//! motion.
+
+use anyhow::{Context, Result, ensure};
+use orator_base::text::counted;
+use orator_base::types::time::FrameRate;
+use orator_dataset::config::{FineMotionReading, Seq2seqConfig, Seq2seqSettings, SequenceNetwork, number};
+use serde_json::{Value, json};
+
+/// Value of a key in one reading.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum ReadingValue {
+    Number(f64),
+    Choice(&'static str),
+}
+
+use ReadingValue::{Choice, Number};
+
+/// Values of a key in the paper and in the code, each with its source.
+#[derive(Clone, Copy, Debug)]
+pub struct ReadingRow {
+    pub key: &'static str,
+    /// Networks that the row is about; empty: all others.
+    pub networks: &'static [SequenceNetwork],
+    pub paper: (ReadingValue, &'static str),
+    pub code: (ReadingValue, &'static str),
+}
+
+/// Networks of section 4.1.
+const SEGMENT_NETWORKS: &[SequenceNetwork] = &[SequenceNetwork::Audio, SequenceNetwork::Words];
+const UNSTATED: &str = "not stated; as in the code";
+
+/// Values of the readings `paper` and `code`; the first row of a key that names the network applies.
+#[rustfmt::skip]
+pub const FINEMOTION: [ReadingRow; 13] = [
+    row("distance", &[], (Choice("mse"), "section 4: the mean squared error is minimised"), (Choice("l1"), "L1 loss")),
+    row("continuity", &[], (Choice("poses"), "section 2: norm of the difference of consecutive poses"), (Choice("numbers"), "absolute differences per coordinate")),
+    row("variance_loss", &[], (Choice("variance"), "section 2: negative variance"), (Choice("norm"), "norm over time, not centred")),
+    row("words_around_secs", &[], (Number(0.5), "section 4.1: a window of 2 s, for segments of 1 s"), (Number(2.0), "2 s on either side of a segment")),
+    row("state_at_seams", &[], (Choice("carried"), "section 4.1: the state is supplied to the next segment"), (Choice("renewed"), "the state is not passed on")),
+    row("batch", SEGMENT_NETWORKS, (Number(512.0), "section 4.1"), (Number(512.0), "command in its README")),
+    row("batch", &[], (Number(50.0), "section 4.2"), (Number(50.0), "default of its trainer")),
+    row("stride_frames", SEGMENT_NETWORKS, (Number(1.0), UNSTATED), (Number(1.0), "command in its README")),
+    row("stride_frames", &[], (Number(0.0), UNSTATED), (Number(0.0), "default of its trainer: length of a segment")),
+    row("learning_rate", &[SequenceNetwork::Autoencoder], (Number(3e-4), UNSTATED), (Number(3e-4), "Adam, audio baseline")),
+    row("learning_rate", &[], (Number(1e-3), "sections 4.1 and 4.2: Adam"), (Number(1e-3), "Adam")),
+    row("lambda_adversarial", &[], (Number(0.1), "section 4.3: small weights around 0.1"), (Number(0.01), "default of its trainer")),
+    row("epochs", &[], (Number(100.0), "sections 4.1 and 4.2"), (Number(100.0), "command in its README")),
+];
+
+const fn row(
+    key: &'static str,
+    networks: &'static [SequenceNetwork],
+    paper: (ReadingValue, &'static str),
+    code: (ReadingValue, &'static str),
+) -> ReadingRow {
+    ReadingRow { key, networks, paper, code }
+}
+
+/// Epochs of the reading `auto` by the minutes of training motion, interpolated linearly in the logarithm of the
+/// minutes. The last is that of FineMotion's 3.5 hours.
+const EPOCHS: [(f64, f64); 4] = [(2.0, 400.0), (10.0, 200.0), (30.0, 100.0), (208.0, 80.0)];
+
+/// Smallest number of steps between two validations.
+const MIN_EPOCH_STEPS: usize = 100;
+
+/// Keys without effect for some networks, with the networks that they apply to.
+const EFFECTIVE: [(&str, &[SequenceNetwork]); 14] = {
+    use SequenceNetwork::{Adversarial, Audio, Contextual, Words};
+    const DECODERS: &[SequenceNetwork] = &[Contextual, Words, Audio, Adversarial];
+    const SUPERVISED: &[SequenceNetwork] = &[Contextual, Words, Audio];
+    [
+        ("distance", SUPERVISED),
+        ("variance_loss", SUPERVISED),
+        ("lambda_variance", SUPERVISED),
+        ("continuity", DECODERS),
+        ("lambda_continuity", DECODERS),
+        ("scheduled_sampling", DECODERS),
+        ("rollout_previous", DECODERS),
+        ("state_at_seams", DECODERS),
+        ("lambda_adversarial", &[Adversarial]),
+        ("discriminator_blocks", &[Adversarial]),
+        ("words_around_secs", &[Words]),
+        ("word_dropout", &[Contextual, Words]),
+        ("audio_context", &[Words, Audio, Adversarial]),
+        ("autoencoder_steps", &[SequenceNetwork::Autoencoder]),
+    ]
+};
+
+/// Checks that every key that differs from its default has an effect on the network.
+///
+/// # Errors
+/// A key without effect, with the networks that it applies to; both `steps` and `epochs`.
+pub fn check(requested: &Seq2seqConfig) -> Result<()> {
+    let [given, default] = [serde_json::to_value(requested)?, serde_json::to_value(Seq2seqConfig::default())?];
+    let network = &given["network"];
+    for (key, networks) in EFFECTIVE {
+        let applies = networks.contains(&requested.network) || given[key] == default[key];
+        ensure!(
+            applies,
+            "seq2seq.{key} has no effect on the network {network}: remove it (it applies to {})",
+            networks.iter().map(|of| json!(of).to_string()).collect::<Vec<_>>().join(", ")
+        );
+    }
+    ensure!(
+        requested.steps.given().is_none() || requested.epochs.given().is_none(),
+        "seq2seq.steps and seq2seq.epochs are both given: remove one"
+    );
+    Ok(())
+}
+
+/// Settings of a training before its data are read: `requested`, with the values of its reading filled in. The length
+/// of the training ([`Seq2seqSettings::steps`], `epochs`, `epoch_steps`) follows from the data; see [`set_length`].
+///
+/// # Errors
+/// An `"auto"` key without a value.
+pub fn settings(requested: &Seq2seqConfig) -> Result<Seq2seqSettings> {
+    let value = |key: &str| match key {
+        "steps" | "epoch_steps" => Some(number(1.0)),
+        _ => {
+            let applies = |row: &&ReadingRow| {
+                row.key == key && (row.networks.is_empty() || row.networks.contains(&requested.network))
+            };
+            let row = FINEMOTION.iter().find(applies)?;
+            Some(match reading_value(row, requested) {
+                Number(value) => number(value),
+                Choice(value) => Value::from(value),
+            })
+        }
+    };
+    requested.filled(value).context("a key of [seq2seq] has no value in this reading")
+}
+
+/// Value of a row in the requested reading. The reading `auto` trains every network on batches of 50 segments that do not
+/// overlap.
+fn reading_value(row: &ReadingRow, requested: &Seq2seqConfig) -> ReadingValue {
+    match (requested.reading, row.key) {
+        (FineMotionReading::Paper, _) => row.paper.0,
+        (FineMotionReading::Auto, "batch") => Number(50.0),
+        (FineMotionReading::Auto, "stride_frames") => Number(0.0),
+        (FineMotionReading::Auto, "learning_rate") => Number(1e-3),
+        (FineMotionReading::Code | FineMotionReading::Auto, _) => row.code.0,
+    }
+}
+
+/// Steps of one pass over `n_segments` training segments.
+pub fn epoch_length(settings: &Seq2seqSettings, n_segments: usize) -> usize {
+    n_segments.div_ceil(settings.batch.max(1)).max(1)
+}
+
+/// Sets the length of a training with `n_segments` training segments of `predicted` poses at `fps`: an epoch is one
+/// pass over the segments; a validation follows the smallest number of epochs with at least 100 steps.
+pub fn set_length(
+    settings: &mut Seq2seqSettings,
+    requested: &Seq2seqConfig,
+    n_segments: usize,
+    predicted: usize,
+    fps: FrameRate,
+) {
+    let per_epoch = epoch_length(settings, n_segments);
+    let stride = if settings.stride_frames == 0 { predicted } else { settings.stride_frames };
+    let minutes = fps.secs(n_segments * stride) / 60.0;
+    settings.epochs = match (requested.epochs.given(), requested.reading) {
+        (Some(epochs), _) => epochs,
+        (None, FineMotionReading::Auto) => auto_epochs(minutes),
+        (None, FineMotionReading::Paper | FineMotionReading::Code) => settings.epochs,
+    };
+    match requested.steps.given() {
+        Some(steps) => {
+            settings.steps = steps;
+            settings.epochs = steps.div_ceil(per_epoch);
+        }
+        None => settings.steps = settings.epochs * per_epoch,
+    }
+    let validation = MIN_EPOCH_STEPS.div_ceil(per_epoch) * per_epoch;
+    settings.epoch_steps = requested.epoch_steps.given().unwrap_or(validation);
+}
+
+fn auto_epochs(minutes: f64) -> usize {
+    let after = EPOCHS.iter().position(|(column, _)| *column >= minutes).unwrap_or(EPOCHS.len() - 1);
+    let ((from, low), (to, high)) = (EPOCHS[after.saturating_sub(1)], EPOCHS[after]);
+    let share = if to > from { ((minutes / from).ln() / (to / from).ln()).clamp(0.0, 1.0) } else { 0.0 };
+    (low + share * (high - low)).round() as usize
+}
+
+/// Line that describes the settings of a new training.
+pub fn line(settings: &Seq2seqSettings) -> String {
+    let text = |value: Value| value.as_str().unwrap_or_default().to_owned();
+    format!(
+        "reading {}: {} of {} segments ({}), learning rate {}, a validation every {}",
+        text(json!(settings.reading)),
+        counted(settings.steps, "step"),
+        settings.batch,
+        counted(settings.epochs, "epoch"),
+        settings.learning_rate,
+        counted(settings.epoch_steps, "step")
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use orator_dataset::config::{ContinuityLoss, DistanceLoss, SeamState, VarianceLoss};
+
+    /// Settings for `n_segments` at 20 fps.
+    fn resolved(requested: &Seq2seqConfig, n_segments: usize) -> Seq2seqSettings {
+        let mut settings = settings(requested).unwrap();
+        set_length(&mut settings, requested, n_segments, 20, FrameRate::new(20, 1));
+        settings
+    }
+
+    fn requested(reading: FineMotionReading, network: SequenceNetwork) -> Seq2seqConfig {
+        Seq2seqConfig { reading, network, ..Seq2seqConfig::default() }
+    }
+
+    /// Both readings in numbers, for FineMotion's 3 h 28 min. Sources: [`FINEMOTION`].
+    #[test]
+    fn both_readings_set_every_value() {
+        // Contextual: 12,480 segments of one second; words: one at every frame of 20 per second.
+        for (network, n_segments, batch, stride_frames, per_epoch) in [
+            (SequenceNetwork::Contextual, 12_480, 50, 0, 250),
+            (SequenceNetwork::Words, 249_600, 512, 1, 488),
+            (SequenceNetwork::Audio, 249_600, 512, 1, 488),
+        ] {
+            let shared = Seq2seqSettings {
+                network,
+                batch,
+                stride_frames,
+                epochs: 100,
+                steps: 100 * per_epoch,
+                epoch_steps: per_epoch,
+                learning_rate: 1e-3,
+                lambda_continuity: 0.01,
+                lambda_variance: 1.0,
+                scheduled_sampling: 1.0,
+                rollout_previous: 0.0,
+                word_dropout: 0.0,
+                hidden: 150,
+                patience: 0,
+                decay_start: 0,
+                ..Seq2seqSettings::default()
+            };
+            let paper = Seq2seqSettings {
+                reading: FineMotionReading::Paper,
+                distance: DistanceLoss::Mse,
+                continuity: ContinuityLoss::Poses,
+                variance_loss: VarianceLoss::Variance,
+                words_around_secs: 0.5,
+                state_at_seams: SeamState::Carried,
+                lambda_adversarial: 0.1,
+                ..shared.clone()
+            };
+            let code = Seq2seqSettings {
+                reading: FineMotionReading::Code,
+                distance: DistanceLoss::L1,
+                continuity: ContinuityLoss::Numbers,
+                variance_loss: VarianceLoss::Norm,
+                words_around_secs: 2.0,
+                state_at_seams: SeamState::Renewed,
+                lambda_adversarial: 0.01,
+                ..shared
+            };
+            for expected in [paper, code] {
+                assert_eq!(resolved(&requested(expected.reading, network), n_segments), expected);
+            }
+        }
+        let baseline = requested(FineMotionReading::Code, SequenceNetwork::Autoencoder);
+        assert_eq!(settings(&baseline).unwrap().learning_rate, 3e-4);
+        // Single keys override the reading.
+        let overridden = Seq2seqConfig {
+            distance: DistanceLoss::L1,
+            epochs: 3.into(),
+            batch: 100.into(),
+            ..requested(FineMotionReading::Paper, SequenceNetwork::Contextual)
+        };
+        let settings = resolved(&overridden, 1_000);
+        assert_eq!((settings.distance, settings.steps, settings.epoch_steps), (DistanceLoss::L1, 30, 100));
+        assert_eq!(settings.continuity, ContinuityLoss::Poses);
+    }
+
+    #[test]
+    fn the_length_of_a_training_follows_from_its_data() {
+        let auto = |n_segments| resolved(&Seq2seqConfig::default(), n_segments);
+        let length = |settings: Seq2seqSettings| (settings.epochs, settings.steps, settings.epoch_steps);
+        // 2, 10 and 30 minutes, and 3 h 28 min.
+        assert_eq!(length(auto(120)), (400, 1_200, 102));
+        assert_eq!(length(auto(600)), (200, 2_400, 108));
+        assert_eq!(length(auto(1_800)), (100, 3_600, 108));
+        assert_eq!(length(auto(12_480)), (80, 20_000, 250));
+        assert_eq!((auto(1).epochs, auto(100_000).epochs), (400, 80));
+        let given = Seq2seqConfig { steps: 50.into(), epoch_steps: 20.into(), ..Seq2seqConfig::default() };
+        assert_eq!(length(resolved(&given, 600)), (5, 50, 20));
+    }
+
+    #[test]
+    fn keys_without_effect_are_errors() {
+        let of = |network| requested(FineMotionReading::Auto, network);
+        let error = |settings: Seq2seqConfig| check(&settings).err().map(|error| error.to_string());
+        use SequenceNetwork::{Adversarial, Audio, Autoencoder, Contextual, Words};
+        for network in [Contextual, Words, Audio, Adversarial, Autoencoder] {
+            assert_eq!(error(of(network)), None);
+        }
+        let text = error(Seq2seqConfig { distance: DistanceLoss::Mse, ..of(Adversarial) }).unwrap();
+        assert_eq!(
+            text,
+            "seq2seq.distance has no effect on the network \"adversarial\": remove it (it applies to \"contextual\", \
+             \"words\", \"audio\")"
+        );
+        assert!(error(Seq2seqConfig { lambda_variance: 0.5, ..of(Adversarial) }).is_some());
+        assert!(error(Seq2seqConfig { continuity: ContinuityLoss::Poses, ..of(Autoencoder) }).is_some());
+        assert!(error(Seq2seqConfig { word_dropout: 0.1, ..of(Autoencoder) }).is_some());
+        assert!(error(Seq2seqConfig { word_dropout: 0.1, ..of(Words) }).is_none());
+        assert!(error(Seq2seqConfig { discriminator_blocks: 3, ..of(Contextual) }).is_some());
+        let both = Seq2seqConfig { steps: 4.into(), epochs: 4.into(), ..of(Words) };
+        assert!(error(both).unwrap().contains("both given"));
+    }
+}
