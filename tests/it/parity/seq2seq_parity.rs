@@ -186,8 +186,9 @@ fn the_contextual_network_agrees_with_pytorch() -> anyhow::Result<()> {
 }
 
 #[test]
-fn the_adversarial_networks_agree_with_pytorch() -> anyhow::Result<()> {
+fn the_networks_without_words_agree_with_pytorch() -> anyhow::Result<()> {
     let run = |net: &WordsSeq2Seq, dtype, mode: &mut Mode| net.forward(&inputs(None, dtype)?, mode);
+    compare("audio_only", |params| WordsSeq2Seq::audio_only(params, &small()), run)?;
     compare("adversarial", |params| WordsSeq2Seq::without_words(params, &small()), run)?;
     let score = |net: &SegmentDiscriminator, dtype, mode: &mut Mode| {
         net.forward(&pattern(&[BATCH, 8, 5], 3.0)?.to_dtype(dtype)?, mode.trains())
