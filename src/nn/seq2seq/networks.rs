@@ -3,7 +3,7 @@
 use super::config::{Config, Segment};
 use super::decoder::Decoder;
 use super::encoders::{ContextEncoder, FrameEncoder, WordEncoder};
-use super::predict::GesturePredictor;
+use super::predict::{GesturePredictor, TruePoses};
 use crate::Mode;
 use crate::ops::affine::Affine;
 use crate::ops::recurrent::gru::Gru;
@@ -25,7 +25,12 @@ impl<N: EncodesAndDecodes> GesturePredictor for N {
 
     fn forward(&self, segment: &Segment, mode: &mut Mode) -> Result<Tensor> {
         let encoded = self.encoded(segment, mode)?;
-        self.parts().1.forward(segment, &encoded, mode)
+        self.parts().1.forward(segment, &encoded, None, mode)
+    }
+
+    fn forward_with_truth(&self, segment: &Segment, truth: &TruePoses, mode: &mut Mode) -> Result<Tensor> {
+        let encoded = self.encoded(segment, mode)?;
+        self.parts().1.forward(segment, &encoded, Some(truth), mode)
     }
 
     fn continue_from(&self, segment: &Segment, state: Option<&Tensor>) -> Result<(Tensor, Option<Tensor>)> {
@@ -145,6 +150,7 @@ impl EncodesAndDecodes for ContextSeq2Seq {
 mod tests {
     use super::*;
     use crate::ops::gradcheck::pattern;
+    use crate::seq2seq::autoencoder::AudioBaseline;
     use candle_core::{DType, Device};
     use rand::SeedableRng;
     use rand_chacha::ChaCha8Rng;
@@ -161,6 +167,55 @@ mod tests {
 
     fn segment(words: Option<Tensor>) -> Result<Segment> {
         Ok(Segment { audio: values([8, 3], 0.0)?, previous: values([3, 2], 1.0)?, words })
+    }
+
+    #[test]
+    fn training_is_unchanged_unless_true_poses_are_taken() -> Result<()> {
+        let mut params = [Params::new(3), Params::new(4), Params::new(5)];
+        let networks: [Box<dyn GesturePredictor>; 3] = [
+            Box::new(WordsSeq2Seq::new(&mut params[0], &small())?),
+            Box::new(WordsSeq2Seq::audio_only(&mut params[1], &small())?),
+            Box::new(ContextSeq2Seq::new(&mut params[2], &small())?),
+        ];
+        let of_segments = Tensor::new(&[[2u32, 0, 3], [1, 2, 2]], &Device::Cpu)?;
+        let of_poses = Tensor::ones((2, 4, 3), DType::U32, &Device::Cpu)?;
+        let poses = values([4, 2], 2.0)?;
+        for ((network, params), words) in networks.iter().zip(&params).zip([Some(of_segments), None, Some(of_poses)]) {
+            let segment = segment(words)?;
+            // Poses, then gradients.
+            let train = |taken: Option<&[bool]>| -> Result<Vec<Vec<f32>>> {
+                let mut rng = ChaCha8Rng::seed_from_u64(1);
+                let mut mode = Mode::Train(&mut rng);
+                let predicted = match taken {
+                    None => network.forward(&segment, &mut mode)?,
+                    Some(taken) => {
+                        network.forward_with_truth(&segment, &TruePoses { poses: &poses, taken }, &mut mode)?
+                    }
+                };
+                let gradients = predicted.sqr()?.sum_all()?.backward()?;
+                let of_params = params.trainables().filter_map(|(_, var)| gradients.get(var));
+                std::iter::once(&predicted).chain(of_params).map(|v| v.flatten_all()?.to_vec1()).collect()
+            };
+            let without = train(None)?;
+            assert_eq!(without.len(), 1 + params.trainables().count());
+            assert_eq!(without, train(Some(&[false; 8]))?);
+            // Only the inputs of the second sample's last two steps are true poses.
+            let with = train(Some(&[true, false, false, false, true, false, true, true]))?;
+            assert_eq!(without[0][..12], with[0][..12]);
+            assert!((12..16).all(|i| without[0][i] != with[0][i]), "{without:?} {with:?}");
+            assert!(train(Some(&[false; 7])).is_err());
+        }
+        Ok(())
+    }
+
+    #[test]
+    fn networks_without_a_decoder_read_no_true_poses() -> Result<()> {
+        let network = AudioBaseline::new(&mut Params::new(1), &small())?;
+        let truth = TruePoses { poses: &values([4, 2], 2.0)?, taken: &[true; 8] };
+        assert!(network.forward(&segment(None)?, &mut Mode::Eval).is_ok());
+        let result = network.forward_with_truth(&segment(None)?, &truth, &mut Mode::Eval);
+        assert!(result.is_err_and(|error| error.to_string().contains("no decoder")));
+        Ok(())
     }
 
     #[test]

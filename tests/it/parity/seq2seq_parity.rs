@@ -13,7 +13,7 @@ use orator_nn::seq2seq::adversarial::SegmentDiscriminator;
 use orator_nn::seq2seq::autoencoder::{PoseAutoencoder, SpeechEncoder};
 use orator_nn::seq2seq::config::{Config, Segment};
 use orator_nn::seq2seq::networks::{ContextSeq2Seq, WordsSeq2Seq};
-use orator_nn::seq2seq::predict::GesturePredictor;
+use orator_nn::seq2seq::predict::{GesturePredictor, TruePoses};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use std::collections::BTreeMap;
@@ -176,6 +176,19 @@ fn the_words_network_agrees_with_pytorch() -> anyhow::Result<()> {
     compare("words", |params| WordsSeq2Seq::new(params, &small()), run)?;
     let config = Config { audio_context: true, ..small() };
     compare("words_context", |params| WordsSeq2Seq::new(params, &config), run)
+}
+
+#[test]
+fn true_poses_as_inputs_of_some_decoder_steps_agree_with_pytorch() -> anyhow::Result<()> {
+    let Config { predicted, pose, .. } = small();
+    let is_taken = |b: usize, t: usize| (3 * b + 2 * t + b * t) % 5 < 2;
+    let taken: Vec<bool> = (0..BATCH * predicted).map(|i| is_taken(i / predicted, i % predicted)).collect();
+    let run = |net: &WordsSeq2Seq, dtype, mode: &mut Mode| {
+        let poses = pattern(&[BATCH, predicted, pose], 3.0)?.to_dtype(dtype)?;
+        let truth = TruePoses { poses: &poses, taken: &taken };
+        net.forward_with_truth(&inputs(Some(words_of_segments()?), dtype)?, &truth, mode)
+    };
+    compare("words_truth", |params| WordsSeq2Seq::new(params, &small()), run)
 }
 
 #[test]
