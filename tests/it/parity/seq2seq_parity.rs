@@ -203,10 +203,14 @@ fn the_networks_without_words_agree_with_pytorch() -> anyhow::Result<()> {
     let run = |net: &WordsSeq2Seq, dtype, mode: &mut Mode| net.forward(&inputs(None, dtype)?, mode);
     compare("audio_only", |params| WordsSeq2Seq::audio_only(params, &small()), run)?;
     compare("adversarial", |params| WordsSeq2Seq::without_words(params, &small()), run)?;
-    let score = |net: &SegmentDiscriminator, dtype, mode: &mut Mode| {
-        net.forward(&pattern(&[BATCH, 8, 5], 3.0)?.to_dtype(dtype)?, mode.trains())
-    };
-    compare("discriminator", |params| SegmentDiscriminator::new(params, &small()), score)
+    let more_blocks = Config { predicted: 16, score_blocks: 4, ..small() };
+    for (name, config) in [("discriminator", small()), ("discriminator_blocks", more_blocks)] {
+        let score = |net: &SegmentDiscriminator, dtype, mode: &mut Mode| {
+            net.forward(&pattern(&[BATCH, config.predicted, config.pose], 3.0)?.to_dtype(dtype)?, mode.trains())
+        };
+        compare(name, |params| SegmentDiscriminator::new(params, &config), score)?;
+    }
+    Ok(())
 }
 
 #[test]
