@@ -32,17 +32,19 @@ impl Conv1d {
         Ok(Self { weight, bias, stride: Some(stride) })
     }
 
-    /// [`Self::valid`] with a bias; both tensors are initialised uniformly in +-1 / sqrt(fan in), as in PyTorch.
-    pub fn valid_with_bias(
+    /// Creates a layer with `n` = [input, output] channels and a bias, both initialised uniformly in +-1 / sqrt(fan
+    /// in), as in PyTorch; without padding, or with zero padding that preserves the number of frames if `stride` is
+    /// `None`.
+    pub fn with_bias(
         params: &mut Params,
         name: &str,
         n: [usize; 2],
         kernel: usize,
-        stride: usize,
+        stride: Option<usize>,
     ) -> Result<Self> {
         let init = Init::Uniform(1.0 / ((n[0] * kernel) as f64).sqrt());
         let (weight, bias) = params.layer(name, &[n[1], n[0], kernel], init, init)?;
-        Ok(Self { weight, bias, stride: Some(stride) })
+        Ok(Self { weight, bias, stride })
     }
 }
 

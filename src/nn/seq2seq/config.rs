@@ -2,6 +2,10 @@
 
 use candle_core::{Result, Tensor};
 use serde::{Deserialize, Serialize};
+use std::ops::RangeInclusive;
+
+/// Possible numbers of blocks of the discriminator.
+pub const SCORE_BLOCKS: RangeInclusive<usize> = 2..=6;
 
 /// Sizes and dropout rates. The defaults are those of the authors' code.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -22,7 +26,7 @@ pub struct Config {
     pub word: usize,
     /// Size of a state of the words in one direction.
     pub word_hidden: usize,
-    /// Number of layers of the encoder of `words`: two in the published network, one in the adversarial one.
+    /// Number of layers of the encoder of `words`: two in the published networks, one in the adversarial one.
     pub encoder_layers: usize,
     /// Whether the encoder of `words` runs a GRU over the audio around a frame instead of using only that frame.
     #[serde(rename = "hears_context")]
@@ -33,12 +37,24 @@ pub struct Config {
     pub dropout: f64,
     /// Dropout rate of state and contexts before the output of `words`.
     pub dropout_read: f64,
-    /// Numbers of channels of the discriminator's convolutions, and size of the hidden layer after them.
+    /// Numbers of channels of the discriminator's first two convolutions, and size of the hidden layer after all.
     pub score_channels: [usize; 2],
     pub score_hidden: usize,
+    /// Number of blocks of the discriminator, in [`SCORE_BLOCKS`]; those after the second have its number of channels.
+    #[serde(default = "two", skip_serializing_if = "is_two")]
+    pub score_blocks: usize,
     /// Size of the autoencoder's hidden layers, and of the code of a pose.
     pub pose_hidden: usize,
     pub code: usize,
+}
+
+/// Number of blocks in the authors' code.
+const fn two() -> usize {
+    2
+}
+
+fn is_two(n: &usize) -> bool {
+    *n == two()
 }
 
 impl Default for Config {
@@ -60,6 +76,7 @@ impl Default for Config {
             dropout_read: 0.5,
             score_channels: [100, 200],
             score_hidden: 100,
+            score_blocks: two(),
             pose_hidden: 312,
             code: 40,
         }
@@ -109,4 +126,20 @@ pub struct Segment {
 pub fn windows(audio: &Tensor, width: usize) -> Result<Tensor> {
     let n = (audio.dim(1)? + 1).saturating_sub(width);
     Tensor::stack(&(0..n).map(|t| audio.narrow(1, t, width)).collect::<Result<Vec<_>>>()?, 1)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_number_of_blocks_is_stored_unless_it_is_two() -> anyhow::Result<()> {
+        for (score_blocks, is_stored) in [(2, false), (5, true)] {
+            let config = Config { score_blocks, ..Config::default() };
+            let stored = serde_json::to_string(&config)?;
+            assert_eq!(stored.contains("score_blocks"), is_stored);
+            assert_eq!(serde_json::from_str::<Config>(&stored)?, config);
+        }
+        Ok(())
+    }
 }

@@ -3,7 +3,7 @@
 use super::config::{Config, Segment};
 use crate::Mode;
 use crate::ops::affine::Affine;
-use crate::ops::recurrent::decoder::{DecoderInputs, DecoderWeights, decode};
+use crate::ops::recurrent::decoder::{DecoderInputs, DecoderWeights, TruePoses, decode};
 use crate::ops::recurrent::gru::{Gru, drop_mask};
 use crate::params::Params;
 use candle_core::{Module, Result, Tensor};
@@ -40,9 +40,16 @@ impl Decoder {
     }
 
     /// Predicts the poses [B, predicted, pose] that follow those of the segment. `encoded` has sequences [B, K, n];
-    /// the first is the audio, whose last forward state and first backward state give the initial state.
-    pub fn forward(&self, segment: &Segment, encoded: &[Tensor], mode: &mut Mode) -> Result<Tensor> {
-        self.decode(&segment.previous, &self.first_state(encoded)?, encoded, mode)
+    /// the first is the audio, whose last forward state and first backward state give the initial state. Steps read
+    /// the poses of `truth`, if given, where they are taken.
+    pub fn forward(
+        &self,
+        segment: &Segment,
+        encoded: &[Tensor],
+        truth: Option<&TruePoses>,
+        mode: &mut Mode,
+    ) -> Result<Tensor> {
+        self.decode(&segment.previous, &self.first_state(encoded)?, encoded, truth, mode)
     }
 
     /// Predicts poses as `forward` does, without dropout, and returns the state [B, hidden] after reading all of them
@@ -60,7 +67,7 @@ impl Decoder {
             Some(state) => (last.clone(), state.clone()),
             None => (segment.previous.clone(), self.first_state(encoded)?),
         };
-        let poses = self.decode(&previous, &state, encoded, &mut Mode::Eval)?;
+        let poses = self.decode(&previous, &state, encoded, None, &mut Mode::Eval)?;
         let read = Tensor::cat(&[&previous, &last, &poses.narrow(1, 0, self.n_steps - 1)?], 1)?;
         let state = self.gru.state_after(&read, &state)?;
         Ok((poses, state))
@@ -74,10 +81,17 @@ impl Decoder {
         self.init.forward(&Tensor::cat(&[end, beginning], 2)?.squeeze(1)?)
     }
 
-    fn decode(&self, previous: &Tensor, state: &Tensor, encoded: &[Tensor], mode: &mut Mode) -> Result<Tensor> {
+    fn decode(
+        &self,
+        previous: &Tensor,
+        state: &Tensor,
+        encoded: &[Tensor],
+        truth: Option<&TruePoses>,
+        mode: &mut Mode,
+    ) -> Result<Tensor> {
         let keys = self.attentions.iter().zip(encoded).map(|(attention, states)| attention.forward(states));
         let keys = keys.collect::<Result<Vec<_>>>()?;
-        let inputs = DecoderInputs { previous, state, keys: &keys };
+        let inputs = DecoderInputs { previous, state, keys: &keys, truth };
         let gru = self.gru.flat_weights()?;
         let weights = DecoderWeights { gru: &gru, weight: self.output.weight(), bias: self.output.bias() };
         decode(&inputs, &weights, self.n_steps, drop_mask(self.dropout, mode))
@@ -98,13 +112,13 @@ mod tests {
         let first = segment(pattern(&[2, 5, 3], 1.0)?);
         let (poses, state) = decoder.continue_from(&first, &encoded, None)?;
         let max_difference = |a: &Tensor, b: &Tensor| (a - b)?.abs()?.max_all()?.to_scalar::<f64>();
-        assert!(max_difference(&poses, &decoder.forward(&first, &encoded, &mut Mode::Eval)?)? < 1e-12);
+        assert!(max_difference(&poses, &decoder.forward(&first, &encoded, None, &mut Mode::Eval)?)? < 1e-12);
         let (carried, _) = decoder.continue_from(&segment(poses.narrow(1, 1, 5)?), &encoded, Some(&state))?;
         // The first pose is read twice, as is the last pose before any segment.
         let read = Tensor::cat(&[&first.previous, &first.previous.narrow(1, 4, 1)?, &poses], 1)?;
-        let all = decoder.decode(&read, &decoder.first_state(&encoded)?, &encoded, &mut Mode::Eval)?;
+        let all = decoder.decode(&read, &decoder.first_state(&encoded)?, &encoded, None, &mut Mode::Eval)?;
         assert!(max_difference(&carried, &all)? < 1e-12);
-        let renewed = decoder.forward(&segment(poses.narrow(1, 1, 5)?), &encoded, &mut Mode::Eval)?;
+        let renewed = decoder.forward(&segment(poses.narrow(1, 1, 5)?), &encoded, None, &mut Mode::Eval)?;
         assert!(max_difference(&carried, &renewed)? > 1e-6);
         Ok(())
     }

@@ -4,6 +4,7 @@
 use super::autoencoder::AudioBaseline;
 use super::config::{Config, Segment};
 use crate::Mode;
+pub use crate::ops::recurrent::decoder::TruePoses;
 use candle_core::{Result, Tensor};
 use serde::Serialize;
 
@@ -13,6 +14,15 @@ pub trait GesturePredictor: Send + Sync {
 
     /// Predicts the poses [B, predicted, pose] of a batch of segments.
     fn forward(&self, segment: &Segment, mode: &mut Mode) -> Result<Tensor>;
+
+    /// Predicts poses as `forward` does, with `truth` as input of the decoder steps for which it is taken. If it is
+    /// taken for none, poses and gradients are bitwise those of `forward`.
+    ///
+    /// # Errors
+    /// The sizes do not fit, or the network has no decoder (the default).
+    fn forward_with_truth(&self, _segment: &Segment, _truth: &TruePoses, _mode: &mut Mode) -> Result<Tensor> {
+        candle_core::bail!("this network has no decoder that reads true poses: train it without scheduled sampling")
+    }
 
     /// Returns the network itself if it is an [`AudioBaseline`], whose pose codes are trained before the speech
     /// encoder.

@@ -13,7 +13,7 @@ use orator_nn::seq2seq::adversarial::SegmentDiscriminator;
 use orator_nn::seq2seq::autoencoder::{PoseAutoencoder, SpeechEncoder};
 use orator_nn::seq2seq::config::{Config, Segment};
 use orator_nn::seq2seq::networks::{ContextSeq2Seq, WordsSeq2Seq};
-use orator_nn::seq2seq::predict::GesturePredictor;
+use orator_nn::seq2seq::predict::{GesturePredictor, TruePoses};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use std::collections::BTreeMap;
@@ -179,6 +179,19 @@ fn the_words_network_agrees_with_pytorch() -> anyhow::Result<()> {
 }
 
 #[test]
+fn true_poses_as_inputs_of_some_decoder_steps_agree_with_pytorch() -> anyhow::Result<()> {
+    let Config { predicted, pose, .. } = small();
+    let is_taken = |b: usize, t: usize| (3 * b + 2 * t + b * t) % 5 < 2;
+    let taken: Vec<bool> = (0..BATCH * predicted).map(|i| is_taken(i / predicted, i % predicted)).collect();
+    let run = |net: &WordsSeq2Seq, dtype, mode: &mut Mode| {
+        let poses = pattern(&[BATCH, predicted, pose], 3.0)?.to_dtype(dtype)?;
+        let truth = TruePoses { poses: &poses, taken: &taken };
+        net.forward_with_truth(&inputs(Some(words_of_segments()?), dtype)?, &truth, mode)
+    };
+    compare("words_truth", |params| WordsSeq2Seq::new(params, &small()), run)
+}
+
+#[test]
 fn the_contextual_network_agrees_with_pytorch() -> anyhow::Result<()> {
     let run =
         |net: &ContextSeq2Seq, dtype, mode: &mut Mode| net.forward(&inputs(Some(words_of_poses()?), dtype)?, mode);
@@ -186,13 +199,18 @@ fn the_contextual_network_agrees_with_pytorch() -> anyhow::Result<()> {
 }
 
 #[test]
-fn the_adversarial_networks_agree_with_pytorch() -> anyhow::Result<()> {
+fn the_networks_without_words_agree_with_pytorch() -> anyhow::Result<()> {
     let run = |net: &WordsSeq2Seq, dtype, mode: &mut Mode| net.forward(&inputs(None, dtype)?, mode);
+    compare("audio_only", |params| WordsSeq2Seq::audio_only(params, &small()), run)?;
     compare("adversarial", |params| WordsSeq2Seq::without_words(params, &small()), run)?;
-    let score = |net: &SegmentDiscriminator, dtype, mode: &mut Mode| {
-        net.forward(&pattern(&[BATCH, 8, 5], 3.0)?.to_dtype(dtype)?, mode.trains())
-    };
-    compare("discriminator", |params| SegmentDiscriminator::new(params, &small()), score)
+    let more_blocks = Config { predicted: 16, score_blocks: 4, ..small() };
+    for (name, config) in [("discriminator", small()), ("discriminator_blocks", more_blocks)] {
+        let score = |net: &SegmentDiscriminator, dtype, mode: &mut Mode| {
+            net.forward(&pattern(&[BATCH, config.predicted, config.pose], 3.0)?.to_dtype(dtype)?, mode.trains())
+        };
+        compare(name, |params| SegmentDiscriminator::new(params, &config), score)?;
+    }
+    Ok(())
 }
 
 #[test]

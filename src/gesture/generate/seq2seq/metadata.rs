@@ -6,7 +6,7 @@ use super::vocabulary::{NumberedWord, Vocabulary};
 use anyhow::{Context, Result, ensure};
 use orator_base::types::time::FrameRate;
 use orator_nn::params::Params;
-use orator_nn::seq2seq::config::Config;
+use orator_nn::seq2seq::config::{Config, SCORE_BLOCKS};
 use orator_nn::seq2seq::predict::GesturePredictor;
 use orator_nn::weights::Contents;
 use serde::{Deserialize, Serialize};
@@ -75,9 +75,11 @@ impl SequenceMetadata {
         ensure!((0.0..=60.0).contains(&around), "the word context is {around} s, expected 0 to 60 s");
         self.poses.check(fps)?;
         ensure!(self.vocabulary.is_sorted(), "the vocabulary is not sorted");
+        let n_blocks = network.score_blocks;
+        ensure!(SCORE_BLOCKS.contains(&n_blocks), "the discriminator has {n_blocks} blocks, expected {SCORE_BLOCKS:?}");
         let (pose, words) = (self.poses.n_features(), self.vocabulary.n_indices());
         let sizes = network_config(fps, pose, words, [network.hidden, network.word]);
-        let expected = Config { audio_context: network.audio_context, ..sizes };
+        let expected = Config { audio_context: network.audio_context, score_blocks: n_blocks, ..sizes };
         ensure!(*network == expected, "unsupported network sizes: {network:?}");
         Ok(())
     }
@@ -115,4 +117,45 @@ fn build(contents: &Contents) -> Result<(SequenceMetadata, Box<dyn GesturePredic
     let network = architecture::network(metadata.architecture, &mut params, &metadata.network)?;
     params.load(&contents.part(NETWORK))?;
     Ok((metadata, network))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::generate::normalisation::{N_FEATURES, Normalisation};
+    use crate::generate::representation::Representation;
+
+    #[test]
+    fn the_number_of_discriminator_blocks_is_free_from_two_to_six() {
+        let fps = FrameRate::new(15, 1);
+        let values = |value: f32| vec![value; N_FEATURES];
+        let bone_lengths = vec![0.1; N_FEATURES / 3];
+        let normalisation = Normalisation { mean: values(0.0), std: values(1.0), bone_lengths, channels: Vec::new() };
+        let representation = Representation::Bones { mean: values(0.0), std: values(1.0) };
+        let stored = serde_json::json!({
+            "kind": KIND,
+            "name": "",
+            "fps": fps,
+            "rate": 16_000,
+            "architecture": Architecture::Adversarial,
+            "network": network_config(fps, N_FEATURES, Vocabulary::default().n_indices(), [8, 8]),
+            "poses": PoseFormat::Joints { normalisation, representation },
+            "vocabulary": Vocabulary::default(),
+            "dataset": "",
+        });
+        let check = |n_blocks: Option<usize>| {
+            let mut stored = stored.clone();
+            if let Some(n_blocks) = n_blocks {
+                stored["network"]["score_blocks"] = n_blocks.into();
+            }
+            serde_json::from_value::<SequenceMetadata>(stored).unwrap().check()
+        };
+        // Checkpoints of earlier versions do not state the number.
+        for n_blocks in [None, Some(2), Some(3), Some(6)] {
+            check(n_blocks).unwrap();
+        }
+        for n_blocks in [0, 1, 7] {
+            assert!(check(Some(n_blocks)).unwrap_err().to_string().contains("expected 2..=6"));
+        }
+    }
 }

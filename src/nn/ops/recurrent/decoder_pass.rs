@@ -17,6 +17,9 @@ pub struct DecoderSizes {
     pub n_keys: Vec<usize>,
     /// Number of rows per chunk.
     pub chunk: usize,
+    /// For each of the B * N decoder steps, whether its input is the true pose of the preceding step instead of the
+    /// computed one; empty without true poses.
+    pub taken: Vec<bool>,
 }
 
 impl DecoderSizes {
@@ -30,9 +33,19 @@ impl DecoderSizes {
         self.n_keys.iter().sum()
     }
 
-    /// Length of a row of the starts: previous poses and state.
+    /// Length of a row of the starts: previous poses, true poses (if any) and state.
     pub fn start_len(&self) -> usize {
-        self.n_previous * self.cell.input + self.cell.hidden
+        let n_true = if self.taken.is_empty() { 0 } else { self.n_steps };
+        (self.n_previous + n_true) * self.cell.input + self.cell.hidden
+    }
+
+    /// Position of the pose that row `row` of the batch reads at `step`, in its row of the starts; `None` if the row
+    /// reads the pose that was computed at the preceding step. The first decoder step reads the last previous pose
+    /// again; the true poses follow it, so that later steps read theirs one position before their own.
+    fn given_pose(&self, row: usize, step: usize) -> Option<usize> {
+        let is_taken = |decoder_step: usize| self.taken.get(row * self.n_steps + decoder_step) == Some(&true);
+        let position = if step < self.n_previous { step } else { step - 1 };
+        (step <= self.n_previous || is_taken(step - self.n_previous)).then_some(position * self.cell.input)
     }
 
     fn n_weights(&self) -> usize {
@@ -83,6 +96,19 @@ fn sequences(s: &DecoderSizes) -> impl Iterator<Item = (usize, usize)> {
     firsts.zip(s.n_keys.iter().copied())
 }
 
+/// Copies the poses that the rows from `begin` on read at `step` to `to`, from their starts and computed poses `y`.
+fn copy_inputs<T: Scalar>(s: &DecoderSizes, (begin, step): (usize, usize), start: &[T], y: &[T], to: &mut [T]) {
+    let pose = s.cell.input;
+    let rows = start.chunks_exact(s.start_len()).zip(y.chunks_exact(s.n_steps * pose));
+    for (row, (to, (start, y))) in to.chunks_exact_mut(pose).zip(rows).enumerate() {
+        let from = match s.given_pose(begin + row, step) {
+            Some(at) => &start[at..],
+            None => &y[(step - s.n_previous - 1) * pose..],
+        };
+        to.copy_from_slice(&from[..pose]);
+    }
+}
+
 /// Keys of a chunk, padded to complete vectors.
 fn wide_keys<T: Scalar>(s: &DecoderSizes, keys: &[T]) -> Vec<T> {
     let mut wide = vec![T::zero(); keys.len() / s.cell.hidden * s.cell.width()];
@@ -126,17 +152,15 @@ impl<'a, T: Scalar> ForwardDecoder<'a, T> {
         let (states, rest) = rest.split_at_mut(lens[1]);
         let (weights, read) = rest.split_at_mut(lens[2]);
         for (row, state) in start.chunks_exact(start_len).zip(states.chunks_exact_mut(width)) {
-            state[..hidden].copy_from_slice(&row[s.n_previous * pose..]);
+            state[..hidden].copy_from_slice(&row[start_len - hidden..]);
         }
         let read_len = s.n_read() * width;
+        let mut inputs = vec![T::zero(); n * pose];
         let mut out = vec![T::zero(); n * self.output.width()];
         for (step, gates) in gates.chunks_exact_mut(n * 4 * width).enumerate() {
             let (previous, next) = states[step * n * width..][..2 * n * width].split_at_mut(n * width);
-            if step <= s.n_previous {
-                self.cell.step(&start[step.min(s.n_previous - 1) * pose..], start_len, previous, gates, next);
-            } else {
-                self.cell.step(&y[(step - s.n_previous - 1) * pose..], y_len, previous, gates, next);
-            }
+            copy_inputs(s, (begin, step), start, y, &mut inputs);
+            self.cell.step(&inputs, pose, previous, gates, next);
             let Some(step) = step.checked_sub(s.n_previous) else { continue };
             let weights = &mut weights[step * n * s.all_keys()..][..n * s.all_keys()];
             let read = &mut read[step * n * read_len..][..n * read_len];
@@ -182,7 +206,8 @@ impl<'a, T: Scalar> BackwardDecoder<'a, T> {
     }
 
     /// Adds the gradients of starts and keys of the rows from `begin` on to `of_start` and `of_keys`; returns those of
-    /// the weights. The tuples are starts and keys, and poses with their gradients.
+    /// the weights. The tuples are starts and keys, and poses with their gradients. The gradient of an input goes to
+    /// the pose that was read: a computed pose that a true one replaced gets none.
     pub fn run(
         &self,
         begin: usize,
@@ -247,21 +272,18 @@ impl<'a, T: Scalar> BackwardDecoder<'a, T> {
             self.cell.step(gates, previous, &mut of_state, of_gates);
             of_input.fill(T::zero());
             self.cell.add_input_gradient(of_gates, &mut of_input);
-            // The pose that the step has read.
-            let (x, of_x, row_len, at) = match step.checked_sub(s.n_previous + 1) {
-                None => (start, &mut *of_start, start_len, step.min(s.n_previous - 1) * pose),
-                Some(before) => (y, &mut of_y[..], y_len, before * pose),
-            };
-            let inputs = &mut inputs[step * n * pose..][..n * pose];
-            for (to, x) in inputs.chunks_exact_mut(pose).zip(x.chunks_exact(row_len)) {
-                to.copy_from_slice(&x[at..][..pose]);
-            }
-            for (to, from) in of_x.chunks_exact_mut(row_len).zip(of_input.chunks_exact(input_width)) {
-                to[at..][..pose].iter_mut().zip(from).for_each(|(to, from)| *to += *from);
+            copy_inputs(s, (begin, step), start, y, &mut inputs[step * n * pose..][..n * pose]);
+            let of_rows = of_start.chunks_exact_mut(start_len).zip(of_y.chunks_exact_mut(y_len));
+            for (row, ((of_start, of_y), from)) in of_rows.zip(of_input.chunks_exact(input_width)).enumerate() {
+                let to = match s.given_pose(begin + row, step) {
+                    Some(at) => &mut of_start[at..],
+                    None => &mut of_y[(step - s.n_previous - 1) * pose..],
+                };
+                to[..pose].iter_mut().zip(from).for_each(|(to, from)| *to += *from);
             }
         }
         for (to, from) in of_start.chunks_exact_mut(start_len).zip(of_state.chunks_exact(width)) {
-            to[s.n_previous * pose..].copy_from_slice(&from[..hidden]);
+            to[start_len - hidden..].copy_from_slice(&from[..hidden]);
         }
         for (to, from) in of_keys.chunks_exact_mut(hidden).zip(of_wide_keys.chunks_exact(width)) {
             to.copy_from_slice(&from[..hidden]);
