@@ -109,10 +109,10 @@ mod tests {
 
     #[test]
     fn invalid_numbers_of_blocks_and_poses_are_errors() {
-        for (score_blocks, predicted, part) in
-            [(0, 20, "0 blocks"), (1, 20, "1 blocks"), (7, 20, "7 blocks"), (2, 7, ": 7")]
+        for (predicted, score_blocks, part) in
+            [(20, 0, "0 blocks"), (20, 1, "1 blocks"), (20, 7, "7 blocks"), (7, 2, ": 7")]
         {
-            let config = Config { score_blocks, predicted, ..Config::default() };
+            let config = Config { predicted, score_blocks, ..Config::default() };
             let error = SegmentDiscriminator::new(&mut Params::new(1), &config).err().map(|error| error.to_string());
             assert!(error.as_ref().is_some_and(|error| error.contains(part)), "{error:?}");
         }
