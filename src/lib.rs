@@ -68,6 +68,7 @@ pub use orator_dataset::index::SampleRef;
 pub use orator_dataset::{Dataset, Sample, Split};
 
 // Speech to motion.
+pub use orator_formats::word_vectors::WordVectors;
 pub use orator_gesture::batch::{BatchReport, SpeechBatch};
 pub use orator_gesture::generate::GestureGenerator;
 pub use orator_gesture::generate::seq2seq::SequenceGenerator;

@@ -11,6 +11,7 @@ use anyhow::{Result, bail, ensure};
 use orator_base::stage::workdir::{self, FolderLock};
 use orator_base::types::time::FrameRate;
 use orator_dataset::{Dataset, Split};
+use orator_formats::word_vectors::WordVectors;
 use orator_gesture::evaluate::Evaluation;
 use orator_gesture::evaluate::clips::checkpoint::EvaluatedCheckpoint;
 use orator_gesture::evaluate::clips::motion_store::{MEMORY_BYTES, MotionStore};
@@ -25,6 +26,7 @@ use serde::Deserialize as _;
 use serde::de::IntoDeserializer as _;
 use serde_json::{Value, json};
 use std::path::PathBuf;
+use std::sync::Arc;
 
 /// Measure predicted motion against the ground truth and baselines.
 ///
@@ -74,6 +76,12 @@ struct MotionArgs {
     /// else the newest); all are reported in one table.
     #[arg(long, value_name = "FILE|DIR", requires = "dataset", num_args = 1..)]
     checkpoint: Vec<PathBuf>,
+    /// Table of word vectors for words of the dataset that did not occur in training.
+    #[arg(long, value_name = "FILE", requires = "checkpoint")]
+    words: Option<PathBuf>,
+    /// Keep the decoder state of sequence-to-sequence networks across segments.
+    #[arg(long, requires = "checkpoint")]
+    carry_state: bool,
     /// Configured speaker, or `all`: prints the PCK of each speaker's model on its own dataset.
     #[arg(long, value_name = "NAME|all", conflicts_with_all = ["truth", "dataset", "report", "all"])]
     speaker: Option<String>,
@@ -141,6 +149,12 @@ fn motion(args: &MotionArgs, ui: &Ui) -> Result<Outcome> {
     let evaluation = evaluation(args, &store, ui)?;
     let table = evaluation.measure(&settings(args), ui)?;
     let mut facts: Value = result::json(&table);
+    if let Some(words) = &args.words {
+        facts["words"] = json!(words);
+    }
+    if args.carry_state {
+        facts["carry_state"] = json!(true);
+    }
     let mut text = text::text(&table, args.all);
     if let Some(path) = &args.report {
         let title = format!("Evaluation of {}", title(args));
@@ -182,7 +196,9 @@ fn title(args: &MotionArgs) -> String {
 fn evaluation(args: &MotionArgs, store: &MotionStore, ui: &Ui) -> Result<Evaluation> {
     if let Some(dataset) = &args.dataset {
         let dataset = Dataset::open(dataset)?;
-        let checkpoints = EvaluatedCheckpoint::open_all(&args.checkpoint, &dataset.info().speaker)?;
+        let mut checkpoints = EvaluatedCheckpoint::open_all(&args.checkpoint, &dataset.info().speaker)?;
+        let words = args.words.as_deref().map(WordVectors::open).transpose()?.map(Arc::new);
+        EvaluatedCheckpoint::set_options(&mut checkpoints, words.as_ref(), args.carry_state)?;
         return Evaluation::of_generators(&dataset, &checkpoints, args.split, store, ui);
     }
     let (Some(truth), Some(prediction)) = (&args.truth, &args.prediction) else {

@@ -9,6 +9,7 @@ use crate::cli::ui::Ui;
 use anyhow::{Context as _, Result, bail, ensure};
 use orator_base::stage::progress::Progress as _;
 use orator_base::text::{counted, length};
+use orator_formats::word_vectors::WordVectors;
 use orator_gesture::batch::speech::{SegmentFacts, SpeechSource};
 use orator_gesture::batch::{SpeechBatch, motion_files, sounds, transcripts};
 use orator_gesture::generate::model::GenerationChoice;
@@ -18,6 +19,7 @@ use orator_gesture::generate::trained::TrainedSpeaker;
 use orator_nn::seq2seq::predict::StateAtSeams;
 use serde_json::json;
 use std::path::PathBuf;
+use std::sync::Arc;
 
 /// Generate motion from speech with a trained model.
 ///
@@ -44,6 +46,9 @@ pub struct Args {
     /// processed.
     #[arg(long, value_name = "FILE|DIR")]
     transcript: Option<PathBuf>,
+    /// Table of word vectors for words of the transcript that did not occur in training.
+    #[arg(long, value_name = "FILE")]
+    words: Option<PathBuf>,
     /// Speaker, for a model of several speakers.
     #[arg(long, value_name = "NAME", requires = "audio")]
     speaker: Option<String>,
@@ -95,12 +100,16 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
         ui.say(&format!("checkpoint {}", checkpoint.display()));
     }
     let _lock = model_lock(&checkpoint)?;
-    let (seams, figure) = (seams(args.carry_state), args.figure.options());
-    let source = SpeechSource { audio, transcript: args.transcript.as_deref(), seams, figure };
+    let vectors = args.words.as_deref().map(WordVectors::open).transpose()?.map(Arc::new);
+    let (transcript, carry_state, figure) = (args.transcript.as_deref(), args.carry_state, args.figure.options());
+    let source = SpeechSource { audio, transcript, carry_state, figure };
     let mut results = Vec::new();
     for (variant, outputs) in variants.iter().zip(&outputs) {
         let choice = GenerationChoice { speaker: args.speaker.clone(), seed: variant.seed };
-        let trained = TrainedSpeaker::open_as(&checkpoint, &choice)?;
+        let mut trained = TrainedSpeaker::open_as(&checkpoint, &choice)?;
+        if let Some(vectors) = &vectors {
+            trained.set_word_vectors(vectors.clone())?;
+        }
         results.push((motion_files::write(&trained, &source, outputs, ui)?, trained));
     }
     let Some((written, trained)) = results.first() else { bail!("--variants: expected at least 1") };
@@ -119,6 +128,7 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
         names.join(", ")
     );
     let flags = args.transcript.as_ref().map_or(String::new(), |path| format!(" --transcript {}", path.display()));
+    let flags = args.words.as_ref().map_or(flags.clone(), |path| format!("{flags} --words {}", path.display()));
     let flags = args.speaker.as_ref().map_or(flags.clone(), |name| format!("{flags} --speaker {name}"));
     let carried = if args.carry_state { " --carry-state" } else { "" };
     let seed =
@@ -176,22 +186,21 @@ fn variants(args: &Args) -> Vec<Variant> {
 
 /// Lines about jumps at segment boundaries, and about the words of the transcript.
 fn segments(facts: &SegmentFacts) -> String {
-    let SegmentFacts { state, seam_jump: [raw, smoothed], other_seam_jump: [other_raw, other_smoothed], words } = facts;
+    let SegmentFacts { state, seam_jump: [raw, smoothed], other_seam_jump: [other_raw, other_smoothed], .. } = facts;
     let other = match state {
         StateAtSeams::Renewed => "with --carry-state",
         StateAtSeams::Carried => "without --carry-state",
     };
-    let known = words.map_or(String::new(), |[n, n_known]| {
-        format!("{n_known} of {} of the transcript are in the vocabulary of the model\n", counted(n, "word"))
+    let from_table = facts.words_from_table;
+    let from_table = from_table.map_or(String::new(), |n| format!(", {n} of the others in the table of word vectors"));
+    let known = facts.words.map_or(String::new(), |[n, n_known]| {
+        let words = counted(n, "word");
+        format!("{n_known} of {words} of the transcript are in the vocabulary of the model{from_table}\n")
     });
     format!(
         "{known}mean step at segment boundaries / elsewhere: {raw:.2} generated, {smoothed:.2} smoothed \
          ({other} {other_raw:.2}, {other_smoothed:.2})\n"
     )
-}
-
-fn seams(carry_state: bool) -> StateAtSeams {
-    if carry_state { StateAtSeams::Carried } else { StateAtSeams::Renewed }
 }
 
 /// The batch that the arguments describe.
@@ -207,7 +216,7 @@ fn batch(args: Args) -> Result<SpeechBatch> {
         ensure!(is_sequence, "{} does not use words; omit --transcript", checkpoint.display());
     }
     transcripts::find(&mut sounds, args.transcript.as_deref())?;
-    let (figure, seams) = (args.figure.options(), seams(args.carry_state));
-    let (formats, checkpoint, again) = (args.format, args.checkpoint, args.force);
-    Ok(SpeechBatch { sounds, folder, formats, checkpoint, seams, figure, again })
+    let figure = args.figure.options();
+    let Args { format: formats, checkpoint, words, carry_state, force: again, .. } = args;
+    Ok(SpeechBatch { sounds, folder, formats, checkpoint, words, carry_state, figure, again })
 }

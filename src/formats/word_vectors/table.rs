@@ -76,6 +76,11 @@ impl WordVectors {
         Ok(Self { path: path.to_owned(), file, at, dim, rows })
     }
 
+    /// File of the table.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
     /// Dimension of the vectors.
     pub fn dim(&self) -> usize {
         self.dim

@@ -8,7 +8,6 @@ use orator_base::stage::fingerprint::HashCache;
 use orator_base::stage::progress::Progress;
 use orator_base::stage::runner::{self, StageOutcome};
 use orator_base::stage::{artifacts, workdir};
-use orator_nn::seq2seq::predict::StateAtSeams;
 use serde::Serialize;
 use serde_json::{Map, Value};
 use std::path::PathBuf;
@@ -27,8 +26,10 @@ pub struct SpeechBatch {
     pub formats: Vec<String>,
     /// Checkpoint, or folder of a training, for sounds without their own.
     pub checkpoint: Option<PathBuf>,
-    /// Initial decoder state of each segment, for sequence-to-sequence networks.
-    pub seams: StateAtSeams,
+    /// Table of vectors for words that are not in the vocabulary of a sequence-to-sequence network.
+    pub words: Option<PathBuf>,
+    /// Whether sequence-to-sequence networks are requested to carry their decoder state across segments.
+    pub carry_state: bool,
     /// Bone names and frame rate of exported figures.
     pub figure: FigureOptions,
     /// Whether up-to-date motions are generated again.

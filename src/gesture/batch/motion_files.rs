@@ -16,7 +16,6 @@ use orator_base::types::posture::Posture;
 use orator_base::types::sound::SAMPLE_RATE;
 use orator_media::ffmpeg::sound_stream::{self, SoundStream};
 use orator_media::ffmpeg::{UnreadableMedia, audio, probe};
-use orator_nn::seq2seq::predict::StateAtSeams;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -128,10 +127,7 @@ pub fn write(
         TrainedSpeaker::Gan(speaker) => {
             let name = speaker.name();
             ensure!(speech.transcript.is_none(), "the model of {name} does not use words: omit --transcript");
-            ensure!(
-                speech.seams == StateAtSeams::Renewed,
-                "the model of {name} does not generate in segments: omit --carry-state"
-            );
+            ensure!(!speech.carry_state, "the model of {name} does not generate in segments: omit --carry-state");
             write_motion(speaker, speech, outputs, progress)
         }
         TrainedSpeaker::Sequence(speaker) => write_sequence(speaker, speech, outputs, progress),

@@ -26,7 +26,7 @@ pub fn write_sequence(
     outputs: &[(PathBuf, ExportFormat)],
     progress: &dyn Progress,
 ) -> Result<MotionReport> {
-    let &SpeechSource { audio, transcript, seams, figure } = speech;
+    let &SpeechSource { audio, transcript, carry_state, figure } = speech;
     let started = Instant::now();
     let is_captured = speaker.is_captured();
     if let Some((path, _)) = outputs.iter().find(|(_, format)| is_captured && *format != ExportFormat::Bvh) {
@@ -44,6 +44,7 @@ pub fn write_sequence(
     let sound = sound.with_context(|| format!("{} has no audio", audio.display()))?;
     let words = parsed.as_ref().map_or(&[][..], |parsed| &parsed.words);
     let no_motion = || format!("cannot generate motion for {}", audio.display());
+    let seams = speaker.seams(carry_state);
     let input = speaker.prepare(&sound, words).with_context(no_motion)?;
     let poses = speaker.generate(&input, seams).with_context(no_motion)?;
     let motion_secs = started.elapsed().as_secs_f64();
@@ -60,6 +61,7 @@ pub fn write_sequence(
         write_outputs((speaker.motion(&poses)?, None), speech, outputs, progress)?;
     }
     let known = parsed.as_ref().map(|parsed| [parsed.words.len(), speaker.metadata.vocabulary.n_known(&parsed.words)]);
+    let words_from_table = parsed.as_ref().and_then(|parsed| speaker.n_from_table(&parsed.words));
     let notes = transcript.zip(parsed).map(|(path, parsed)| notes(speaker, path, &parsed, sound.secs()));
     Ok(MotionReport {
         secs: sound.secs(),
@@ -71,6 +73,7 @@ pub fn write_sequence(
             seam_jump: poses.seam_jump,
             other_seam_jump,
             words: known.filter(|_| speaker.reads_words()),
+            words_from_table,
         }),
     })
 }
@@ -80,7 +83,8 @@ fn notes(speaker: &SequenceGenerator, path: &Path, parsed: &Transcript, sound_se
     if !speaker.reads_words() {
         return vec![format!("the network does not use words: {} was ignored", path.display())];
     }
-    let is_unknown = !parsed.words.is_empty() && speaker.metadata.vocabulary.n_known(&parsed.words) == 0;
+    let n_read = speaker.metadata.vocabulary.n_known(&parsed.words) + speaker.n_from_table(&parsed.words).unwrap_or(0);
+    let is_unknown = !parsed.words.is_empty() && n_read == 0;
     let unknown = is_unknown.then(|| {
         format!(
             "no word of the transcript ({}) is in the network's vocabulary: is it in the language of the training?",

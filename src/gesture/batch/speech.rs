@@ -12,8 +12,8 @@ pub struct SpeechSource<'a> {
     pub audio: &'a Path,
     /// Transcript file.
     pub transcript: Option<&'a Path>,
-    /// Initial decoder state of each segment.
-    pub seams: StateAtSeams,
+    /// Whether a sequence-to-sequence network is requested to carry its decoder state across segments.
+    pub carry_state: bool,
     /// Options of exported figures.
     pub figure: FigureOptions,
 }
@@ -44,4 +44,7 @@ pub struct SegmentFacts {
     pub other_seam_jump: [f64; 2],
     /// Numbers of words in the transcript, and of those in the vocabulary; `None` if no words were read.
     pub words: Option<[usize; 2]>,
+    /// Number of the other words whose vectors are in the table of word vectors; `None` without a table.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub words_from_table: Option<usize>,
 }

@@ -13,6 +13,7 @@ use orator_avatar::animate::export::file::{ExportFormat, FigureOptions};
 use orator_base::stage::progress::Progress;
 use orator_base::stage::workdir::FolderLock;
 use orator_base::stage::{Input, Report, Stage, Unit};
+use orator_formats::word_vectors::WordVectors;
 use orator_nn::seq2seq::predict::StateAtSeams;
 use serde_json::json;
 use std::collections::BTreeMap;
@@ -27,6 +28,8 @@ pub struct BatchStage<'a> {
     formats: Vec<(String, ExportFormat)>,
     /// Checkpoint file for sounds without their own.
     checkpoint: Option<PathBuf>,
+    /// Vectors of words outside the vocabularies.
+    vectors: Option<Arc<WordVectors>>,
     /// Loaded models by checkpoint file, with the locks of their folders.
     speakers: Mutex<BTreeMap<PathBuf, (Arc<TrainedSpeaker>, FolderLock)>>,
 }
@@ -35,7 +38,8 @@ impl<'a> BatchStage<'a> {
     /// Stage of a batch.
     ///
     /// # Errors
-    /// A format that is unknown or given twice, a sound without a checkpoint, a common checkpoint that cannot be read.
+    /// A format that is unknown or given twice, a sound without a checkpoint, a common checkpoint or a table of word
+    /// vectors that cannot be read, a table that the common checkpoint does not read.
     pub fn new(batch: &'a SpeechBatch) -> Result<Self> {
         let checkpoint = batch.checkpoint.as_deref().map(checkpoint_file).transpose()?;
         if checkpoint.is_none()
@@ -45,7 +49,8 @@ impl<'a> BatchStage<'a> {
         }
         let sounds = batch.sounds.iter().map(|sound| (sound.name.as_str(), sound)).collect();
         let formats = formats(&batch.formats)?;
-        let stage = Self { batch, sounds, formats, checkpoint, speakers: Mutex::default() };
+        let vectors = batch.words.as_deref().map(WordVectors::open).transpose()?.map(Arc::new);
+        let stage = Self { batch, sounds, formats, checkpoint, vectors, speakers: Mutex::default() };
         // Loaded immediately, because a broken common checkpoint would fail all sounds.
         stage.checkpoint.as_deref().map(|path| stage.speaker(path)).transpose()?;
         Ok(stage)
@@ -81,7 +86,11 @@ impl<'a> BatchStage<'a> {
             return Ok(speaker.clone());
         }
         let lock = model_lock(checkpoint)?;
-        let speaker = Arc::new(TrainedSpeaker::open(checkpoint)?);
+        let mut speaker = TrainedSpeaker::open(checkpoint)?;
+        if let Some(vectors) = &self.vectors {
+            speaker.set_word_vectors(vectors.clone())?;
+        }
+        let speaker = Arc::new(speaker);
         speakers.insert(checkpoint.to_owned(), (speaker.clone(), lock));
         Ok(speaker)
     }
@@ -99,8 +108,8 @@ impl Stage for BatchStage<'_> {
     fn settings(&self, _unit: &Unit) -> serde_json::Value {
         let endings: Vec<&str> = self.formats.iter().map(|(ending, _)| ending.as_str()).collect();
         let mut settings = json!({ "formats": endings, "animation": format!("{:?}", AnimationOptions::default()) });
-        if self.batch.seams != StateAtSeams::default() {
-            settings["state"] = json!(self.batch.seams);
+        if self.batch.carry_state {
+            settings["state"] = json!(StateAtSeams::Carried);
         }
         if self.batch.figure != FigureOptions::default() {
             settings["figure"] = json!({ "names": self.batch.figure.names.label(), "fps": self.batch.figure.fps });
@@ -111,8 +120,9 @@ impl Stage for BatchStage<'_> {
     fn inputs(&self, unit: &Unit) -> Result<Vec<Input>> {
         let input = |role: &str, path| Input { role: role.to_owned(), path };
         let transcript = self.transcript_of(unit)?.map(|path| input("transcript", path.to_owned()));
+        let words = self.batch.words.clone().map(|path| input("words", path));
         let needed = [input("sound", unit.source.clone()), input("checkpoint", self.checkpoint_of(unit)?)];
-        Ok(needed.into_iter().chain(transcript).collect())
+        Ok(needed.into_iter().chain(transcript).chain(words).collect())
     }
 
     fn common_folder(&self) -> Option<&Path> {
@@ -133,8 +143,8 @@ impl Stage for BatchStage<'_> {
         }
         let outputs: Vec<(PathBuf, ExportFormat)> =
             self.formats.iter().map(|(ending, format)| (out.join(file(ending)), *format)).collect();
-        let (transcript, seams, figure) = (self.transcript_of(unit)?, self.batch.seams, self.batch.figure);
-        let source = SpeechSource { audio: &unit.source, transcript, seams, figure };
+        let SpeechBatch { carry_state, figure, .. } = *self.batch;
+        let source = SpeechSource { audio: &unit.source, transcript: self.transcript_of(unit)?, carry_state, figure };
         let written = motion_files::write(&speaker, &source, &outputs, progress)?;
         let mut facts = json!({
             "secs": written.secs, "n_frames": written.n_frames, "speaker": speaker.name(), "note": written.note,

@@ -12,7 +12,9 @@ use orator_base::types::sound::{SAMPLE_RATE, Sound};
 use orator_base::types::time::FrameRate;
 use orator_formats::checkpoint;
 use orator_formats::transcript::Word;
+use orator_formats::word_vectors::WordVectors;
 use std::path::Path;
+use std::sync::Arc;
 
 /// Checkpoint of `orator train gan` or of `orator train seq2seq`.
 pub enum TrainedSpeaker {
@@ -115,6 +117,15 @@ impl TrainedSpeaker {
     /// Whether the model reads words.
     pub fn reads_words(&self) -> bool {
         self.architecture().is_some_and(|of| architecture::word_encoder(of).is_some())
+    }
+
+    /// Words that are not in the vocabulary take their vectors from this table. Fails if the model does not read words,
+    /// or if its word vectors have another dimension.
+    pub fn set_word_vectors(&mut self, vectors: Arc<WordVectors>) -> Result<()> {
+        match self {
+            Self::Gan(speaker) => bail!("the model of {} does not read words: omit --words", speaker.name()),
+            Self::Sequence(speaker) => speaker.set_word_vectors(vectors),
+        }
     }
 
     /// Motion for a sound and its words.

@@ -141,7 +141,7 @@ impl WordEncoder {
 }
 
 /// Name of the word vectors of a word encoder.
-fn table_name(encoder: &str) -> String {
+pub fn table_name(encoder: &str) -> String {
     format!("{encoder}.embedding.weight")
 }
 

@@ -11,6 +11,10 @@ pub struct StudyCondition {
     pub source: ConditionSource,
     /// Whether this is the real condition of Turing tests.
     pub real: bool,
+    /// Table of vectors for words that are not in the vocabulary of the model; only for checkpoints.
+    pub words: Option<PathBuf>,
+    /// Whether the model is requested to carry its decoder state across segments; only for checkpoints.
+    pub carry_state: bool,
 }
 
 /// Source of a condition's motion. In paths, `{speaker}` and `{clip}` stand for names.
@@ -75,13 +79,21 @@ struct WrittenCondition {
     files: Option<PathBuf>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     real: Option<bool>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    words: Option<PathBuf>,
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    carry_state: bool,
 }
 
 impl TryFrom<WrittenCondition> for StudyCondition {
     type Error = String;
 
     fn try_from(written: WrittenCondition) -> Result<Self, String> {
-        let WrittenCondition { name, kind, checkpoint, of, files, real } = written;
+        let WrittenCondition { name, kind, checkpoint, of, files, real, words, carry_state } = written;
+        if kind != ConditionKind::Checkpoint && (words.is_some() || carry_state) {
+            let rule = "the keys words and carry_state apply to the kind checkpoint";
+            return Err(format!("condition {name}: {rule}; remove them"));
+        }
         let missing =
             |key: &str, example: &str| format!("condition {name}: missing key {key}: expected for example {example}");
         let source = match (kind, checkpoint, of, files) {
@@ -100,15 +112,15 @@ impl TryFrom<WrittenCondition> for StudyCondition {
             }
         };
         let real = real.unwrap_or(source == ConditionSource::Natural);
-        Ok(Self { name, source, real })
+        Ok(Self { name, source, real, words, carry_state })
     }
 }
 
 impl From<StudyCondition> for WrittenCondition {
     fn from(condition: StudyCondition) -> Self {
-        let StudyCondition { name, source, real } = condition;
-        let written =
-            Self { name, kind: ConditionKind::Natural, checkpoint: None, of: None, files: None, real: Some(real) };
+        let StudyCondition { name, source, real, words, carry_state } = condition;
+        let (kind, real) = (ConditionKind::Natural, Some(real));
+        let written = Self { name, kind, checkpoint: None, of: None, files: None, real, words, carry_state };
         match source {
             ConditionSource::Natural => written,
             ConditionSource::MeanPose => Self { kind: ConditionKind::MeanPose, ..written },

@@ -110,7 +110,8 @@ fn problem_of_error(text: &str, error: &toml::de::Error, spans: &BTreeMap<String
 
 fn paths_mut(study: &mut StudyFile) -> impl Iterator<Item = &mut PathBuf> {
     let speakers = study.speaker.iter_mut().flat_map(|speaker| speaker.dataset.iter_mut().chain(&mut speaker.sounds));
-    speakers.chain(study.condition.iter_mut().filter_map(|condition| condition.source.path_mut()))
+    let conditions = study.condition.iter_mut();
+    speakers.chain(conditions.flat_map(|of| of.source.path_mut().into_iter().chain(&mut of.words)))
 }
 
 #[cfg(test)]
@@ -144,6 +145,10 @@ mod tests {
             ConditionSource::Checkpoint("/s/models/{speaker}".into())
         );
         assert_eq!(file.speaker[0].dataset.as_deref(), Some(Path::new("/s/data")));
+        let model = |keys: &str| read(&format!("{SMALLEST}{keys}")).find_condition("model").unwrap().clone();
+        let (plain, set) = (model(""), model("words = \"glove.safetensors\"\ncarry_state = true\n"));
+        assert_eq!((plain.words, plain.carry_state), (None, false));
+        assert_eq!((set.words, set.carry_state), (Some("/s/glove.safetensors".into()), true));
         let kinds: Vec<_> = file.hypothesis.iter().map(|hypothesis| hypothesis.kind).collect();
         use HypothesisKind::{DiffersFromChance, Equivalence, GreaterThanChance};
         assert_eq!(kinds, [DiffersFromChance, Equivalence, GreaterThanChance]);
@@ -178,7 +183,9 @@ mod tests {
         let bare = SMALLEST.replace("preset = \"rebol\"", "participants = 3")
             + "[exclusion]\nincomplete = false\n[[condition]]\nname = \"real\"\nkind = \"natural\"\n\
                    [[task]]\nname = \"single\"\ndesign = \"turing-single\"\ntrials = 9\n";
-        for file in [file, read(SMALLEST), read(&SMALLEST.replace("rebol", "genea2020")), read(&dropped), read(&bare)] {
+        let set = read(&format!("{SMALLEST}words = \"glove.safetensors\"\ncarry_state = true\n"));
+        let genea = read(&SMALLEST.replace("rebol", "genea2020"));
+        for file in [file, read(SMALLEST), set, genea, read(&dropped), read(&bare)] {
             let path = dir.path().join("study.toml");
             file.write(&path).unwrap();
             assert_eq!(StudyFile::read(&path).unwrap(), file);
@@ -209,6 +216,11 @@ mod tests {
             one("[[condition]]\nname = \"b\"\nkind = \"files\"\n"),
             ["line 6: condition[model]: condition b: missing key files: expected for example files = \
                  \"other/{clip}.bvh\""]
+        );
+        assert_eq!(
+            one("[[condition]]\nname = \"b\"\nkind = \"natural\"\ncarry_state = true\n"),
+            ["line 6: condition[model]: condition b: the keys words and carry_state apply to the kind checkpoint; \
+              remove them"]
         );
         assert_eq!(
             one("[[hypothesis]]\ntask = \"real-or-generated\"\nkind = \"differs\"\n[[hypothesis]]\n\

@@ -13,9 +13,11 @@ use orator_base::types::sound::samples_of;
 use orator_base::types::time::FrameRate;
 use orator_dataset::Dataset;
 use orator_formats::mocap::motion_file;
+use orator_formats::word_vectors::WordVectors;
 use orator_gesture::evaluate::clips::checkpoint::EvaluatedCheckpoint;
 use std::collections::BTreeMap;
 use std::path::Path;
+use std::sync::Arc;
 
 /// Tolerance for the length of another system's motion file, frames.
 const LENGTH_TOLERANCE_FRAMES: usize = 2;
@@ -36,12 +38,12 @@ impl ConditionModels {
     /// Opens the checkpoints of a speaker.
     ///
     /// # Errors
-    /// A checkpoint cannot be opened; the error names the condition.
+    /// A checkpoint cannot be opened, or does not support a key of its condition; the error names the condition.
     pub fn open(conditions: &[StudyCondition], speaker: &str) -> Result<Self> {
         let mut models = BTreeMap::new();
         for condition in conditions {
             let ConditionSource::Checkpoint(path) = &condition.source else { continue };
-            let opened = EvaluatedCheckpoint::open_all(&[fill_pattern(path, speaker, "")], speaker);
+            let opened = open(condition, path, speaker);
             let opened = opened.with_context(|| format!("condition {} of the speaker {speaker}", condition.name))?;
             models.extend(opened.into_iter().map(|model| (condition.name.clone(), model)));
         }
@@ -52,6 +54,26 @@ impl ConditionModels {
     pub fn fps(&self) -> Option<FrameRate> {
         self.0.values().next().map(|model| model.speaker.fps())
     }
+}
+
+/// Opens the checkpoint `path` of a condition with the settings of the condition.
+fn open(condition: &StudyCondition, path: &Path, speaker: &str) -> Result<Vec<EvaluatedCheckpoint>> {
+    let mut opened = EvaluatedCheckpoint::open_all(&[fill_pattern(path, speaker, "")], speaker)?;
+    for EvaluatedCheckpoint { speaker, .. } in &opened {
+        let (name, reads_words, is_sequence) =
+            (speaker.name(), speaker.reads_words(), speaker.architecture().is_some());
+        ensure!(
+            condition.words.is_none() || reads_words,
+            "the model of {name} does not read words: remove the key words"
+        );
+        ensure!(
+            !condition.carry_state || is_sequence,
+            "the model of {name} does not generate in segments: remove the key carry_state"
+        );
+    }
+    let words = condition.words.as_ref().map(|path| WordVectors::open(&fill_pattern(path, speaker, "")));
+    EvaluatedCheckpoint::set_options(&mut opened, words.transpose()?.map(Arc::new).as_ref(), condition.carry_state)?;
+    Ok(opened)
 }
 
 /// Motions by condition, then by clip. `tick` is called after each segment of speech.

@@ -4,6 +4,7 @@
 use crate::fixtures::animation::captures::write_capture;
 use crate::fixtures::browser::Browser;
 use crate::fixtures::gesture_dataset::{FPS, dataset};
+use crate::fixtures::untrained::write_untrained_sequence;
 use crate::fixtures::write_dataset::write_dataset;
 use orator_base::motion::{bones, resample};
 use orator_base::stage::progress::Silent;
@@ -19,6 +20,8 @@ use orator_formats::bvh::read::Bvh;
 use orator_formats::mocap::bvh;
 use orator_formats::mocap::captured::MotionKind;
 use orator_formats::wav;
+use orator_formats::word_vectors::glove;
+use orator_gesture::generate::seq2seq::architecture::Architecture;
 use orator_gesture::train::seq2seq::captures::CaptureFolder;
 use orator_gesture::train::seq2seq::source::TrainingSource;
 use orator_gesture::train::seq2seq::train::train;
@@ -128,12 +131,36 @@ fn networks_of_both_trainings_are_evaluated_in_one_table() {
         assert!(browser.problems.is_empty(), "{:?}", browser.problems);
     }
 
+    // The decoder state of sequence-to-sequence networks is carried on request.
+    let measure = |more: &[&str]| {
+        let answer =
+            project.answer(&[&["evaluate", "--dataset", "data", "--checkpoint", "gan", "words"], more].concat());
+        assert_eq!(answer.code, 0, "{}", answer.errors);
+        answer
+    };
+    let (renewed, carried) = (measure(&[]), measure(&["--carry-state"]));
+    let change = |key: &str| {
+        let [a, b] = [&renewed, &carried].map(|answer| value(answer, "mpjpe", "all", key).unwrap());
+        (a - b).abs() / a
+    };
+    assert!(change("prediction") < 1e-6 && change("prediction_2") > 1e-6 && change("mismatched_prediction_2") > 1e-6);
+    let carries = "seq2seq carries its decoder state across segments";
+    assert!(notes(&carried).contains(carries) && !notes(&renewed).contains(carries));
+    assert_eq!((&carried.json["carry_state"], &renewed.json["carry_state"]), (&true.into(), &Value::Null));
+
     let fails = |args: &[&str]| {
         let answer = project.answer(&[&["evaluate", "--dataset", "data", "--checkpoint"], args].concat());
         assert_eq!(answer.code, 1, "{}", answer.errors);
         answer.errors
     };
     assert!(fails(&["gan", "gan/best.safetensors"]).contains("given twice"));
+    assert!(fails(&["gan", "--carry-state"]).contains("omit --carry-state"));
+    glove::convert("world 1 -1\n".as_bytes(), &project.dir().join("table.safetensors")).unwrap();
+    assert!(fails(&["gan", "--words", "table.safetensors"]).contains("omit --words"));
+    assert!(
+        fails(&["gan", "words", "--words", "table.safetensors"])
+            .contains("have 2 dimensions, those of the model of host 100")
+    );
     assert!(fails(&["gan", "nowhere"]).contains("nowhere does not exist"));
     assert!(fails(&["data"]).contains("no checkpoint in data"));
     let lifter = concat!(env!("CARGO_MANIFEST_DIR"), "/models/body_lifter.safetensors");
@@ -211,6 +238,22 @@ fn captured_skeletons_and_the_gan_are_evaluated_on_common_joints() {
         assert!(value(&genea, name, "body", "mismatched_prediction").is_some(), "{name}");
     }
     assert!(rows(&genea).iter().all(|(_, checkpoint)| checkpoint.is_empty()));
+
+    // Vectors of words that are not in the vocabulary.
+    write_untrained_sequence(&project.dir().join("hello.safetensors"), Architecture::Words, true, &["hello"]);
+    glove::convert("world 1 -1 0.5 2\n".as_bytes(), &project.dir().join("table.safetensors")).unwrap();
+    let (without, with) =
+        (measure(&["hello.safetensors"]), measure(&["hello.safetensors", "--words", "table.safetensors"]));
+    let error = |answer: &ProgramAnswer| value(answer, "mpjpe", "body", "prediction").unwrap();
+    assert!((error(&without) - error(&with)).abs() > 1e-6 * error(&with));
+    let n = samples[2].1.words.as_ref().map_or(0, Vec::len);
+    let note = format!(
+        "{} of {n} words of this split are in the vocabulary of seq2seq, {} of the others in the table of word vectors",
+        n.div_ceil(2),
+        n / 2
+    );
+    assert!(notes(&with).contains(&note) && !notes(&without).contains("table of word vectors"), "{}", notes(&with));
+    assert_eq!((&with.json["words"], &without.json["words"]), (&"table.safetensors".into(), &Value::Null));
 
     // A dataset without words.
     let silent: Vec<(Split, Sample)> =

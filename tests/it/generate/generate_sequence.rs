@@ -7,11 +7,13 @@ use orator_base::types::sound::Sound;
 use orator_formats::bvh::read::Bvh;
 use orator_formats::transcript::{Word, WordSource};
 use orator_formats::wav;
+use orator_formats::word_vectors::{WordVectors, glove};
 use orator_gesture::generate::seq2seq::SequenceGenerator;
 use orator_gesture::generate::seq2seq::architecture::Architecture;
 use orator_nn::seq2seq::predict::StateAtSeams;
 use serde_json::Value;
 use std::path::Path;
+use std::sync::Arc;
 
 const WORDS: [&str; 2] = ["hello", "world"];
 
@@ -52,6 +54,18 @@ fn tsv(n: usize, words: &[&str]) -> String {
     (0..n).map(|t| format!("{t}.1\t{t}.6\t{}\n", words[t % words.len()])).collect()
 }
 
+/// One word per second.
+fn spoken<'w>(words: impl IntoIterator<Item = &'w str>) -> Vec<Word> {
+    let word = |(t, word): (usize, &str)| Word {
+        word: word.into(),
+        start_secs: t as f64,
+        end_secs: t as f64 + 0.5,
+        source: WordSource::Given,
+        confidence: None,
+    };
+    words.into_iter().enumerate().map(word).collect()
+}
+
 #[test]
 fn the_state_is_renewed_or_carried_and_both_jumps_are_reported() {
     let folder = folder();
@@ -79,16 +93,7 @@ fn the_state_is_renewed_or_carried_and_both_jumps_are_reported() {
 #[test]
 fn words_change_the_motion_only_of_networks_that_read_words() {
     let folder = folder();
-    let words = |n: usize| -> Vec<Word> {
-        let word = |t: usize| Word {
-            word: WORDS[t % 2].into(),
-            start_secs: t as f64,
-            end_secs: t as f64 + 0.5,
-            source: WordSource::Given,
-            confidence: None,
-        };
-        (0..n).map(word).collect()
-    };
+    let words = |n: usize| spoken(WORDS.into_iter().cycle().take(n));
     for network in ["contextual", "words", "adversarial", "autoencoder"] {
         let speaker = SequenceGenerator::open(&folder.path().join(format!("{network}.safetensors"))).unwrap();
         let (sound, silence) = (tone(4.37, 0.0), Sound { rate: 16_000, samples: vec![0.0; 16_000 * 437 / 100] });
@@ -173,6 +178,99 @@ fn dubious_transcripts_are_reported() {
     for (more, words) in [("--transcript good.tsv", "omit --transcript"), ("--carry-state", "omit --carry-state")] {
         let text = failure(dir, &format!("--checkpoint host.safetensors --audio talks/a.wav {more} --out a.npy"));
         assert!(text.contains(words), "{text}");
+    }
+}
+
+/// Writes tables of vectors of 4 and of 2 numbers.
+fn write_tables(dir: &Path) {
+    let write = |file: &str, text: &str| glove::convert(text.as_bytes(), &dir.join(file)).unwrap();
+    write("table.safetensors", "blue -2 1 1 0\nhello 9 9 9 9\nred 1 -1 0.5 2\n");
+    write("other.safetensors", "red 1 2\n");
+}
+
+#[test]
+fn words_outside_the_vocabulary_take_their_vectors_from_a_table() {
+    let folder = folder();
+    let dir = folder.path();
+    write_tables(dir);
+    let vectors = Arc::new(WordVectors::open(&dir.join("table.safetensors")).unwrap());
+    let sound = tone(3.3, 0.0);
+    for network in ["contextual", "words"] {
+        let open = || SequenceGenerator::open(&dir.join(format!("{network}.safetensors"))).unwrap();
+        let (without, mut with) = (open(), open());
+        with.set_word_vectors(vectors.clone()).unwrap();
+        let poses = |speaker: &SequenceGenerator, words: &[&str]| {
+            speaker.poses(&sound, &spoken(words.iter().copied())).unwrap().features
+        };
+        let unknown = poses(&without, &["hello", "gray"]);
+        for word in ["red", "blue", "Red."] {
+            assert_eq!(poses(&without, &["hello", word]), unknown, "{network}");
+        }
+        let [red, blue, gray] = ["red", "blue", "gray"].map(|word| poses(&with, &["hello", word]));
+        assert!(red != blue && red != unknown && blue != unknown, "{network}");
+        assert_eq!((&gray, &poses(&with, &["hello", "Red."])), (&unknown, &red), "{network}");
+        // The same bytes for known words, also beside a new word that is spoken after the end of the audio.
+        assert_eq!(poses(&with, &WORDS), poses(&without, &WORDS), "{network}");
+        let late = ["hello", "world", "hello", "world", "hello", "world", "hello", "red"];
+        assert_eq!(poses(&with, &late), poses(&without, &late), "{network}");
+        let swapped =
+            |speaker: &SequenceGenerator| [["red", "blue"], ["blue", "red"]].map(|words| poses(speaker, &words));
+        let [one, other] = swapped(&with);
+        assert!(one != other && swapped(&without)[0] == swapped(&without)[1], "{network}");
+    }
+}
+
+#[test]
+fn a_table_of_word_vectors_is_read_by_the_program() {
+    let folder = folder();
+    let dir = folder.path();
+    write_tables(dir);
+    let bytes = |file: &str| std::fs::read(dir.join(file)).unwrap();
+    for (file, words) in [("talks/a.tsv", &["hello", "red", "gray"][..]), ("red.tsv", &["red"][..])] {
+        std::fs::write(dir.join(file), tsv(3, words)).unwrap();
+    }
+    let args = "--checkpoint words.safetensors --audio talks/a.wav --transcript talks/a.tsv --out one.bvh";
+    let table = "--words table.safetensors";
+    let without = run(dir, args);
+    let before = bytes("one.bvh");
+    let with = run(dir, &format!("{args} {table}"));
+    assert_ne!(bytes("one.bvh"), before);
+    let counts = |answer: &Value| (answer["segments"]["words"].clone(), answer["segments"]["words_from_table"].clone());
+    assert_eq!(counts(&without), (serde_json::json!([3, 1]), Value::Null));
+    assert_eq!(counts(&with), (serde_json::json!([3, 1]), 1.into()));
+    let output = generate(dir, &format!("{args} {table}"));
+    let text = String::from_utf8_lossy(&output.stdout).into_owned() + &String::from_utf8_lossy(&output.stderr);
+    assert!(text.contains("in the vocabulary of the model, 1 of the others in the table of word vectors"), "{text}");
+    let red = args.replace("talks/a.tsv", "red.tsv");
+    assert!(run(dir, &red)["note"].as_str().unwrap().contains("no word of the transcript"));
+    assert!(run(dir, &format!("{red} {table}"))["note"].is_null());
+
+    // A batch gives the same bytes; it is generated again when the table changes.
+    let batch = |more: &str| {
+        let args = "--checkpoint words.safetensors --audio-folder talks --out-folder made";
+        run(dir, &format!("{args} {more}"))["created"].as_u64()
+    };
+    assert_eq!((batch(""), batch(table), batch(table)), (Some(2), Some(2), Some(0)));
+    run(dir, &format!("{args} {table}"));
+    assert_eq!(bytes("made/a.bvh"), bytes("one.bvh"));
+    glove::convert("red 3 3 3 3\n".as_bytes(), &dir.join("table.safetensors")).unwrap();
+    assert_eq!(batch(table), Some(2));
+    assert_ne!(bytes("made/a.bvh"), bytes("one.bvh"));
+
+    write_untrained_speaker(&dir.join("host.safetensors"));
+    let no_words = "does not read words: omit --words";
+    for (checkpoint, table, words) in [
+        ("host", "table", no_words),
+        ("adversarial", "table", no_words),
+        ("words", "other", "other.safetensors have 2 dimensions, those of the model of talker 4"),
+        ("words", "gone", "gone.safetensors"),
+        ("words", "words", "words.safetensors is not a valid table of word vectors"),
+    ] {
+        for output in ["--audio talks/a.wav --out x.bvh", "--audio-folder talks --out-folder others"] {
+            let args = format!("--checkpoint {checkpoint}.safetensors --words {table}.safetensors {output}");
+            let text = failure(dir, &args);
+            assert!(text.contains(words), "{args}: {text}");
+        }
     }
 }
 

@@ -2,16 +2,23 @@
 
 use crate::fixtures::study::films::{SIZE, speaker};
 use crate::fixtures::study::mp4;
+use crate::fixtures::untrained::{write_untrained_sequence, write_untrained_speaker};
 use orator_base::stage::progress::Silent;
 use orator_base::types::split::Split;
 use orator_base::types::time::FrameRate;
+use orator_formats::word_vectors::glove;
+use orator_gesture::generate::seq2seq::architecture::Architecture;
 use orator_media::ffmpeg::frames::FrameReader;
 use orator_media::ffmpeg::probe::probe;
 use orator_study::build::{common_bytes, padded};
 use orator_study::file::StudyFile;
 use orator_study::plan::{FilmContent, FilmSound};
+use orator_study::stimuli::condition_motion::{ConditionModels, motions};
+use orator_study::stimuli::cut::cut;
 use orator_study::stimuli::filmed_speaker::{CutSpeaker, normalise_loudness};
-use orator_test_support::rule::dataset::{RULE, SpokenClip};
+use orator_study::stimuli::speaker_source::SpeakerSource;
+use orator_test_support::rule::dataset::{RULE, RULE_OF_WORDS, SpokenClip, write};
+use std::collections::BTreeSet;
 
 const STUDY: &str = r#"
 title = "Kinds of motion"
@@ -132,4 +139,62 @@ fn films_of_all_conditions_differ_only_in_motion() {
     assert!(headers.windows(2).all(|pair| pair[0] == pair[1]), "the headers of the films differ");
     let sounds: Vec<_> = films.iter().map(|film| orator::read_sound(film).unwrap()).collect();
     assert!(sounds.windows(2).all(|pair| pair[0] == pair[1]), "the audio of the films differs");
+}
+
+const MODEL_STUDY: &str = r#"
+title = "Settings of a model"
+participants = 4
+[clips]
+seconds = 2.0
+[[speaker]]
+name = "host"
+dataset = "data"
+[[task]]
+name = "liking"
+design = "preference"
+trials = 1
+[[condition]]
+name = "real"
+kind = "natural"
+[[condition]]
+name = "model"
+kind = "checkpoint"
+checkpoint = "words.safetensors"
+"#;
+
+#[test]
+fn a_model_condition_may_carry_its_state_and_read_word_vectors() {
+    let folder = tempfile::tempdir().unwrap();
+    let dir = folder.path();
+    let clip = |split, number| SpokenClip { rule: RULE_OF_WORDS, seed: 5, split, number, n_frames: 90, habits: 0 };
+    let clips = [clip(Split::Train, 0), clip(Split::Test, 0), clip(Split::Test, 1)];
+    std::fs::create_dir_all(dir.join("data")).unwrap();
+    write(&dir.join("data"), &clips, &Silent).unwrap();
+    write_untrained_speaker(&dir.join("gan.safetensors"));
+    write_untrained_sequence(&dir.join("words.safetensors"), Architecture::Words, false, &["hello"]);
+    let spoken: BTreeSet<String> = clips.iter().flat_map(SpokenClip::words).map(|word| word.word).collect();
+    let rows = spoken.iter().enumerate().map(|(n, word)| format!("{word} {n} 1 -1 0.5\n"));
+    glove::convert(rows.collect::<String>().as_bytes(), &dir.join("host.safetensors")).unwrap();
+    let joints = |checkpoint: &str, key: &str| {
+        let study = MODEL_STUDY.replace("words.safetensors", checkpoint);
+        std::fs::write(dir.join("study.toml"), format!("{study}{key}\n")).unwrap();
+        let file = StudyFile::read(&dir.join("study.toml"))?;
+        let models = ConditionModels::open(&file.condition, "host")?;
+        let source = SpeakerSource::of_dataset("host", &dir.join("data"), Split::Test)?;
+        let cut = cut(&source, 30, 2, |_| 0)?;
+        let shown = motions(&source, &cut.clips, &file.condition, &models, &|| ())?;
+        anyhow::Ok(shown["model"].iter().map(|shown| shown.motion.joints.clone()).collect::<Vec<_>>())
+    };
+    let of = |key: &str| joints("words.safetensors", key).unwrap();
+    let plain = of("");
+    assert_eq!((plain.len(), &of("carry_state = false")), (2, &plain));
+    assert_ne!(of("carry_state = true"), plain);
+    assert_ne!(of("words = \"{speaker}.safetensors\""), plain);
+    for (key, error) in [
+        ("carry_state = true", "the model of host does not generate in segments: remove the key carry_state"),
+        ("words = \"host.safetensors\"", "the model of host does not read words: remove the key words"),
+    ] {
+        let text = format!("{:#}", joints("gan.safetensors", key).unwrap_err());
+        assert!(text.contains(&format!("condition model of the speaker host: {error}")), "{text}");
+    }
 }

@@ -16,8 +16,11 @@ use orator_base::types::sound::{Sound, sample_at};
 use orator_base::types::time::FrameRate;
 use orator_formats::mocap::bvh;
 use orator_formats::transcript::Word;
+use orator_formats::word_vectors::WordVectors;
 use orator_media::ffmpeg::audio;
+use orator_nn::seq2seq::predict::StateAtSeams;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 /// Frames of silence appended to the sound for a captured skeleton, so that the resampled motion covers the interval.
 const EXTRA_FRAMES: usize = 2;
@@ -27,6 +30,8 @@ pub struct EvaluatedCheckpoint {
     /// Name in a table of several checkpoints.
     pub name: String,
     pub speaker: TrainedSpeaker,
+    /// Whether a sequence-to-sequence network is requested to carry its decoder state across segments.
+    pub carry_state: bool,
 }
 
 impl EvaluatedCheckpoint {
@@ -57,21 +62,53 @@ impl EvaluatedCheckpoint {
                 Some(level) => names[at][level].clone(),
                 None => format!("{} {}", names[at][last], at + 1),
             };
-            Self { name, speaker }
+            Self { name, speaker, carry_state: false }
         });
         Ok(opened.collect())
+    }
+
+    /// Options for sequence-to-sequence networks: a table with vectors of words that are not in the vocabulary, for
+    /// those that read words, and whether the decoder state is carried across segments. Other networks are unaffected.
+    ///
+    /// # Errors
+    /// An option that applies to none of the checkpoints; word vectors of another dimension than those of a checkpoint.
+    pub fn set_options(checkpoints: &mut [Self], words: Option<&Arc<WordVectors>>, carry_state: bool) -> Result<()> {
+        ensure!(
+            words.is_none() || checkpoints.iter().any(|of| of.speaker.reads_words()),
+            "none of the checkpoints is of a network that reads words: omit --words"
+        );
+        ensure!(
+            !carry_state || checkpoints.iter().any(|of| of.seams().is_some()),
+            "none of the checkpoints is of a network that generates in segments: omit --carry-state"
+        );
+        for of in checkpoints {
+            if let Some(words) = words.filter(|_| of.speaker.reads_words()) {
+                of.speaker.set_word_vectors(words.clone())?;
+            }
+            of.carry_state = carry_state && of.seams().is_some();
+        }
+        Ok(())
+    }
+
+    /// Initial decoder state of the segments; `None` for a GAN.
+    pub fn seams(&self) -> Option<StateAtSeams> {
+        match &self.speaker {
+            TrainedSpeaker::Gan(_) => None,
+            TrainedSpeaker::Sequence(network) => Some(network.seams(self.carry_state)),
+        }
     }
 }
 
 impl From<GestureGenerator> for EvaluatedCheckpoint {
     fn from(generator: GestureGenerator) -> Self {
-        Self { name: "gan".to_owned(), speaker: TrainedSpeaker::Gan(Box::new(generator)) }
+        Self { name: "gan".to_owned(), speaker: TrainedSpeaker::Gan(Box::new(generator)), carry_state: false }
     }
 }
 
 impl From<SequenceGenerator> for EvaluatedCheckpoint {
     fn from(generator: SequenceGenerator) -> Self {
-        Self { name: "seq2seq".to_owned(), speaker: TrainedSpeaker::Sequence(Box::new(generator)) }
+        let speaker = TrainedSpeaker::Sequence(Box::new(generator));
+        Self { name: "seq2seq".to_owned(), speaker, carry_state: false }
     }
 }
 
@@ -112,7 +149,7 @@ impl EvaluatedCheckpoint {
         let n_needed = sample_at(fps, rate, n_frames) + sample_at(network.fps(), rate, extra) + 1;
         let mut sound = audio::at_rate(sound, rate)?;
         sound.samples.resize(sound.samples.len().max(n_needed), 0.0);
-        let poses = network.poses(&sound, words)?;
+        let poses = network.generate(&network.prepare(&sound, words)?, network.seams(self.carry_state))?;
         let motion = if network.is_captured() {
             let captured = bvh::from_text(&network.bvh(&poses)?).context("cannot convert its skeleton to 49 joints")?;
             resample::at_rate(&without_fingers(captured.motion), fps)

@@ -59,8 +59,7 @@ pub fn prepare(
         .map(|of| held_out.generate(of, store).with_context(|| of.name.clone()))
         .collect::<Result<Vec<GeneratedIntervals>>>()?;
     task.detail("computing audio features");
-    let has_words = held_out.words.iter().any(|words| !words.is_empty());
-    let notes = notes::of_checkpoints(dataset, checkpoints, has_words, split);
+    let notes = notes::of_checkpoints(dataset, checkpoints, &held_out.words.concat(), split);
     let first = std::mem::take(&mut generated.first_mut().context("no checkpoint to evaluate")?.matched);
     let clips = first
         .into_iter()

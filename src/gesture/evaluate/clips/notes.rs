@@ -2,17 +2,20 @@
 
 use super::checkpoint::EvaluatedCheckpoint;
 use super::clips::EvalClips;
+use crate::generate::trained::TrainedSpeaker;
 use orator_base::text::counted;
 use orator_base::types::skeleton::{self, L_HAND, N_JOINTS, NECK, is_duplicate};
 use orator_base::types::sound::SAMPLE_RATE;
 use orator_dataset::{Dataset, Split};
+use orator_formats::transcript::Word;
+use orator_nn::seq2seq::predict::StateAtSeams;
 
-/// Notes on how the training data of the checkpoints differ from the evaluated split; `has_words`: whether the split
-/// has any.
+/// Notes on how the training data of the checkpoints differ from the evaluated split with these `words`, and on the
+/// options of the sequence-to-sequence networks.
 pub fn of_checkpoints(
     dataset: &Dataset,
     checkpoints: &[EvaluatedCheckpoint],
-    has_words: bool,
+    words: &[Word],
     split: Split,
 ) -> Vec<String> {
     let mut notes = Vec::new();
@@ -22,7 +25,8 @@ pub fn of_checkpoints(
     }
     let (host, fps) = (&dataset.info().speaker, dataset.info().fps);
     let first_of_dataset = checkpoints.iter().position(|of| of.speaker.normalisation().is_some());
-    for (at, EvaluatedCheckpoint { name, speaker }) in checkpoints.iter().enumerate() {
+    for (at, checkpoint) in checkpoints.iter().enumerate() {
+        let EvaluatedCheckpoint { name, speaker, .. } = checkpoint;
         let (model_speaker, is_first) = (speaker.name(), first_of_dataset == Some(at));
         if speaker.normalisation().is_none() {
             notes.push(format!(
@@ -49,7 +53,20 @@ pub fn of_checkpoints(
                 SAMPLE_RATE / 2
             ));
         }
-        if speaker.n_words() > 0 && !has_words {
+        if checkpoint.seams() == Some(StateAtSeams::Carried) {
+            notes.push(format!("{name} carries its decoder state across segments"));
+        }
+        if let TrainedSpeaker::Sequence(network) = speaker
+            && let Some(n_from_table) = network.n_from_table(words)
+        {
+            let n_known = network.metadata.vocabulary.n_known(words);
+            let n_words = counted(words.len(), "word");
+            notes.push(format!(
+                "{n_known} of {n_words} of this split are in the vocabulary of {name}, {n_from_table} of the others in \
+                 the table of word vectors"
+            ));
+        }
+        if speaker.n_words() > 0 && words.is_empty() {
             notes.push(format!(
                 "{name} uses words, and this split has none: its motion is generated from the audio only"
             ));

@@ -4,7 +4,7 @@
 use super::architecture;
 use super::metadata::{self, SequenceMetadata};
 use super::poses::PoseFormat;
-use super::vocabulary::NumberedWord;
+use super::vocabulary::{NumberedWord, UNKNOWN};
 use crate::generate::model::checkpoint_file;
 use anyhow::{Result, ensure};
 use candle_core::{DType, Device, Tensor};
@@ -14,15 +14,23 @@ use orator_base::types::sound::Sound;
 use orator_base::types::time::FrameRate;
 use orator_formats::bvh::exponential_maps::smooth;
 use orator_formats::transcript::Word;
+use orator_formats::word_vectors::{WordVectors, table};
+use orator_nn::params::Params;
 use orator_nn::seq2seq::config::Config;
 use orator_nn::seq2seq::predict::{GesturePredictor, StateAtSeams, generate};
+use std::collections::BTreeSet;
 use std::path::Path;
+use std::sync::Arc;
 
 /// A trained sequence-to-sequence network.
 pub struct SequenceGenerator {
     /// Metadata stored in the checkpoint.
     pub metadata: SequenceMetadata,
     network: Box<dyn GesturePredictor>,
+    /// Tensors of the network.
+    params: Params,
+    /// Vectors of words that are not in the vocabulary.
+    vectors: Option<Arc<WordVectors>>,
 }
 
 /// Input features of a network for a sound and its words.
@@ -31,6 +39,8 @@ pub struct SpeechInput {
     /// Cepstra [1, n predicted + context - 1, 26] for n segments.
     audio: Tensor,
     words: Vec<NumberedWord>,
+    /// Network that also has the vectors of the words outside the vocabulary, if any has one.
+    network: Option<Box<dyn GesturePredictor>>,
 }
 
 /// Generated poses for a sound.
@@ -46,8 +56,32 @@ pub struct GeneratedPoses {
 impl SequenceGenerator {
     /// Opens a checkpoint of `orator train seq2seq`: a file, or the best checkpoint in the folder of a training.
     pub fn open(path: &Path) -> Result<Self> {
-        let (metadata, network) = metadata::load(&checkpoint_file(path)?)?;
-        Ok(Self { metadata, network })
+        let (metadata, params, network) = metadata::load(&checkpoint_file(path)?)?;
+        Ok(Self { metadata, network, params, vectors: None })
+    }
+
+    /// Words that are not in the vocabulary take their vectors from this table. Without a table, or without a vector in
+    /// it, all have the vector of the unknown word.
+    ///
+    /// # Errors
+    /// A network that does not read words, or whose word vectors have another dimension.
+    pub fn set_word_vectors(&mut self, vectors: Arc<WordVectors>) -> Result<()> {
+        let (name, dim) = (&self.metadata.name, self.metadata.network.word);
+        ensure!(self.reads_words(), "the model of {name} does not read words: omit --words");
+        ensure!(
+            vectors.dim() == dim,
+            "the word vectors in {} have {} dimensions, those of the model of {name} {dim}: expected the table that it \
+             was trained with",
+            vectors.path().display(),
+            vectors.dim()
+        );
+        self.vectors = Some(vectors);
+        Ok(())
+    }
+
+    /// Initial decoder state of the segments, for all callers: carried from segment to segment if requested.
+    pub fn seams(&self, carry_state: bool) -> StateAtSeams {
+        if carry_state { StateAtSeams::Carried } else { StateAtSeams::Renewed }
     }
 
     /// Frame rate of the generated motion.
@@ -73,11 +107,31 @@ impl SequenceGenerator {
         Ok(n_frames)
     }
 
+    /// Number of words that take their vectors from the table of word vectors; `None` without a table.
+    pub fn n_from_table<'w>(&self, words: impl IntoIterator<Item = &'w Word>) -> Option<usize> {
+        let is_in_table = |word: &&Word| self.table_index(word).is_some();
+        self.vectors.as_ref().map(|_| words.into_iter().filter(is_in_table).count())
+    }
+
+    /// Index in the table of word vectors of a word that is not in the vocabulary; `None` if it has no vector.
+    fn table_index(&self, word: &Word) -> Option<usize> {
+        let vectors = self.vectors.as_ref().filter(|_| self.metadata.vocabulary.number(&word.word) == UNKNOWN)?;
+        Some(vectors.index(&word.word)).filter(|index| *index != table::UNKNOWN)
+    }
+
+    /// The network with the table's vectors of these indices after those of the vocabulary; `None` without indices.
+    fn with_vectors(&self, indices: &[usize]) -> Result<Option<Box<dyn GesturePredictor>>> {
+        let Some(vectors) = self.vectors.as_ref().filter(|_| !indices.is_empty()) else { return Ok(None) };
+        let added = indices.iter().map(|index| vectors.vector(*index)).collect::<Result<Vec<_>>>()?.concat();
+        let added = Tensor::from_vec(added, (indices.len(), vectors.dim()), &Device::Cpu)?;
+        self.metadata.with_word_vectors(&self.params, &added).map(Some)
+    }
+
     /// Input features for a sound at `metadata.rate` and its words, of which there may be none. The sound is padded
     /// with silence to complete segments.
     ///
     /// # Errors
-    /// Sound of another rate, or shorter than a frame.
+    /// Sound of another rate, or shorter than a frame; a table of word vectors that cannot be read.
     pub fn prepare(&self, sound: &Sound, words: &[Word]) -> Result<SpeechInput> {
         let rate = self.metadata.rate;
         ensure!(sound.rate == rate, "the audio has a sample rate of {} Hz, expected {rate} Hz", sound.rate);
@@ -87,7 +141,14 @@ impl SequenceGenerator {
             architecture::audio_features(sound, self.fps(), n_frames, n_frames.next_multiple_of(predicted), context);
         let shape = (1, cepstra.nrows(), cepstra.ncols());
         let audio = Tensor::from_iter(cepstra.iter().copied(), &Device::Cpu)?.reshape(shape)?;
-        Ok(SpeechInput { n_frames, audio, words: self.metadata.vocabulary.numbered(words) })
+        let vocabulary = &self.metadata.vocabulary;
+        let indices: BTreeSet<usize> = words.iter().filter_map(|word| self.table_index(word)).collect();
+        let indices: Vec<usize> = indices.into_iter().collect();
+        let words = vocabulary.numbered_with(words, |word| {
+            let at = self.table_index(word).and_then(|index| indices.binary_search(&index).ok());
+            at.map_or(UNKNOWN, |at| (vocabulary.n_indices() + at) as u32)
+        });
+        Ok(SpeechInput { n_frames, audio, words, network: self.with_vectors(&indices)? })
     }
 
     /// Generates poses for the input. The first segment starts from the mean pose.
@@ -95,12 +156,13 @@ impl SequenceGenerator {
     /// # Errors
     /// Network output that is not finite.
     pub fn generate(&self, speech: &SpeechInput, seams: StateAtSeams) -> Result<GeneratedPoses> {
-        let SpeechInput { n_frames, audio, words } = speech;
+        let SpeechInput { n_frames, audio, words, network } = speech;
         let Config { pose, previous, predicted, .. } = *self.network.config();
         let start = Tensor::zeros((1, previous, pose), DType::F32, &Device::Cpu)?;
         let of = &self.metadata;
         let words = |i| architecture::words_tensor(of.architecture, &[of.words_of_segment(words, i * predicted)]);
-        let generated = generate(&*self.network, audio, &start, seams, words)?.flatten_all()?.to_vec1::<f32>()?;
+        let network = network.as_ref().unwrap_or(&self.network);
+        let generated = generate(&**network, audio, &start, seams, words)?.flatten_all()?.to_vec1::<f32>()?;
         ensure!(
             generated.iter().all(|value| value.is_finite()),
             "the network output is not finite: the checkpoint is damaged, or its training failed"
@@ -113,9 +175,9 @@ impl SequenceGenerator {
         Ok(GeneratedPoses { features, seam_jump: [raw, smoothed] })
     }
 
-    /// Generates poses for a sound: `prepare`, then `generate` with the decoder state renewed at seams.
+    /// Generates poses for a sound: `prepare`, then `generate` without a request to carry the decoder state.
     pub fn poses(&self, sound: &Sound, words: &[Word]) -> Result<GeneratedPoses> {
-        self.generate(&self.prepare(sound, words)?, StateAtSeams::Renewed)
+        self.generate(&self.prepare(sound, words)?, self.seams(false))
     }
 
     /// Motion of the 49 joints. Fails for a model of a captured skeleton.

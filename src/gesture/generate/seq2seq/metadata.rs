@@ -4,12 +4,15 @@ use super::architecture::{self, AROUND_SEGMENT_SECS, Architecture, RATES, networ
 use super::poses::PoseFormat;
 use super::vocabulary::{NumberedWord, Vocabulary};
 use anyhow::{Context, Result, ensure};
+use candle_core::Tensor;
 use orator_base::types::time::FrameRate;
 use orator_nn::params::Params;
 use orator_nn::seq2seq::config::{Config, SCORE_BLOCKS};
+use orator_nn::seq2seq::encoders::table_name;
 use orator_nn::seq2seq::predict::GesturePredictor;
 use orator_nn::weights::Contents;
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
 use std::path::Path;
 
 /// Prefix of the network's tensors in a checkpoint.
@@ -60,6 +63,21 @@ impl SequenceMetadata {
         )
     }
 
+    /// Builds the network with the tensors `params` of its checkpoint and the word vectors `added` [n, word] after those
+    /// of the vocabulary. Fails if the network does not read words, or if its word vectors have another dimension.
+    pub fn with_word_vectors(&self, params: &Params, added: &Tensor) -> Result<Box<dyn GesturePredictor>> {
+        let encoder = architecture::word_encoder(self.architecture).context("the network does not read words")?;
+        let mut tensors: BTreeMap<String, Tensor> =
+            params.all().map(|(name, var)| (name.to_owned(), var.as_detached_tensor())).collect();
+        let table = tensors.get_mut(&table_name(encoder)).context("the network has no word embedding")?;
+        *table = Tensor::cat(&[&*table, added], 0)?;
+        let config = Config { vocabulary: table.dim(0)?, ..self.network.clone() };
+        let mut extended = Params::frozen();
+        let network = architecture::network(self.architecture, &mut extended, &config)?;
+        extended.load(&tensors)?;
+        Ok(network)
+    }
+
     /// Fails unless the metadata is consistent and supported by this program.
     fn check(&self) -> Result<()> {
         let (fps, network) = (self.fps, &self.network);
@@ -100,13 +118,13 @@ pub fn is_sequence_kind(kind: &serde_json::Value) -> bool {
     kind.as_str().is_some_and(|kind| kind.starts_with("orator sequence"))
 }
 
-/// Loads a checkpoint of `orator train seq2seq`. Errors name the file and the cause.
-pub fn load(path: &Path) -> Result<(SequenceMetadata, Box<dyn GesturePredictor>)> {
+/// Loads a checkpoint of `orator train seq2seq`: the network, and its tensors. Errors name the file and the cause.
+pub fn load(path: &Path) -> Result<(SequenceMetadata, Params, Box<dyn GesturePredictor>)> {
     let contents = Contents::read(path)?;
     build(&contents).with_context(|| format!("{} is not a checkpoint of `orator train seq2seq`", path.display()))
 }
 
-fn build(contents: &Contents) -> Result<(SequenceMetadata, Box<dyn GesturePredictor>)> {
+fn build(contents: &Contents) -> Result<(SequenceMetadata, Params, Box<dyn GesturePredictor>)> {
     let kind = &contents.facts["speaker"]["kind"];
     ensure!(kind == KIND, "unsupported kind {kind}: expected {KIND:?}");
     let metadata: SequenceMetadata =
@@ -116,7 +134,7 @@ fn build(contents: &Contents) -> Result<(SequenceMetadata, Box<dyn GesturePredic
     let mut params = Params::frozen();
     let network = architecture::network(metadata.architecture, &mut params, &metadata.network)?;
     params.load(&contents.part(NETWORK))?;
-    Ok((metadata, network))
+    Ok((metadata, params, network))
 }
 
 #[cfg(test)]

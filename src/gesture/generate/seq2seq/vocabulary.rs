@@ -56,8 +56,16 @@ impl Vocabulary {
 
     /// Indices and times of words, sorted by start time.
     pub fn numbered(&self, words: &[Word]) -> Vec<NumberedWord> {
+        self.numbered_with(words, |_| UNKNOWN)
+    }
+
+    /// Like `numbered`; `other` returns the index of a word that is not in the vocabulary.
+    pub fn numbered_with(&self, words: &[Word], other: impl Fn(&Word) -> u32) -> Vec<NumberedWord> {
         let number = |word: &Word| NumberedWord {
-            number: self.number(&word.word),
+            number: match self.number(&word.word) {
+                UNKNOWN => other(word),
+                number => number,
+            },
             start_secs: word.start_secs,
             end_secs: word.end_secs,
         };
@@ -98,5 +106,7 @@ mod tests {
         assert_eq!(["dog", "DOG.", "the", "cat", ""].map(|word| vocabulary.number(word)), [2, 2, 3, UNKNOWN, UNKNOWN]);
         let numbered = vocabulary.numbered(&words[1..2]);
         assert_eq!(numbered, [NumberedWord { number: 2, start_secs: 0.5, end_secs: 1.0 }]);
+        let numbered = vocabulary.numbered_with(&[word("Cat"), word("dog")], |word| 10 + word.word.len() as u32);
+        assert_eq!(numbered.iter().map(|word| word.number).collect::<Vec<_>>(), [13, 2]);
     }
 }
