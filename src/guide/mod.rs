@@ -18,6 +18,8 @@ pub mod animation {}
 pub mod evaluation {}
 #[doc = include_str!("results.md")]
 pub mod results {}
+#[doc = include_str!("papers.md")]
+pub mod papers {}
 #[doc = include_str!("study.md")]
 pub mod study {}
 #[doc = include_str!("models.md")]

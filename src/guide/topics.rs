@@ -18,7 +18,7 @@ macro_rules! topic {
 }
 
 /// Every page, in reading order.
-pub const TOPICS: [Topic; 14] = [
+pub const TOPICS: [Topic; 15] = [
     topic!("dataset", "files of a dataset, rejected seconds, transcripts, splits, import and removal"),
     topic!("lifting", "2D keypoints to 3D joints: input, output, errors, custom lifters"),
     topic!("keypoints", "keypoints of OpenPose, MMPose, AlphaPose, MediaPipe and PATS instead of videos"),
@@ -26,6 +26,7 @@ pub const TOPICS: [Topic; 14] = [
     topic!("animation", "joints to BVH, GLB, JSON and MP4: rig, smoothing, constraints"),
     topic!("evaluation", "metrics, baselines, conclusions, conventions, comparison of results, rendered persons"),
     topic!("results", "measured results of detectors, recipes and fine-tuning; speed; the commands that print them"),
+    topic!("papers", "every statement of both papers: code, settings, defaults, measurements; paper against code"),
     topic!("study", "user studies: the study file, clips and films, the web page, the answers and their analysis"),
     topic!("models", "pose models: origin, licences, download, adding your own"),
     topic!("configuration", "pipeline.toml, --set, the work folder, exit codes, JSON output"),

@@ -189,7 +189,7 @@ fn segments(facts: &SegmentFacts) -> String {
     let SegmentFacts { state, seam_jump: [raw, smoothed], other_seam_jump: [other_raw, other_smoothed], .. } = facts;
     let other = match state {
         StateAtSeams::Renewed => "with --carry-state",
-        StateAtSeams::Carried => "without --carry-state",
+        StateAtSeams::Carried => "with the state renewed",
     };
     let from_table = facts.words_from_table;
     let from_table = from_table.map_or(String::new(), |n| format!(", {n} of the others in the table of word vectors"));

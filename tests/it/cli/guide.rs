@@ -1,5 +1,6 @@
 //! `orator guide`, and commands whose standard output is closed.
 
+use std::path::Path;
 use std::process::{Command, Stdio};
 
 fn orator(arguments: &[&str]) -> Command {
@@ -41,6 +42,19 @@ fn a_closed_standard_output_is_not_an_error() {
         let output = running.wait_with_output().unwrap();
         assert!(output.status.success(), "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
     }
+}
+
+/// The second column of the tables of statements names files and folders relative to `src`, most of them with a path.
+#[test]
+fn the_page_of_the_papers_names_existing_code() {
+    let page = orator::guide::TOPICS.into_iter().find(|topic| topic.name == "papers").unwrap();
+    let cells = page.text.lines().map(|line| line.split('|').collect::<Vec<_>>());
+    let code = cells.filter(|cells| cells.len() == 7).flat_map(|cells| cells[2].split('`').skip(1).step_by(2));
+    let paths: Vec<&str> = code.filter(|name| name.contains('/')).collect();
+    assert!(paths.len() > 50, "{paths:?}");
+    let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
+    let missing: Vec<_> = paths.iter().filter(|path| !source.join(path).exists()).collect();
+    assert!(missing.is_empty(), "{missing:?}");
 }
 
 /// Each `orator VERB` in the guide and README is a subcommand of the program.

@@ -79,9 +79,10 @@ impl SequenceGenerator {
         Ok(())
     }
 
-    /// Initial decoder state of the segments, for all callers: carried from segment to segment if requested.
+    /// Initial decoder state of the segments, for all callers: carried from segment to segment if requested, or if the
+    /// model was trained to.
     pub fn seams(&self, carry_state: bool) -> StateAtSeams {
-        if carry_state { StateAtSeams::Carried } else { StateAtSeams::Renewed }
+        if carry_state || self.metadata.carries_state { StateAtSeams::Carried } else { StateAtSeams::Renewed }
     }
 
     /// Frame rate of the generated motion.
