@@ -4,15 +4,13 @@
 use super::common_motion::{CommonBody, CommonVisibility};
 use super::condition_motion::{ConditionModels, ShownMotion, motions, sound_of};
 use super::cut::{CutSpeech, StudyClip, cut};
-use super::film::{CAMERA, FilmScene};
+use super::film::{self, FilmScene};
 use super::speaker_source::SpeakerSource;
 use crate::file::{StudyFile, StudySpeaker};
 use crate::pages::assets::SOUND_CHECK_TONES;
 use crate::plan::{FilmContent, FilmSound};
 use anyhow::{Context, Result, bail};
 use orator_avatar::animate::Performance;
-use orator_avatar::animate::avatar::Appearance;
-use orator_avatar::animate::export::film::smooth_rate;
 use orator_avatar::animate::export::film_avatar::AvatarStage;
 use orator_base::audio::loudness;
 use orator_base::stage::progress::Progress;
@@ -78,7 +76,7 @@ impl CutSpeaker {
         };
         let fps = source.fps;
         let cut = cut(&source, fps.frames_in(file.clips.seconds), n_clips, rank)?;
-        let film_fps = smooth_rate(fps);
+        let film_fps = film::film_fps(file.films.layout, fps);
         let mut sounds = Vec::new();
         for of_segment in cut.clips.chunk_by(|a, b| a.segment == b.segment) {
             let segment = source.read(of_segment[0].segment)?;
@@ -124,9 +122,10 @@ impl CutSpeaker {
             .collect();
         drop(task);
         let shown: Vec<&Performance> = performances.values().flatten().map(|(_, performance)| performance).collect();
-        let stage = AvatarStage::new(&shown, &Appearance::faceless(), size, CAMERA);
+        let layout = file.films.layout;
+        let stage = film::stage(layout, &shown, size);
         let stage = stage.with_context(|| format!("the speaker {} has no clips", source.name))?;
-        let (clips, film_fps) = (cut.clips, smooth_rate(source.fps));
+        let (clips, film_fps) = (cut.clips, film::film_fps(layout, source.fps));
         Ok(FilmedSpeaker { clips, sounds, tones, film_fps, performances, stage })
     }
 }
@@ -154,38 +153,47 @@ impl FilmedSpeaker {
         self.clips.iter().position(|known| known.name == name)
     }
 
-    /// Name `speaker/clip` of the clip whose motion is shown in the film with this content.
+    /// Sets the names `speaker/clip` of the clips whose motion is shown in the film with this content.
     ///
     /// # Errors
-    /// The speaker does not have the clip or the condition.
-    pub fn motion_of(&self, content: &FilmContent) -> Result<String> {
-        let (of, _) = self.shown(content)?;
-        Ok(format!("{}/{}", content.speaker, self.clips[*of].name))
+    /// The speaker does not have the clip or a condition.
+    pub fn set_motion(&self, content: &mut FilmContent) -> Result<()> {
+        let motion_of = |condition: &str| {
+            let (of, _) = self.shown(&content.clip, condition)?;
+            anyhow::Ok(format!("{}/{}", content.speaker, self.clips[*of].name))
+        };
+        let left = motion_of(&content.condition)?;
+        let right = content.right.as_ref().map(|right| motion_of(&right.condition)).transpose()?;
+        content.motion_of = left;
+        if let (Some(avatar), Some(motion_of)) = (&mut content.right, right) {
+            avatar.motion_of = motion_of;
+        }
+        Ok(())
     }
 
-    fn shown(&self, content: &FilmContent) -> Result<&(usize, Performance)> {
-        let missing = || format!("no motion for the clip {} in the condition {}", content.clip, content.condition);
-        let clip = self.find(&content.clip).with_context(missing)?;
-        self.performances.get(&content.condition).and_then(|of_condition| of_condition.get(clip)).with_context(missing)
+    fn shown(&self, clip: &str, condition: &str) -> Result<&(usize, Performance)> {
+        let missing = || format!("no motion for the clip {clip} in the condition {condition}");
+        let clip_idx = self.find(clip).with_context(missing)?;
+        self.performances.get(condition).and_then(|of_condition| of_condition.get(clip_idx)).with_context(missing)
     }
 
-    /// Performance of the film with this content, at the film's rate.
+    /// Performances of the film with this content at the film's rate, left to right.
     ///
     /// # Errors
-    /// The speaker does not have the clip or the condition.
-    pub fn performance(&self, content: &FilmContent) -> Result<Performance> {
-        let (_, performance) = self.shown(content)?;
-        Ok(performance.resampled(self.film_fps))
+    /// The speaker does not have the clip or a condition.
+    pub fn performances(&self, content: &FilmContent) -> Result<Vec<Performance>> {
+        let performance = |condition| Ok(self.shown(&content.clip, condition)?.1.resampled(self.film_fps));
+        content.conditions().map(performance).collect()
     }
 
-    /// Scene of the film with this content.
-    pub fn scene<'a>(&'a self, content: &FilmContent, performance: &'a Performance) -> FilmScene<'a> {
+    /// Scene of the film with this content and its performances.
+    pub fn scene<'a>(&'a self, content: &FilmContent, performances: &'a [Performance]) -> FilmScene<'a> {
         let sound = match content.sound {
             FilmSound::Speech => self.find(&content.clip).and_then(|clip| self.sounds.get(clip)),
             FilmSound::Silence => None,
             FilmSound::Tones => self.tones.as_ref(),
         };
-        FilmScene { performance, stage: &self.stage, sound, number: content.number }
+        FilmScene { performances, stage: &self.stage, sound, number: content.number }
     }
 }
 

@@ -86,22 +86,26 @@ fn films_of_all_conditions_differ_only_in_motion() {
         motion_of: name(1),
         number,
         sound: FilmSound::Speech,
+        right: None,
     };
     let (mut films, mut skeletons) = (Vec::new(), Vec::new());
     for (condition, number) in
         [("real", None), ("model", None), ("mismatched", None), ("still", None), ("theirs", None), ("real", Some(47))]
     {
         let content = content(condition, number);
-        let performance = host.performance(&content).unwrap();
-        let scene = host.scene(&content, &performance);
-        assert_eq!(performance.clip.n_frames(), 60);
-        skeletons.push(performance.rig.skeleton.clone());
+        let performances = host.performances(&content).unwrap();
+        let scene = host.scene(&content, &performances);
+        assert_eq!((performances.len(), performances[0].clip.n_frames()), (1, 60));
+        skeletons.push(performances[0].rig.skeleton.clone());
         let path = dir.join(format!("{condition}{}.mp4", number.unwrap_or(0)));
         scene.write(&path).unwrap();
         films.push(path);
     }
-    assert_eq!(host.motion_of(&content("real", None)).unwrap(), name(1));
-    assert_ne!(host.motion_of(&content("mismatched", None)).unwrap(), name(1));
+    let both = FilmContent { motion_of: String::new(), ..content("real", None) };
+    let mut both = both.with_right(content("mismatched", None));
+    host.set_motion(&mut both).unwrap();
+    assert_eq!(both.motion_of, name(1));
+    assert_ne!(both.right.unwrap().motion_of, name(1));
 
     assert!(skeletons.windows(2).all(|pair| pair[0] == pair[1]), "all films show one body");
     let bytes = common_bytes(films.iter().map(|film| std::fs::metadata(film).unwrap().len() as usize));
