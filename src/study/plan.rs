@@ -122,6 +122,12 @@ impl FilmContent {
         std::iter::once(self.condition.as_str()).chain(right)
     }
 
+    /// Content of the film of the right avatar alone.
+    pub fn right_alone(&self) -> Option<Self> {
+        let RightAvatar { condition, motion_of } = self.right.clone()?;
+        Some(Self { condition, motion_of, right: None, ..self.clone() })
+    }
+
     /// Content of the side-by-side film of this one and, on the right, another film of the same speech.
     #[must_use]
     pub fn with_right(self, right: Self) -> Self {

@@ -153,28 +153,28 @@ impl FilmedSpeaker {
         self.clips.iter().position(|known| known.name == name)
     }
 
-    /// Sets the names `speaker/clip` of the clips whose motion is shown in the film with this content.
+    /// Name `speaker/clip` of the clip whose motion is shown in the film with this content, by its left avatar.
     ///
     /// # Errors
-    /// The speaker does not have the clip or a condition.
-    pub fn set_motion(&self, content: &mut FilmContent) -> Result<()> {
-        let motion_of = |condition: &str| {
-            let (of, _) = self.shown(&content.clip, condition)?;
-            anyhow::Ok(format!("{}/{}", content.speaker, self.clips[*of].name))
-        };
-        let left = motion_of(&content.condition)?;
-        let right = content.right.as_ref().map(|right| motion_of(&right.condition)).transpose()?;
-        content.motion_of = left;
-        if let (Some(avatar), Some(motion_of)) = (&mut content.right, right) {
-            avatar.motion_of = motion_of;
-        }
-        Ok(())
+    /// The speaker does not have the clip or the condition.
+    pub fn motion_of(&self, content: &FilmContent) -> Result<String> {
+        let (of, _) = self.shown(content)?;
+        Ok(format!("{}/{}", content.speaker, self.clips[*of].name))
     }
 
-    fn shown(&self, clip: &str, condition: &str) -> Result<&(usize, Performance)> {
-        let missing = || format!("no motion for the clip {clip} in the condition {condition}");
-        let clip_idx = self.find(clip).with_context(missing)?;
-        self.performances.get(condition).and_then(|of_condition| of_condition.get(clip_idx)).with_context(missing)
+    fn shown(&self, content: &FilmContent) -> Result<&(usize, Performance)> {
+        let missing = || format!("no motion for the clip {} in the condition {}", content.clip, content.condition);
+        let clip = self.find(&content.clip).with_context(missing)?;
+        self.performances.get(&content.condition).and_then(|of_condition| of_condition.get(clip)).with_context(missing)
+    }
+
+    /// Performance of the left avatar of the film with this content, at the film's rate.
+    ///
+    /// # Errors
+    /// The speaker does not have the clip or the condition.
+    fn performance(&self, content: &FilmContent) -> Result<Performance> {
+        let (_, performance) = self.shown(content)?;
+        Ok(performance.resampled(self.film_fps))
     }
 
     /// Performances of the film with this content at the film's rate, left to right.
@@ -182,8 +182,8 @@ impl FilmedSpeaker {
     /// # Errors
     /// The speaker does not have the clip or a condition.
     pub fn performances(&self, content: &FilmContent) -> Result<Vec<Performance>> {
-        let performance = |condition| Ok(self.shown(&content.clip, condition)?.1.resampled(self.film_fps));
-        content.conditions().map(performance).collect()
+        let right = content.right_alone().map(|right| self.performance(&right));
+        std::iter::once(self.performance(content)).chain(right).collect()
     }
 
     /// Scene of the film with this content and its performances.
