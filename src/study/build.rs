@@ -56,7 +56,7 @@ pub struct BuiltSpeaker {
 }
 
 /// Builds the study of `file` in the folder `out`, with films of `size` px, width and height
-/// ([`super::stimuli::film::SIZE`] except in tests).
+/// ([`super::file::FilmLayout::size`] except in tests).
 ///
 /// # Errors
 /// No H.264 encoder; the folder holds another study or responses; speech or motion is missing or too short.
@@ -99,6 +99,9 @@ pub fn build(file: &StudyFile, out: &Path, size: [usize; 2], progress: &dyn Prog
     let designed = design(file, &clips, &mut |mut content| {
         let speaker = filmed.get(&content.speaker).with_context(|| format!("unknown speaker {}", content.speaker))?;
         content.motion_of = speaker.motion_of(&content)?;
+        if let (Some(alone), Some(right)) = (content.right_alone(), &mut content.right) {
+            right.motion_of = speaker.motion_of(&alone)?;
+        }
         let name = film_name(file.seed, &content);
         let is_unique = key.films.insert(name.clone(), content.clone()).is_none_or(|other| other == content);
         ensure!(is_unique, "two films have the name {name}: choose another seed");
@@ -196,8 +199,8 @@ fn render_films(
     let task = progress.begin("films", key.films.len() as u64);
     let film = |(name, content): (&String, &FilmContent)| -> Result<(String, PathBuf)> {
         let speaker = speakers.get(&content.speaker).with_context(|| format!("unknown speaker {}", content.speaker))?;
-        let performance = speaker.performance(content)?;
-        let scene = speaker.scene(content, &performance);
+        let performances = speaker.performances(content)?;
+        let scene = speaker.scene(content, &performances);
         let path = dir.join(format!("{}.mp4", scene.hash()));
         if path.is_file() {
             task.skip(1);

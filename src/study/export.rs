@@ -3,7 +3,7 @@
 use super::design::right_response;
 use super::file::StudyFile;
 use super::folder::{StudyFolder, read_json};
-use super::plan::{FilmContent, StudyKey, StudyPlan, TaskDesign};
+use super::plan::{StudyKey, StudyPlan, TaskDesign};
 use super::store::answers::{self, SubmittedAnswer};
 use super::store::database;
 use super::store::participants::{self, PARAMETERS, Participant, Status};
@@ -98,9 +98,9 @@ impl JoinedPlan {
         Ok(Self { plan: read_json(&folder.plan())?, key: read_json(&folder.key())?, file })
     }
 
-    /// Correct response of an analysed trial, from the conditions of its films.
-    fn right_response(&self, design: TaskDesign, films: &[&FilmContent]) -> Option<Response> {
-        let shown: Option<Vec<_>> = films.iter().map(|film| self.file.find_condition(&film.condition)).collect();
+    /// Correct response of an analysed trial, from the conditions of its avatars.
+    fn right_response(&self, design: TaskDesign, conditions: &[String]) -> Option<Response> {
+        let shown: Option<Vec<_>> = conditions.iter().map(|name| self.file.find_condition(name)).collect();
         right_response(design, &shown?)
     }
 
@@ -118,6 +118,8 @@ impl JoinedPlan {
         let films = trial.films.iter().map(|film| self.key.films.get(film));
         let films = films.collect::<Option<Vec<_>>>().with_context(context)?;
         let first = films.first().with_context(context)?;
+        let conditions = films.iter().flat_map(|film| film.conditions()).map(str::to_owned);
+        let conditions: Vec<String> = conditions.collect();
         Ok(StudyVote {
             participant: participant.id.clone(),
             task: task.name.clone(),
@@ -126,8 +128,8 @@ impl JoinedPlan {
             trial: answer.position + 1,
             clip: first.clip.clone(),
             speaker: first.speaker.clone(),
-            conditions: films.iter().map(|film| film.condition.clone()).collect(),
-            expected: trial.expected.clone().or_else(|| self.right_response(task.design, &films)),
+            expected: trial.expected.clone().or_else(|| self.right_response(task.design, &conditions)),
+            conditions,
             response: answer.response,
             stalled_secs: answer.stalled_secs,
             unfocused_secs: answer.unfocused_secs,

@@ -9,15 +9,15 @@ use std::collections::BTreeMap;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum TaskDesign {
-    /// Two films of the same speech side by side: which is the real one?
+    /// Two avatars with the same speech: which is the real one?
     Turing,
     /// One film: is it real?
     TuringSingle,
-    /// Two films of the same speech side by side: which is preferred, in five steps?
+    /// Two avatars with the same speech: which is preferred, in five steps?
     Preference,
     /// Several films of the same speech, each rated from 0 to 100 (Jonell et al. 2021, HEMVIP).
     Sliders,
-    /// Two films, one with the motion of its own speech, one with the motion of another speech: which fits the speech?
+    /// Two avatars, one with the motion of its own speech, one with that of another speech: which fits the speech?
     Mismatch,
 }
 
@@ -74,7 +74,7 @@ pub struct Trial {
     /// Index into [`StudyPlan::tasks`].
     pub task: usize,
     pub phase: TrialPhase,
-    /// Opaque names of the films, left to right.
+    /// Opaque names of the films, left to right; one name if both avatars are in one film.
     pub films: Vec<String>,
     /// Correct response of an attention check, or of a training trial with feedback.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -103,6 +103,37 @@ pub struct FilmContent {
     pub number: Option<u16>,
     #[serde(default, skip_serializing_if = "FilmSound::is_speech")]
     pub sound: FilmSound,
+    /// Right avatar of a side-by-side film; `condition` and `motion_of` then describe the left one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub right: Option<RightAvatar>,
+}
+
+/// Right avatar of a side-by-side film.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct RightAvatar {
+    pub condition: String,
+    pub motion_of: String,
+}
+
+impl FilmContent {
+    /// Conditions of the avatars, left to right.
+    pub fn conditions(&self) -> impl Iterator<Item = &str> {
+        let right = self.right.as_ref().map(|right| right.condition.as_str());
+        std::iter::once(self.condition.as_str()).chain(right)
+    }
+
+    /// Content of the film of the right avatar alone.
+    pub fn right_alone(&self) -> Option<Self> {
+        let RightAvatar { condition, motion_of } = self.right.clone()?;
+        Some(Self { condition, motion_of, right: None, ..self.clone() })
+    }
+
+    /// Content of the side-by-side film of this one and, on the right, another film of the same speech.
+    #[must_use]
+    pub fn with_right(self, right: Self) -> Self {
+        let Self { condition, motion_of, number, .. } = right;
+        Self { number: self.number.or(number), right: Some(RightAvatar { condition, motion_of }), ..self }
+    }
 }
 
 /// Audio track of a film.

@@ -4,7 +4,7 @@
 use super::plan::{TaskDesign, TrialPhase};
 use serde::{Deserialize, Serialize};
 
-/// Position of a film on the screen.
+/// Position of a film on the screen, or of an avatar in a side-by-side film.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum ScreenSide {
@@ -16,7 +16,7 @@ pub enum ScreenSide {
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Response {
-    /// Turing test and mismatch: the chosen film.
+    /// Turing test and mismatch: the chosen film or avatar.
     Side(ScreenSide),
     /// Turing test with a single film: whether it was judged real.
     Real(bool),
@@ -59,7 +59,7 @@ pub struct StudyVote {
     pub trial: u32,
     pub clip: String,
     pub speaker: String,
-    /// Conditions of the films, left to right.
+    /// Conditions of the avatars, left to right.
     pub conditions: Vec<String>,
     pub response: Response,
     /// Correct response, if the task has one: the side of the real or the matched film, whether a single film is real,

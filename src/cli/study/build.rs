@@ -8,7 +8,6 @@ use anyhow::Result;
 use orator_base::text::counted;
 use orator_study::build::{BuiltSpeaker, BuiltStudy, build};
 use orator_study::file::{ConditionSource, StudyFile, fill_pattern};
-use orator_study::stimuli::film::SIZE;
 use serde_json::json;
 use std::fmt::Write as _;
 use std::path::PathBuf;
@@ -44,7 +43,7 @@ pub fn run(args: &Args, ui: &Ui) -> Result<Outcome> {
     let locked: Vec<PathBuf> = checkpoints.chain(datasets).collect();
     enter_sandbox([out.as_path()], locked.iter().map(PathBuf::as_path));
     signals::exit_on_signal("completed films are saved; run the same command again to continue");
-    let built = build(&file, &out, SIZE, ui)?;
+    let built = build(&file, &out, file.films.layout.size(), ui)?;
     let next = format!("orator study serve {}", built.folder.display());
     let mut facts = json!(built);
     facts["next"] = json!(next);

@@ -69,8 +69,8 @@ pub fn design(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::file::ClipReuse;
-    use crate::plan::{PlannedSession, TaskDesign, Trial, TrialPhase};
+    use crate::file::{ClipReuse, FilmLayout, FilmSettings};
+    use crate::plan::{FilmSound, PlannedSession, TaskDesign, Trial, TrialPhase};
     use crate::vote::{Response, ScreenSide};
     use std::collections::BTreeSet;
     use std::fmt::Write as _;
@@ -215,6 +215,27 @@ mod tests {
             let side = if is_left { ScreenSide::Left } else { ScreenSide::Right };
             assert_eq!(trial.expected, Some(Response::Side(side)));
         }
+    }
+
+    #[test]
+    fn a_side_by_side_trial_has_one_film_of_both_avatars() {
+        let tasks = [(TaskDesign::Turing, 6, 2), (TaskDesign::Mismatch, 4, 0), (TaskDesign::Preference, 3, 0)];
+        let separate = file(&tasks, 2, 1, "participants = 6");
+        let side_by_side = StudyFile { films: FilmSettings { layout: FilmLayout::SideBySide }, ..separate.clone() };
+        let n_clips = [ClipNeeds::of(&separate).total(); 2];
+        let [(two, two_films), (one, one_films)] =
+            [&separate, &side_by_side].map(|file| designed(file, &n_clips).unwrap());
+        let sessions = two.plan.sessions.iter().zip(&one.plan.sessions);
+        for (two, one) in sessions.flat_map(|(two, one)| two.trials.iter().zip(&one.trials)) {
+            assert_eq!((two.films.len(), one.films.len()), (2, 1));
+            assert_eq!((two.task, two.phase, &two.expected), (one.task, one.phase, &one.expected));
+            let (both, apart) = (&one_films[&one.films[0]], two.films.iter().map(|film| &two_films[film]));
+            assert!(both.conditions().eq(apart.clone().map(|film| film.condition.as_str())));
+            assert!(apart.clone().all(|film| film.clip == both.clip));
+            assert_eq!(both.number, apart.clone().find_map(|film| film.number));
+        }
+        let sound_check = &one_films[&one.plan.sound_check];
+        assert!(sound_check.right.is_some() && sound_check.sound == FilmSound::Tones);
     }
 
     #[test]

@@ -5,7 +5,7 @@ use super::clip_needs::SharedClips;
 use super::clip_scheduler::ClipScheduler;
 use super::latin_square::SquareRows;
 use super::task_design::{AssignedTrial, TaskBalance, TaskDesigner, assign, right_response};
-use crate::file::{StudyCondition, StudyFile, StudyTask, TaskOrder};
+use crate::file::{FilmLayout, StudyCondition, StudyFile, StudyTask, TaskOrder};
 use crate::plan::{FilmContent, FilmSound, PlannedSession, Trial, TrialPhase};
 use crate::vote::Response;
 use anyhow::{Context, Result};
@@ -117,17 +117,23 @@ impl Designer<'_> {
         let comparison = self.tasks.first().and_then(|task| task.comparisons.first());
         let condition =
             comparison.and_then(|comparison| comparison.first()).context("the study compares no conditions")?;
-        let shown = vec![(condition.name.clone(), None)];
+        let n_avatars = if self.file.films.layout == FilmLayout::SideBySide { 2 } else { 1 };
+        let shown = vec![(condition.name.clone(), None); n_avatars];
         self.films(&clip, shown, FilmSound::Tones).map(|films| films.concat())
     }
 
-    /// Names of the films of a clip, one per condition with the number that it shows, if any.
+    /// Names of the films of a clip, one per condition with the number that it shows, if any; one for both conditions of
+    /// a side-by-side film.
     fn films(&mut self, clip: &NamedClip, shown: Vec<(String, Option<u16>)>, sound: FilmSound) -> Result<Vec<String>> {
-        let name = |(condition, number)| {
+        let content = |(condition, number)| {
             let [clip, speaker] = clip.clone();
-            (self.film)(FilmContent { motion_of: clip.clone(), clip, speaker, condition, number, sound })
+            FilmContent { motion_of: clip.clone(), clip, speaker, condition, number, sound, right: None }
         };
-        shown.into_iter().map(name).collect()
+        let mut contents: Vec<FilmContent> = shown.into_iter().map(content).collect();
+        if self.file.films.layout == FilmLayout::SideBySide {
+            contents = contents.into_iter().reduce(FilmContent::with_right).into_iter().collect();
+        }
+        contents.into_iter().map(|content| (self.film)(content)).collect()
     }
 }
 

@@ -117,7 +117,7 @@ fn paths_mut(study: &mut StudyFile) -> impl Iterator<Item = &mut PathBuf> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::file::{ConditionSource, HypothesisKind, TaskOrder};
+    use crate::file::{ConditionSource, FilmLayout, HypothesisKind, TaskOrder};
 
     const SMALLEST: &str = "title = \"t\"\npreset = \"rebol\"\n[[speaker]]\nname = \"ellen\"\ndataset = \"data\"\n\
                             [[condition]]\nname = \"model\"\nkind = \"checkpoint\"\ncheckpoint = \"models/{speaker}\"\n";
@@ -137,6 +137,7 @@ mod tests {
         assert_eq!((file.participants, file.n_sessions(), file.task_order), (100, 150, TaskOrder::Written));
         let tasks: Vec<_> = file.task.iter().map(|task| (task.trials, task.training, task.replay)).collect();
         assert_eq!(tasks, [(20, 3, false), (10, 3, false)]);
+        assert_eq!((file.films.layout, file.films.layout.size()), (FilmLayout::SideBySide, [1000, 360]));
         assert_eq!(file.task[0].conditions, ["real", "model"]);
         assert_eq!(file.task[1].conditions, ["mismatched", "model"]);
         assert_eq!(file.find_condition("mismatched").unwrap().source, ConditionSource::Mismatched("model".into()));
@@ -169,6 +170,7 @@ mod tests {
     #[test]
     fn the_challenge_preset_mismatches_natural_motion_in_audio_tasks() {
         let file = read(&SMALLEST.replace("rebol", "genea2020"));
+        assert_eq!((file.films.layout, file.films.layout.size()), (FilmLayout::Separate, [800, 600]));
         assert_eq!(file.task[0].conditions, ["natural", "model"]);
         assert_eq!(file.task[1].conditions, ["natural", "mismatched", "model"]);
         assert_eq!((file.task[0].sound, file.task[1].sound, file.exclusion.failed_checks), (false, true, Some(2)));
@@ -189,6 +191,9 @@ mod tests {
             let path = dir.path().join("study.toml");
             file.write(&path).unwrap();
             assert_eq!(StudyFile::read(&path).unwrap(), file);
+            // Files of studies built before the key existed stay equal.
+            let has_layout = std::fs::read_to_string(&path).unwrap().contains("[films]");
+            assert_eq!(has_layout, file.films.layout == FilmLayout::SideBySide);
         }
     }
 
@@ -203,11 +208,20 @@ mod tests {
             one("[texts.en]\n\"study.titel\" = \"Hi\"\n"),
             ["line 11: texts.en.study.titel: unknown text of the page (did you mean study.title?)"]
         );
-        let wrong = one("[[task]]\nname = \"x\"\ndesign = \"sliders\"\ntrials = 3\nscale = \"appropriate\"\n");
+        let wrong = one("[[task]]\nname = \"x\"\ndesign = \"sliders\"\ntrials = 3\nscale = \"appropriate\"\n\
+                         [films]\nlayout = \"separate\"\n");
         assert_eq!(
             wrong,
             ["line 14: task[x].scale: \"appropriate\": expected human-likeness or appropriateness \
                             (did you mean appropriateness?)"]
+        );
+        assert_eq!(
+            one("[[task]]\nname = \"x\"\ndesign = \"turing-single\"\ntrials = 3\n"),
+            ["line 2: films.layout: a side-by-side film shows two avatars, which does not fit the task x: expected \
+              \"separate\", or only tasks of the designs turing, preference and mismatch"]
+        );
+        assert!(
+            one("[films]\nlayout = \"beside\"\n")[0].starts_with("line 11: films.layout: unknown value \"beside\"")
         );
         let wrong = one("[[task]]\nname = \"x\"\ndesign = \"turin\"\ntrials = 3\n");
         assert!(wrong[0].starts_with("line 12: task[x].design: unknown value \"turin\""), "{wrong:?}");

@@ -1,7 +1,7 @@
 //! Rules for study files beyond their types. Each violation gives a key and what was expected.
 
 use super::condition::{ConditionSource, StudyCondition};
-use super::study_file::{HypothesisKind, StudyFile, StudyHypothesis, StudyTask};
+use super::study_file::{FilmLayout, HypothesisKind, StudyFile, StudyHypothesis, StudyTask};
 use crate::pages::page_texts::text_keys;
 use crate::plan::TaskDesign;
 use orator_dataset::config::file::did_you_mean;
@@ -237,6 +237,14 @@ impl StudyRules<'_> {
         }
         if task.feedback && matches!(task.design, TaskDesign::Preference | TaskDesign::Sliders) {
             self.report(key("feedback"), "this design has no correct response to show: remove the key");
+        }
+        let shows_two = matches!(task.design, TaskDesign::Turing | TaskDesign::Preference | TaskDesign::Mismatch);
+        if self.file.films.layout == FilmLayout::SideBySide && !shows_two {
+            let message = format!("a side-by-side film shows two avatars, which does not fit the task {}", task.name);
+            self.report(
+                "films.layout",
+                message + ": expected \"separate\", or only tasks of the designs turing, preference and mismatch",
+            );
         }
         if task.design == TaskDesign::Mismatch && !task.sound {
             self.report(key("sound"), "the design mismatch requires sound: remove the key");

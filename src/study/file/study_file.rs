@@ -45,6 +45,8 @@ pub struct StudyFile {
     pub task_order: TaskOrder,
     #[serde(default)]
     pub clips: ClipSettings,
+    #[serde(default, skip_serializing_if = "FilmSettings::is_default")]
+    pub films: FilmSettings,
     #[serde(default)]
     pub exclusion: ExclusionRules,
     #[serde(default)]
@@ -118,6 +120,40 @@ pub enum ClipReuse {
     Never,
     /// In another task; for speakers with few clips.
     OtherTasks,
+}
+
+/// Settings of the films.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct FilmSettings {
+    pub layout: FilmLayout,
+}
+
+impl FilmSettings {
+    fn is_default(&self) -> bool {
+        *self == Self::default()
+    }
+}
+
+/// Distribution of the compared avatars over films.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum FilmLayout {
+    /// One avatar per film; the page plays the two films of a comparison together.
+    #[default]
+    Separate,
+    /// One film with both avatars of a comparison (Rebol et al. 2021, section 4.1).
+    SideBySide,
+}
+
+impl FilmLayout {
+    /// Width and height of the films, px.
+    pub const fn size(self) -> [usize; 2] {
+        match self {
+            Self::Separate => [800, 600],
+            Self::SideBySide => [1000, 360],
+        }
+    }
 }
 
 /// Speaker whose clips are shown; either `dataset` or `sounds` is set.

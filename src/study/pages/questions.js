@@ -9,6 +9,12 @@ export function questionKeys(task, phase) {
   return [`question.${task.name}`, `question.${task.scale || task.design}`];
 }
 
+// Whether the only film of a trial shows both avatars of a comparison.
+export const isSideBySide = (task, trial) => trial.films.length === 1 && task.design !== "turing-single";
+
+// Names of what is compared, left and right: two films, or the halves of one.
+export const sideNames = (trial) => (trial.films.length > 1 ? [t("film.left"), t("film.right")] : [t("film.a"), t("film.b")]);
+
 // Creates a question: `node` to show, `enable()` to call after the films were seen, `response()`, which is `null` until
 // it is answered.
 export function question(task, trial, onchange) {
@@ -24,7 +30,8 @@ export function question(task, trial, onchange) {
       return choice(legend, "five", options, (value) => ({ step: Number(value) }), onchange);
     }
     default: {
-      const options = [["left", t("film.left")], ["right", t("film.right")]];
+      const [left, right] = sideNames(trial);
+      const options = [["left", left], ["right", right]];
       return choice(legend, "two", options, (side) => ({ side }), onchange);
     }
   }

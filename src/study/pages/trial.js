@@ -2,7 +2,7 @@
 
 import { announce, button, el, show } from "./dom.js";
 import { Screening } from "./player.js";
-import { question, questionKeys, slider } from "./questions.js";
+import { isSideBySide, question, questionKeys, sideNames, slider } from "./questions.js";
 import { firstText, t } from "./texts.js";
 
 const filmUrl = (film) => `films/${film}.mp4`;
@@ -45,9 +45,11 @@ export function runTrial({ task, trial, heading, playsBefore, onplay }) {
   });
 }
 
-const captioned = (video, label) => {
-  video.setAttribute("aria-label", label);
-  return el("figure", {}, video, el("figcaption", { dir: "auto", "aria-hidden": "true" }, label));
+// A film with its name, or with the names of its left and right half.
+const captioned = (video, ...names) => {
+  video.setAttribute("aria-label", names.join(", "));
+  const captions = names.map((name) => el("span", { dir: "auto" }, name));
+  return el("figure", {}, video, el("figcaption", { "aria-hidden": "true" }, ...captions));
 };
 
 // Button that plays a screening; calls `onseen` after the first complete play. Without `replay` the films play once.
@@ -86,13 +88,15 @@ function playButton(screening, labels, replay, { onstart, onbegin, onseen, onend
   return play;
 }
 
-// One film, or two side by side and in synchrony.
+// One film of one avatar or of two side by side, or two films side by side and in synchrony.
 function filmsTogether(task, trial) {
   const screening = new Screening(trial.films.map(filmUrl));
-  const isPair = trial.films.length > 1;
-  const names = isPair ? [t("film.left"), t("film.right")] : [t("film.one")];
-  const films = screening.videos.map((video, at) => captioned(video, names[at]));
-  const stage = el("div", { class: isPair ? "films pair" : "films one", role: "group", "aria-label": t("films.group") }, ...films);
+  const isWide = isSideBySide(task, trial);
+  const isPair = trial.films.length > 1 || isWide;
+  const names = isPair ? sideNames(trial) : [t("film.one")];
+  const films = isWide ? [captioned(screening.videos[0], ...names)] : screening.videos.map((video, at) => captioned(video, names[at]));
+  const kind = isWide ? "wide" : "pair";
+  const stage = el("div", { class: `films ${isPair ? kind : "one"}`, role: "group", "aria-label": t("films.group") }, ...films);
   const asked = question(task, trial, () => view.onchange());
   const labels = { play: t(isPair ? "films.play.both" : "films.play.one"), again: t("films.play.again"), seen: t("films.seen") };
   const play = playButton(screening, labels, task.replay, {

@@ -1,20 +1,24 @@
-//! Renders one film: the faceless avatar before a plain backdrop with the sound of its clip, and a number in attention
-//! checks. All films of a study have the same size, rate and length; the mouth does not move.
+//! Renders one film: one faceless avatar, or two side by side, before a plain backdrop with the sound of a clip, and a
+//! number in attention checks. All films of a study have the same size, rate and length; the mouth does not move.
 
+use crate::file::FilmLayout;
 use crate::plan::{FilmContent, FilmSound};
-use anyhow::{Result, ensure};
+use anyhow::{Context, Result, ensure};
 use orator_avatar::animate::Performance;
+use orator_avatar::animate::avatar::Appearance;
+use orator_avatar::animate::export::film::smooth_rate;
 use orator_avatar::animate::export::film_avatar::{AvatarStage, AvatarView, FilmCamera};
 use orator_base::types::image::Image;
 use orator_base::types::sound::Sound;
+use orator_base::types::time::FrameRate;
 use orator_media::ffmpeg::write::encode::{VideoWriter, has_h264};
 use orator_media::opencv::draw;
 use std::path::Path;
 
-/// Width and height of the films of a study, px.
-pub const SIZE: [usize; 2] = [800, 600];
-/// Camera of all films of a study.
-pub const CAMERA: FilmCamera = FilmCamera::Front;
+/// Camera of the films with one avatar.
+const CAMERA: FilmCamera = FilmCamera::Front;
+/// Frame rate of side-by-side films.
+const SIDE_BY_SIDE_FPS: FrameRate = FrameRate::new(30, 1);
 /// Key derivation context of the film names.
 const NAME_CONTEXT: &str = "orator study 2026 names of films";
 /// Incremented when the same content gives different bytes.
@@ -25,9 +29,27 @@ const CRF: u32 = 20;
 const DIGIT_HEIGHT: f32 = 0.18;
 const PLATE_MARGIN: f32 = 0.27;
 
+/// Frame rate of the films of a motion at `fps`: 30 fps side by side, otherwise that of [`smooth_rate`].
+pub fn film_fps(layout: FilmLayout, fps: FrameRate) -> FrameRate {
+    match layout {
+        FilmLayout::Separate => smooth_rate(fps),
+        FilmLayout::SideBySide => SIDE_BY_SIDE_FPS,
+    }
+}
+
+/// Avatars and camera of the films of one speaker, of `size` px; `None` without a performance.
+pub fn stage(layout: FilmLayout, shown: &[&Performance], size: [usize; 2]) -> Option<AvatarStage> {
+    let appearance = Appearance::faceless();
+    match layout {
+        FilmLayout::Separate => AvatarStage::new(shown, &appearance, size, CAMERA),
+        FilmLayout::SideBySide => AvatarStage::side_by_side(shown, &appearance, size),
+    }
+}
+
 /// Content of a film.
 pub struct FilmScene<'a> {
-    pub performance: &'a Performance,
+    /// Performances of the avatars at the film's rate and of equal length, left to right.
+    pub performances: &'a [Performance],
     pub stage: &'a AvatarStage,
     /// Sound as long as the film; `None` for a silent film.
     pub sound: Option<&'a Sound>,
@@ -39,7 +61,7 @@ pub struct FilmScene<'a> {
 /// the content.
 pub fn film_name(seed: u64, content: &FilmContent) -> String {
     let key = blake3::derive_key(NAME_CONTEXT, &seed.to_le_bytes());
-    let FilmContent { clip, speaker, condition, motion_of, number, sound } = content;
+    let FilmContent { clip, speaker, condition, motion_of, number, sound, right } = content;
     let number = number.map_or(String::new(), |number| number.to_string());
     let sound = match sound {
         FilmSound::Speech => "speech",
@@ -47,7 +69,8 @@ pub fn film_name(seed: u64, content: &FilmContent) -> String {
         FilmSound::Tones => "tones",
     };
     let mut hasher = blake3::Hasher::new_keyed(&key);
-    for part in [clip.as_str(), speaker, condition, motion_of, &number, sound] {
+    let right = right.iter().flat_map(|right| [right.condition.as_str(), &right.motion_of]);
+    for part in [clip.as_str(), speaker, condition, motion_of, &number, sound].into_iter().chain(right) {
         // The length prefix makes the concatenation of parts unambiguous.
         hasher.update(&(part.len() as u64).to_le_bytes()).update(part.as_bytes());
     }
@@ -76,15 +99,17 @@ impl FilmScene<'_> {
                 hasher.update(&value.to_le_bytes());
             });
         };
-        let clip = &self.performance.clip;
-        numbers(&[f64::from(VERSION), f64::from(CRF), self.number.map_or(0.0, f64::from), clip.fps.per_sec()]);
+        let fps = self.performances.first().map_or(0.0, |performance| performance.clip.fps.per_sec());
+        numbers(&[f64::from(VERSION), f64::from(CRF), self.number.map_or(0.0, f64::from), fps]);
         numbers(&self.stage.camera.size.map(|px| px as f64));
         let camera = self.stage.camera;
         numbers(&[&[camera.focal_px, camera.axes.w][..], &camera.position, &camera.axes.v].concat());
-        clip.skeleton.joints.iter().for_each(|joint| numbers(&joint.offset));
-        for frame in 0..clip.n_frames() {
-            numbers(&clip.root_at(frame));
-            clip.local[frame].iter().for_each(|turn| numbers(&[&[turn.w][..], &turn.v].concat()));
+        for Performance { clip, .. } in self.performances {
+            clip.skeleton.joints.iter().for_each(|joint| numbers(&joint.offset));
+            for frame in 0..clip.n_frames() {
+                numbers(&clip.root_at(frame));
+                clip.local[frame].iter().for_each(|turn| numbers(&[&[turn.w][..], &turn.v].concat()));
+            }
         }
         for sample in self.sound.into_iter().flat_map(|sound| &sound.samples) {
             hasher.update(&sample.to_le_bytes());
@@ -93,13 +118,18 @@ impl FilmScene<'_> {
     }
 
     /// Writes the mp4 directly to `path`, not atomically.
+    ///
+    /// # Errors
+    /// The film has no avatar or cannot be written.
     pub fn write(&self, path: &Path) -> Result<()> {
-        let clip = &self.performance.clip;
-        let mut view = AvatarView::on(self.stage, self.performance);
-        let mut writer = VideoWriter::with_crf(path, self.stage.camera.size, clip.fps, self.sound, CRF)?;
-        for frame in 0..clip.n_frames() {
+        let first = self.performances.first().context("the film has no avatar")?;
+        let fps = first.clip.fps;
+        let n_frames = self.performances.iter().map(|performance| performance.clip.n_frames()).min().unwrap_or(0);
+        let mut view = AvatarView::on(self.stage, self.performances);
+        let mut writer = VideoWriter::with_crf(path, self.stage.camera.size, fps, self.sound, CRF)?;
+        for frame in 0..n_frames {
             let mut image = view.frame(frame, 0.0);
-            if let Some(number) = self.number.filter(|_| 3 * frame / clip.n_frames() == 1) {
+            if let Some(number) = self.number.filter(|_| 3 * frame / n_frames == 1) {
                 draw_number(&mut image, number)?;
             }
             writer.push(&image)?;
@@ -121,4 +151,42 @@ fn draw_number(image: &mut Image, number: u16) -> Result<()> {
         [250; 3],
     )?;
     draw::text(image, &text, [x - width / 2.0, y + digits / 2.0], digits, [20; 3])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_depend_on_the_right_avatar_and_otherwise_stay_the_same() {
+        let content = |condition: &str| FilmContent {
+            clip: "ellen/4".to_owned(),
+            speaker: "ellen".to_owned(),
+            condition: condition.to_owned(),
+            motion_of: "ellen/4".to_owned(),
+            number: None,
+            sound: FilmSound::Speech,
+            right: None,
+        };
+        let name = |content: &FilmContent| film_name(7, content);
+        // The name that versions before side-by-side films gave.
+        assert_eq!(name(&content("real")), "6d7eba505208690f");
+        let both = content("real").with_right(content("model"));
+        let swapped = content("model").with_right(content("real"));
+        assert_eq!(both.conditions().collect::<Vec<_>>(), ["real", "model"]);
+        let mut names = [name(&content("real")), name(&content("model")), name(&both), name(&swapped)];
+        names.sort();
+        assert!(names.windows(2).all(|pair| pair[0] != pair[1]), "{names:?}");
+        let json = serde_json::to_value(content("real")).unwrap();
+        assert!(json.get("right").is_none() && serde_json::from_value::<FilmContent>(json).unwrap() == content("real"));
+        let numbered = content("real").with_right(FilmContent { number: Some(42), ..content("model") });
+        assert_eq!(numbered.number, Some(42));
+    }
+
+    #[test]
+    fn side_by_side_films_have_thirty_frames_per_second() {
+        let [separate, side_by_side] =
+            [FilmLayout::Separate, FilmLayout::SideBySide].map(|layout| film_fps(layout, FrameRate::new(25, 1)));
+        assert_eq!((separate, side_by_side), (FrameRate::new(50, 1), FrameRate::new(30, 1)));
+    }
 }

@@ -4,15 +4,13 @@
 use super::common_motion::{CommonBody, CommonVisibility};
 use super::condition_motion::{ConditionModels, ShownMotion, motions, sound_of};
 use super::cut::{CutSpeech, StudyClip, cut};
-use super::film::{CAMERA, FilmScene};
+use super::film::{self, FilmScene};
 use super::speaker_source::SpeakerSource;
 use crate::file::{StudyFile, StudySpeaker};
 use crate::pages::assets::SOUND_CHECK_TONES;
 use crate::plan::{FilmContent, FilmSound};
 use anyhow::{Context, Result, bail};
 use orator_avatar::animate::Performance;
-use orator_avatar::animate::avatar::Appearance;
-use orator_avatar::animate::export::film::smooth_rate;
 use orator_avatar::animate::export::film_avatar::AvatarStage;
 use orator_base::audio::loudness;
 use orator_base::stage::progress::Progress;
@@ -78,7 +76,7 @@ impl CutSpeaker {
         };
         let fps = source.fps;
         let cut = cut(&source, fps.frames_in(file.clips.seconds), n_clips, rank)?;
-        let film_fps = smooth_rate(fps);
+        let film_fps = film::film_fps(file.films.layout, fps);
         let mut sounds = Vec::new();
         for of_segment in cut.clips.chunk_by(|a, b| a.segment == b.segment) {
             let segment = source.read(of_segment[0].segment)?;
@@ -124,9 +122,10 @@ impl CutSpeaker {
             .collect();
         drop(task);
         let shown: Vec<&Performance> = performances.values().flatten().map(|(_, performance)| performance).collect();
-        let stage = AvatarStage::new(&shown, &Appearance::faceless(), size, CAMERA);
+        let layout = file.films.layout;
+        let stage = film::stage(layout, &shown, size);
         let stage = stage.with_context(|| format!("the speaker {} has no clips", source.name))?;
-        let (clips, film_fps) = (cut.clips, smooth_rate(source.fps));
+        let (clips, film_fps) = (cut.clips, film::film_fps(layout, source.fps));
         Ok(FilmedSpeaker { clips, sounds, tones, film_fps, performances, stage })
     }
 }
@@ -154,7 +153,7 @@ impl FilmedSpeaker {
         self.clips.iter().position(|known| known.name == name)
     }
 
-    /// Name `speaker/clip` of the clip whose motion is shown in the film with this content.
+    /// Name `speaker/clip` of the clip whose motion is shown in the film with this content, by its left avatar.
     ///
     /// # Errors
     /// The speaker does not have the clip or the condition.
@@ -169,23 +168,32 @@ impl FilmedSpeaker {
         self.performances.get(&content.condition).and_then(|of_condition| of_condition.get(clip)).with_context(missing)
     }
 
-    /// Performance of the film with this content, at the film's rate.
+    /// Performance of the left avatar of the film with this content, at the film's rate.
     ///
     /// # Errors
     /// The speaker does not have the clip or the condition.
-    pub fn performance(&self, content: &FilmContent) -> Result<Performance> {
+    fn performance(&self, content: &FilmContent) -> Result<Performance> {
         let (_, performance) = self.shown(content)?;
         Ok(performance.resampled(self.film_fps))
     }
 
-    /// Scene of the film with this content.
-    pub fn scene<'a>(&'a self, content: &FilmContent, performance: &'a Performance) -> FilmScene<'a> {
+    /// Performances of the film with this content at the film's rate, left to right.
+    ///
+    /// # Errors
+    /// The speaker does not have the clip or a condition.
+    pub fn performances(&self, content: &FilmContent) -> Result<Vec<Performance>> {
+        let right = content.right_alone().map(|right| self.performance(&right));
+        std::iter::once(self.performance(content)).chain(right).collect()
+    }
+
+    /// Scene of the film with this content and its performances.
+    pub fn scene<'a>(&'a self, content: &FilmContent, performances: &'a [Performance]) -> FilmScene<'a> {
         let sound = match content.sound {
             FilmSound::Speech => self.find(&content.clip).and_then(|clip| self.sounds.get(clip)),
             FilmSound::Silence => None,
             FilmSound::Tones => self.tones.as_ref(),
         };
-        FilmScene { performance, stage: &self.stage, sound, number: content.number }
+        FilmScene { performances, stage: &self.stage, sound, number: content.number }
     }
 }
 

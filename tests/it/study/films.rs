@@ -93,16 +93,17 @@ fn films_of_all_conditions_differ_only_in_motion() {
         motion_of: name(1),
         number,
         sound: FilmSound::Speech,
+        right: None,
     };
     let (mut films, mut skeletons) = (Vec::new(), Vec::new());
     for (condition, number) in
         [("real", None), ("model", None), ("mismatched", None), ("still", None), ("theirs", None), ("real", Some(47))]
     {
         let content = content(condition, number);
-        let performance = host.performance(&content).unwrap();
-        let scene = host.scene(&content, &performance);
-        assert_eq!(performance.clip.n_frames(), 60);
-        skeletons.push(performance.rig.skeleton.clone());
+        let performances = host.performances(&content).unwrap();
+        let scene = host.scene(&content, &performances);
+        assert_eq!((performances.len(), performances[0].clip.n_frames()), (1, 60));
+        skeletons.push(performances[0].rig.skeleton.clone());
         let path = dir.join(format!("{condition}{}.mp4", number.unwrap_or(0)));
         scene.write(&path).unwrap();
         films.push(path);

@@ -12,3 +12,4 @@ mod serve_busy;
 mod serve_hostile;
 mod serve_load;
 mod server_killed;
+mod side_by_side;

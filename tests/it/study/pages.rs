@@ -60,6 +60,11 @@ fn take_part(study: &MadeStudy, address: &str, driver: &Path, options: &str) -> 
     let score = |k: usize| if k.is_multiple_of(2) { 0.9 } else { 0.1 };
     let scores: BTreeMap<_, _> = study.films.iter().enumerate().map(|(k, film)| (film, score(k))).collect();
     let rule = json!({ "scores": scores, "numbers": { &study.films[6]: 42 } });
+    answer_by(&rule, study, address, driver, options)
+}
+
+/// Takes part at `address` by a rule of `participant.mjs`, and returns the report of the participant.
+pub(super) fn answer_by(rule: &Value, study: &MadeStudy, address: &str, driver: &Path, options: &str) -> Value {
     let answers = study.path().join("answers.json");
     fs::write(&answers, rule.to_string()).unwrap();
     let mut command = Command::new("node");

@@ -2,9 +2,10 @@
 //
 //   node participant.mjs --url URL --answers FILE [--seed N] [--participants N] [--at-once N]
 //
-// FILE: {"scores": {FILM: 0 to 1}, "numbers": {FILM: NUMBER}, "certainty": 0 to 1}. The film of the higher score is
-// chosen, with the probability `certainty`; a single film is judged real above 0.5; sliders are set to the score.
-// An attention check is answered with the number of its film. Prints one line of JSON per participant.
+// FILE: {"scores": {FILM: 0 to 1}, "numbers": {FILM: NUMBER}, "certainty": 0 to 1}. A film of two avatars has two scores,
+// [LEFT, RIGHT]. The film or avatar of the higher score is chosen, with the probability `certainty`; a single film is
+// judged real above 0.5; sliders are set to the score. An attention check is answered with the number of its film. Prints
+// one line of JSON per participant.
 //
 // For tests of the page: --touch, --width, --height, --scheme dark, --language CODE, --audit (axe-core at every step),
 // --pictures DIR, --reload-at POSITION, --offline-at POSITION, --away-at POSITION, --interrupt-at POSITION,
@@ -70,8 +71,8 @@ const describe = (page) =>
 // Index of the option that the rule chooses.
 function chooseOption({ films, options: values }, draw) {
   const followsRule = draw() < rule.certainty;
-  const scores = films.map((film) => rule.scores[film] ?? 0.5);
-  if (films.length === 1) return (scores[0] > 0.5) === followsRule ? 0 : 1;
+  const scores = films.flatMap((film) => rule.scores[film] ?? 0.5);
+  if (scores.length === 1) return (scores[0] > 0.5) === followsRule ? 0 : 1;
   const difference = (scores[1] - scores[0]) * (followsRule ? 1 : -1);
   if (values.length === 2) return difference === 0 ? Math.floor(2 * draw()) : Number(difference > 0);
   return Math.max(0, Math.min(4, 2 + Math.sign(difference) * Math.ceil(2 * Math.abs(difference))));
