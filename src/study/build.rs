@@ -98,7 +98,9 @@ pub fn build(file: &StudyFile, out: &Path, size: [usize; 2], progress: &dyn Prog
     let mut key = StudyKey { films: BTreeMap::new() };
     let designed = design(file, &clips, &mut |mut content| {
         let speaker = filmed.get(&content.speaker).with_context(|| format!("unknown speaker {}", content.speaker))?;
-        content.motion_of = speaker.motion_of(&content)?;
+        if content.motion_of == content.clip {
+            content.motion_of = speaker.motion_of(&content)?;
+        }
         let name = film_name(file.seed, &content);
         let is_unique = key.films.insert(name.clone(), content.clone()).is_none_or(|other| other == content);
         ensure!(is_unique, "two films have the name {name}: choose another seed");
