@@ -80,7 +80,7 @@ fn a_drawn_mismatched_film_shows_the_motion_of_the_clip_that_is_named() {
         assert!(mismatched == own, "{clip} {of}");
         assert!(mismatched != film("real", clip, clip).unwrap().clip, "{clip} {of}");
     }
-    let error = film("mismatched", 0, 9).err().unwrap().to_string();
+    let error = film("mismatched", 0, 9).unwrap_err().to_string();
     assert!(error.contains("no motion of the clip host/none"), "{error}");
 }
 
