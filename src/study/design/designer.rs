@@ -147,11 +147,11 @@ impl Designer<'_> {
 
     /// Film with tones for the sound check; its clip occurs in no trial other than practice.
     pub(super) fn sound_check(&mut self) -> Result<String> {
-        let clip = self.clip(0, 0, self.shared.first().and_then(|shared| shared.practice.first()), None)?;
         let comparison = self.tasks.first().and_then(|task| task.comparisons.first());
         let condition =
             comparison.and_then(|comparison| comparison.first()).context("the study compares no conditions")?;
         let shown = vec![(condition.name.clone(), None)];
+        let clip = self.clip(0, 0, self.shared.first().and_then(|shared| shared.practice.first()), None)?;
         self.films(&clip, shown, FilmSound::Tones).map(|films| films.concat())
     }
 
