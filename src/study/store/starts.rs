@@ -1,5 +1,5 @@
-//! Starts of trials: in how many loads of the page the films of a trial began to play. More than one means that the page
-//! was reloaded and that films were seen again.
+//! Starts of trials: in how many loads of the page the films of a trial began to play. If it is more than one, the page
+//! was reloaded and films were seen again.
 
 use super::participants::{Status, find};
 use rusqlite::{Connection, params};
