@@ -98,8 +98,12 @@ pub fn build(file: &StudyFile, out: &Path, size: [usize; 2], progress: &dyn Prog
     let mut key = StudyKey { films: BTreeMap::new() };
     let designed = design(file, &clips, &mut |mut content| {
         let speaker = filmed.get(&content.speaker).with_context(|| format!("unknown speaker {}", content.speaker))?;
-        content.motion_of = speaker.motion_of(&content)?;
-        if let (Some(alone), Some(right)) = (content.right_alone(), &mut content.right) {
+        if content.motion_of == content.clip {
+            content.motion_of = speaker.motion_of(&content)?;
+        }
+        if let (Some(alone), Some(right)) = (content.right_alone(), &mut content.right)
+            && right.motion_of == content.clip
+        {
             right.motion_of = speaker.motion_of(&alone)?;
         }
         let name = film_name(file.seed, &content);

@@ -5,8 +5,8 @@ use super::file::StudyFile;
 use super::folder::{StudyFolder, read_json};
 use super::plan::{StudyKey, StudyPlan, TaskDesign};
 use super::store::answers::{self, SubmittedAnswer};
-use super::store::database;
 use super::store::participants::{self, PARAMETERS, Participant, Status};
+use super::store::{database, starts};
 use super::vote::{Response, StudyVote, VOTE_COLUMNS};
 use anyhow::{Context, Result};
 use orator_base::stage::workdir;
@@ -78,8 +78,10 @@ pub fn responses(folder: &StudyFolder) -> Result<(Vec<Participant>, Vec<StudyVot
     db.execute_batch("BEGIN")?;
     let (all, mut votes) = (participants::all(&db)?, Vec::new());
     for participant in &all {
+        let reloads = starts::reloads(&db, &participant.id)?;
         for answer in answers::of(&db, &participant.id)? {
-            votes.push(joined.vote(participant, answer)?);
+            let reloads = reloads.get(&answer.position).copied().unwrap_or_default();
+            votes.push(joined.vote(participant, answer, reloads)?);
         }
     }
     Ok((all, votes))
@@ -104,7 +106,7 @@ impl JoinedPlan {
         right_response(design, &shown?)
     }
 
-    fn vote(&self, participant: &Participant, answer: SubmittedAnswer) -> Result<StudyVote> {
+    fn vote(&self, participant: &Participant, answer: SubmittedAnswer, reloads: u32) -> Result<StudyVote> {
         let context = || {
             format!(
                 "answer {} of the participant {} is not in plan.json and key.json: restore the files of the build",
@@ -135,6 +137,7 @@ impl JoinedPlan {
             unfocused_secs: answer.unfocused_secs,
             response_secs: answer.response_secs,
             plays: answer.plays,
+            reloads,
             completed: participant.status == Status::Completed,
         })
     }

@@ -1,5 +1,5 @@
 //! User study of gesture generation: films of several conditions are built and sealed, served to participants in a
-//! browser, and the responses are collected and analysed (Rebol, Guetl, Pietroszek 2021, section V; Kucherenko et al.
+//! browser, and the responses are collected and analysed (Rebol, Guetl, Pietroszek 2021, section 4; Kucherenko et al.
 //! 2021). `file` is the study file that a researcher writes, `folder` the layout on disk, `plan` the trials that each
 //! participant sees.
 

@@ -146,6 +146,7 @@ mod tests {
         let file = StudyFile::read(&path).unwrap();
         let registration = Preregistration::new(&file);
         assert_eq!((registration.participants, registration.sessions), (100, 150));
+        assert!(registration.exclusion.reloaded && registration.exclusion == file.exclusion);
         assert_eq!(registration.tasks.iter().map(|task| task.votes).collect::<Vec<_>>(), [2000, 1000]);
         assert!(registration.hypotheses.iter().map(|hypothesis| &hypothesis.claim).eq(&file.hypothesis));
         assert!(

@@ -29,7 +29,7 @@ pub enum Response {
 }
 
 /// Columns of a table of votes: the fields of [`StudyVote`] in declaration order.
-pub const VOTE_COLUMNS: [&str; 15] = [
+pub const VOTE_COLUMNS: [&str; 16] = [
     "participant",
     "task",
     "design",
@@ -44,6 +44,7 @@ pub const VOTE_COLUMNS: [&str; 15] = [
     "unfocused_secs",
     "response_secs",
     "plays",
+    "reloads",
     "completed",
 ];
 
@@ -73,6 +74,9 @@ pub struct StudyVote {
     pub response_secs: f64,
     /// Number of times the films were played.
     pub plays: u32,
+    /// Number of times the page was reloaded after a film of the trial began to play.
+    #[serde(default)]
+    pub reloads: u32,
     /// Whether the participant completed the session.
     pub completed: bool,
 }
@@ -96,6 +100,7 @@ impl StudyVote {
             unfocused_secs: 0.0,
             response_secs: 4.25,
             plays: 2,
+            reloads: 0,
             completed: true,
         }
     }

@@ -89,7 +89,8 @@ fn serve(args: &ServeArgs, ui: &Ui) -> Result<Outcome> {
 ///
 /// This also works while the study is being served. `votes` has a row per answered trial: participant, task, design,
 /// phase, trial (from 1), clip, speaker, conditions (from left to right), response and expected (left or right; real
-/// or generated; -2 to 2; scores; a number), stalled_secs, unfocused_secs, response_secs, plays, completed.
+/// or generated; -2 to 2; scores; a number), stalled_secs, unfocused_secs, response_secs, plays, reloads (after a film
+/// began), completed.
 ///
 /// `participants` has a row per participant: participant, place, language, status (active, completed, replaced),
 /// answers, failed_checks, begun_ms (Unix time, milliseconds), code, and the parameters passed by the recruiting

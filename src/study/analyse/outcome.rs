@@ -1,6 +1,6 @@
 //! Converts the votes of a task to numbers: indices of participants and clips, and scores.
 
-use super::result::ShareMeasure;
+use super::result::{ClipShare, ShareMeasure};
 use crate::plan::TaskDesign;
 use crate::stats::cluster::votes::ClipVote;
 use crate::vote::{Response, ScreenSide, StudyVote};
@@ -101,6 +101,23 @@ pub fn binary<'v>(votes: &[&'v StudyVote], numbering: &Numbering, measure: Share
         Some(BinaryVote { vote: numbering.vote(vote, score), speaker: &vote.speaker, condition, sides })
     };
     votes.iter().filter_map(one).collect()
+}
+
+/// Proportion of successes by clip, in alphabetical order of speakers and clips.
+pub fn clip_shares(votes: &[BinaryVote], numbering: &Numbering) -> Vec<ClipShare> {
+    let mut counts = vec![(0, 0); numbering.clips.len()];
+    for BinaryVote { vote, .. } in votes {
+        if let Some((n_votes, n_successes)) = counts.get_mut(vote.clip) {
+            *n_votes += 1;
+            *n_successes += u64::from(vote.score == 1.0);
+        }
+    }
+    let share = |((speaker, clip), index): (&(&str, &str), &usize)| {
+        let (n_votes, n_successes) = counts.get(*index).copied().filter(|(n_votes, _)| *n_votes > 0)?;
+        let [speaker, clip] = [speaker, clip].map(|name| (*name).to_owned());
+        Some(ClipShare { speaker, clip, n_votes, n_successes, share: n_successes as f64 / n_votes as f64 })
+    };
+    numbering.clips.iter().filter_map(share).collect()
 }
 
 /// Conditions in alphabetical order.

@@ -115,6 +115,9 @@ pub struct TaskAnalysis {
     /// Proportions: all votes first, then by speaker and by condition. Empty for preferences and sliders.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub shares: Vec<ShareAnalysis>,
+    /// Proportions by clip, of the measure of the first of `shares`.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub clips: Vec<ClipShare>,
     /// Scores by condition, highest median first. Sliders only.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub scores: Vec<ScoreAnalysis>,
@@ -161,6 +164,9 @@ pub struct ShareAnalysis {
     pub n_participants: usize,
     pub n_clips: usize,
     pub share: f64,
+    /// Standard deviation of the participants' own proportions; `None` with fewer than two participants.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub participant_sd: Option<f64>,
     #[serde(flatten)]
     pub statistics: StatisticSet,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -176,6 +182,16 @@ impl ShareAnalysis {
             ShareMeasure::MatchedChosen | ShareMeasure::Correct | ShareMeasure::JudgedReal => self.share,
         }
     }
+}
+
+/// Proportion of the votes about one clip.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ClipShare {
+    pub speaker: String,
+    pub clip: String,
+    pub n_votes: u64,
+    pub n_successes: u64,
+    pub share: f64,
 }
 
 /// Scores of a condition.

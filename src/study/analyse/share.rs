@@ -5,7 +5,7 @@ use super::result::{ModelEstimate, ShareAnalysis, ShareMeasure, StatisticSetting
 use super::statistic::{StatisticMethod, StatisticSet, TestResult};
 use crate::stats::cluster::crossed::crossed_estimate;
 use crate::stats::cluster::sign_flips::{SideBlock, side_p, sign_flip_p};
-use crate::stats::cluster::votes::{ClipVote, participant_estimate};
+use crate::stats::cluster::votes::{ClipVote, participant_estimate, participant_sd};
 use crate::stats::equivalence::Equivalence;
 use crate::stats::glmm::fit::MixedLogit;
 use crate::stats::proportion::BinomialCount;
@@ -45,6 +45,7 @@ pub fn share(cell: &ShareCell, settings: &StatisticSettings) -> ShareAnalysis {
         n_participants,
         n_clips,
         share: n_successes as f64 / votes.len().max(1) as f64,
+        participant_sd: participant_sd(&votes),
         statistics: found,
         model: None,
         conclusion: TestOutcome::Untested,

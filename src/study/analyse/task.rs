@@ -1,7 +1,9 @@
 //! Analysis of one task: the cells of its design, its families of tests, inter-rater agreement.
 
 use super::conclusions::conclusions;
-use super::outcome::{BinaryVote, Numbering, binary, conditions, differences, measure, name_pairs, scores};
+use super::outcome::{
+    BinaryVote, Numbering, binary, clip_shares, conditions, differences, measure, name_pairs, scores,
+};
 use super::pair::{overall, pairs, score_table, single_pairs};
 use super::result::{ShareAnalysis, ShareMeasure, StatisticSettings, TaskAnalysis};
 use super::share::{ShareCell, conclude, share};
@@ -40,6 +42,7 @@ pub fn task(name: &str, votes: &[&StudyVote], settings: &StatisticSettings) -> R
         speakers: speakers.into_iter().filter(|name| !name.is_empty()).map(str::to_owned).collect(),
         conclusions: Vec::new(),
         shares: Vec::new(),
+        clips: Vec::new(),
         scores: Vec::new(),
         pairs: Vec::new(),
         overall: None,
@@ -68,6 +71,7 @@ fn binary_task(
     settings: &StatisticSettings,
 ) {
     let all = binary(votes, numbering, measure);
+    analysis.clips = clip_shares(&all, numbering);
     let cell = |measure, speaker: Option<&str>, condition: Option<&str>, votes: Vec<BinaryVote>| {
         let [speaker, condition] = [speaker, condition].map(|name| name.map(str::to_owned));
         share(&ShareCell { measure, speaker, condition, votes }, settings)
@@ -152,4 +156,51 @@ fn agreement(votes: &[&StudyVote], numbering: &Numbering, analysis: &TaskAnalysi
         votes.iter().for_each(|vote| units.entry((group, vote.clip)).or_default().push(vote.score));
     }
     alpha(&units.into_values().collect::<Vec<_>>(), scale)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::vote::{Response, ScreenSide};
+
+    /// Three participants and two clips of each of two speakers; the right film is chosen in five of eight votes.
+    #[test]
+    fn shares_of_participants_and_clips_are_those_computed_by_hand() {
+        let side = |is_right: bool| Response::Side(if is_right { ScreenSide::Left } else { ScreenSide::Right });
+        let rows = [
+            ("a", "x/1", true),
+            ("a", "x/2", true),
+            ("a", "y/1", false),
+            ("a", "y/2", true),
+            ("b", "x/1", true),
+            ("b", "y/1", false),
+            ("c", "x/1", false),
+            ("c", "y/2", true),
+        ];
+        let votes = rows.map(|(participant, clip, is_right)| StudyVote {
+            participant: participant.to_owned(),
+            clip: clip.to_owned(),
+            speaker: clip[..1].to_owned(),
+            expected: Some(side(true)),
+            ..StudyVote::example(TaskDesign::Mismatch, &["model", "other"], side(is_right))
+        });
+        let settings = StatisticSettings { n_draws: 0, with_models: false, ..StatisticSettings::default() };
+        let of = |votes: &[StudyVote]| task("t", &votes.iter().collect::<Vec<_>>(), &settings).unwrap();
+        let found = of(&votes);
+        // Participants: 3/4, 1/2, 1/2 of all votes; 2/2, 1/1, 0/1 about x; 1/2, 0/1, 1/1 about y.
+        let expected = [(0.625, (1.0f64 / 48.0).sqrt()), (0.75, (1.0f64 / 3.0).sqrt()), (0.5, 0.5)];
+        for (share, (value, sd)) in found.shares.iter().zip(expected) {
+            assert_eq!(share.share, value);
+            assert!((share.participant_sd.unwrap() - sd).abs() < 1e-12, "{:?}", share.participant_sd);
+        }
+        let clips = |analysis: &TaskAnalysis| -> Vec<(String, u64, u64, f64)> {
+            analysis.clips.iter().map(|row| (row.clip.clone(), row.n_successes, row.n_votes, row.share)).collect()
+        };
+        let expected = [("x/1", 2, 3, 2.0 / 3.0), ("x/2", 1, 1, 1.0), ("y/1", 0, 2, 0.0), ("y/2", 2, 2, 1.0)];
+        assert_eq!(clips(&found), expected.map(|(clip, chosen, n, share)| (clip.to_owned(), chosen, n, share)));
+        // In a Turing test, the share is that of the generated film.
+        let turing = votes.map(|vote| StudyVote { design: TaskDesign::Turing, ..vote });
+        let expected = [("x/1", 1, 3, 1.0 / 3.0), ("x/2", 0, 1, 0.0), ("y/1", 2, 2, 1.0), ("y/2", 0, 2, 0.0)];
+        assert_eq!(clips(&of(&turing)), expected.map(|(clip, chosen, n, share)| (clip.to_owned(), chosen, n, share)));
+    }
 }

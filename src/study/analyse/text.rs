@@ -2,7 +2,7 @@
 
 use super::conclusions::scope;
 use super::number_format::{bare_p, count, counted, p_value, percent, percents, points};
-use super::result::{StudyAnalysis, TaskAnalysis};
+use super::result::{ClipShare, StudyAnalysis, TaskAnalysis};
 use super::statistic::{StatisticMethod, StatisticRow};
 use orator_base::text::number;
 use std::fmt::Write as _;
@@ -76,6 +76,10 @@ fn rows(task: &TaskAnalysis) -> String {
     for share in &task.shares {
         let (scope, percent, votes) = (scope(share), percent(share.share), count(share.n_votes as usize));
         let _ = writeln!(text, "\n  {scope:<46} {percent:>8} of {votes:>8} votes");
+        if let Some(sd) = share.participant_sd {
+            let (name, sd) = ("standard deviation over participants", format!("{:.1} points", 100.0 * sd));
+            let _ = writeln!(text, "    {name:<44} {sd:>16}");
+        }
         for StatisticRow { origin, interval, test } in share.statistics.rows() {
             let name = format!("{}{}", origin.method.name(), if origin.naive { ", naive" } else { "" });
             let interval = interval.map(percents).unwrap_or_default();
@@ -96,6 +100,17 @@ fn rows(task: &TaskAnalysis) -> String {
             let _ =
                 writeln!(text, "    {name:<44} {outcome:>16}  p {}{}", bare_p(test.p), mark(test.origin.exploratory));
         }
+    }
+    if !task.clips.is_empty() {
+        text += "\n  shares per clip\n";
+    }
+    for ClipShare { speaker, clip, n_votes, share, .. } in &task.clips {
+        let _ = writeln!(
+            text,
+            "    {speaker:<20} {clip:<23} {:>16} of {:>8} votes",
+            percent(*share),
+            count(*n_votes as usize)
+        );
     }
     for row in &task.scores {
         let interval = row.statistics.interval(StatisticMethod::Median);

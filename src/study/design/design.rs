@@ -23,7 +23,8 @@ pub struct DesignedStudy {
 
 /// Designs the sessions of a study. `clips` holds names `speaker/clip` by speaker, best first, each with motion for
 /// every condition; the same number is used of every speaker. `film` returns the opaque name of the film with the given
-/// content and determines `motion_of` itself.
+/// content. Its `motion_of` is the clip itself, except in mismatched films whose other clip is drawn per participant; a
+/// fixed one is determined by `film`.
 ///
 /// # Errors
 /// A speaker has too few clips, or `film` fails.
@@ -236,6 +237,69 @@ mod tests {
         }
         let sound_check = &one_films[&one.plan.sound_check];
         assert!(sound_check.right.is_some() && sound_check.sound == FilmSound::Tones);
+    }
+
+    #[test]
+    fn training_of_all_tasks_may_precede_the_first_main_trial() {
+        let tasks = [(TaskDesign::Turing, 4, 2), (TaskDesign::Mismatch, 4, 3)];
+        let of = |first: bool| {
+            let file = file(&tasks, 1, 1, &format!("participants = 9\npractice = false\ntraining_first = {first}"));
+            let (study, films) = designed(&file, &[ClipNeeds::of(&file).total()]).unwrap();
+            check(&file, &study, &films);
+            study.plan.sessions
+        };
+        let is_training = |trial: &Trial| trial.phase == TrialPhase::Training;
+        for (by_task, first) in of(false).into_iter().zip(of(true)) {
+            assert!(first.trials[..5].iter().all(is_training) && !by_task.trials[..5].iter().all(is_training));
+            let kinds = |session: PlannedSession| session.trials.into_iter().partition::<Vec<Trial>, _>(is_training);
+            assert_eq!(kinds(first), kinds(by_task), "the trials of each kind and their order are equal");
+        }
+    }
+
+    #[test]
+    fn mismatched_clips_are_drawn_uniformly_for_each_session() {
+        let of = |participants: usize, seed: u64, more: &str| {
+            let head = format!("participants = {participants}\nseed = {seed}\n[clips]\n{more}");
+            let file = file(&[(TaskDesign::Mismatch, 6, 2)], 1, 1, &head);
+            let (study, films) = designed(&file, &[ClipNeeds::of(&file).total()]).unwrap();
+            check(&file, &study, &films);
+            (study.plan.sessions, films)
+        };
+        let drawn = "mismatched = \"per-participant\"";
+        let (sessions, films) = of(600, 1, drawn);
+        assert_eq!(of(10, 1, drawn).0[..], sessions[..15], "more participants change no earlier session");
+        assert_ne!(of(10, 2, drawn).0[..], sessions[..15]);
+        assert!(of(10, 1, "").1.values().all(|film| film.motion_of == film.clip), "fixed clips are not designed");
+        let (mut counts, mut of_checks) = (BTreeMap::<_, u32>::new(), BTreeMap::<_, BTreeSet<_>>::new());
+        let mut in_task = BTreeSet::new();
+        for trial in sessions.iter().flat_map(|session| &session.trials) {
+            for film in trial.films.iter().map(|film| &films[film]) {
+                if film.condition != "x0" {
+                    assert_eq!(film.motion_of, film.clip);
+                    continue;
+                }
+                assert_ne!(film.motion_of, film.clip);
+                match trial.phase {
+                    TrialPhase::Main => *counts.entry((&film.clip, &film.motion_of)).or_default() += 1,
+                    TrialPhase::AttentionCheck => _ = of_checks.entry(&film.clip).or_default().insert(&film.motion_of),
+                    TrialPhase::Practice | TrialPhase::Training => {}
+                }
+                if matches!(trial.phase, TrialPhase::Main | TrialPhase::Training) {
+                    in_task.insert(&film.clip);
+                }
+            }
+        }
+        // Six clips, each with the seven others of the task: 36 degrees of freedom, of which 80 is the quantile 0.9999.
+        assert_eq!((counts.len(), in_task.len()), (6 * 7, 8));
+        assert!(counts.keys().all(|(_, other)| in_task.contains(other)));
+        let expected = 900.0 / 7.0;
+        let chi_square: f64 = counts.values().map(|n| (f64::from(*n) - expected).powi(2) / expected).sum();
+        assert!(chi_square < 80.0, "{chi_square}: {counts:?}");
+        assert!(of_checks.len() == 2 && of_checks.values().all(|others| others.len() == 1), "{of_checks:?}");
+        let head = format!("participants = 1\nattention_checks = 0\n[clips]\n{drawn}");
+        let single = file(&[(TaskDesign::Mismatch, 1, 0)], 1, 1, &head);
+        let error = designed(&single, &[ClipNeeds::of(&single).total()]).unwrap_err().to_string();
+        assert!(error.contains("needs at least 2"), "{error}");
     }
 
     #[test]

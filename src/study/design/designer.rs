@@ -2,13 +2,13 @@
 //! the main trials.
 
 use super::clip_needs::SharedClips;
-use super::clip_scheduler::ClipScheduler;
+use super::clip_scheduler::{ClipScheduler, stream};
 use super::latin_square::SquareRows;
 use super::task_design::{AssignedTrial, TaskBalance, TaskDesigner, assign, right_response};
 use crate::file::{FilmLayout, StudyCondition, StudyFile, StudyTask, TaskOrder};
 use crate::plan::{FilmContent, FilmSound, PlannedSession, Trial, TrialPhase};
 use crate::vote::Response;
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, ensure};
 use rand::Rng;
 use rand::seq::SliceRandom;
 use rand_chacha::ChaCha8Rng;
@@ -29,8 +29,9 @@ pub(super) struct Designer<'a> {
     pub film: &'a mut dyn FnMut(FilmContent) -> Result<String>,
 }
 
-/// Names of a clip and of its speaker.
-type NamedClip = [String; 2];
+/// Names of a clip, of its speaker, and of the clip whose motion mismatched conditions show; unless the design draws
+/// that, the clip itself.
+type NamedClip = [String; 3];
 
 impl Designer<'_> {
     /// Builds the session with this index; sessions must be built in ascending order.
@@ -47,18 +48,21 @@ impl Designer<'_> {
         let mut checks = assign(&mut self.check_schedulers, check_positions.len(), session);
         checks.shuffle(&mut self.rng);
         let (mut trials, mut n_before) = (Vec::new(), 0);
-        for (nth, at) in order.into_iter().enumerate() {
-            if nth == 0 && self.file.practice {
-                for trial in self.tasks[at].practice(session) {
-                    let clip =
-                        self.clip(trial.speaker, self.shared[trial.speaker].practice.get(trial.assigned.clip))?;
-                    trials.push(self.trial(at, TrialPhase::Practice, clip, trial)?);
-                }
+        if let Some(at) = order.first().copied().filter(|_| self.file.practice) {
+            for trial in self.tasks[at].practice(session) {
+                let clip = self.shared[trial.speaker].practice.get(trial.assigned.clip);
+                let clip = self.clip(at, trial.speaker, clip, None)?;
+                trials.push(self.trial(at, TrialPhase::Practice, clip, trial)?);
             }
-            for trial in self.tasks[at].training(session) {
-                let clip =
-                    self.clip(trial.speaker, self.shared[trial.speaker].training[at].get(trial.assigned.clip))?;
-                trials.push(self.trial(at, TrialPhase::Training, clip, trial)?);
+        }
+        if self.file.training_first {
+            for at in &order {
+                trials.extend(self.training(*at, session)?);
+            }
+        }
+        for at in order {
+            if !self.file.training_first {
+                trials.extend(self.training(at, session)?);
             }
             let main = self.tasks[at].main(session);
             if session < self.file.participants {
@@ -70,7 +74,8 @@ impl Designer<'_> {
                 {
                     trials.push(self.check(at, check)?);
                 }
-                let clip = self.clip(trial.speaker, self.shared[trial.speaker].main[at].get(trial.assigned.clip))?;
+                let clip = self.shared[trial.speaker].main[at].get(trial.assigned.clip);
+                let clip = self.clip(at, trial.speaker, clip, Some(session))?;
                 trials.push(self.trial(at, TrialPhase::Main, clip, trial)?);
                 n_before += 1;
             }
@@ -78,9 +83,37 @@ impl Designer<'_> {
         Ok(PlannedSession { trials })
     }
 
-    fn clip(&self, speaker: usize, clip: Option<&String>) -> Result<NamedClip> {
+    /// Training trials of a task in a session.
+    fn training(&mut self, at: usize, session: usize) -> Result<Vec<Trial>> {
+        let assigned = self.tasks[at].training(session);
+        let trial = |trial: AssignedTrial| {
+            let clip = self.shared[trial.speaker].training[at].get(trial.assigned.clip);
+            let clip = self.clip(at, trial.speaker, clip, Some(session))?;
+            self.trial(at, TrialPhase::Training, clip, trial)
+        };
+        assigned.into_iter().map(trial).collect()
+    }
+
+    /// Names of a clip shown in a task. The clip of mismatched motion is drawn for the session, or without one for all
+    /// sessions alike, so that practice and attention checks need few films.
+    fn clip(&self, at: usize, speaker: usize, clip: Option<&String>, session: Option<usize>) -> Result<NamedClip> {
         let clip = clip.context("the design assigns a clip that does not exist")?;
-        Ok([clip.clone(), self.file.speaker[speaker].name.clone()])
+        let (task, name) = (self.tasks[at].task, &self.file.speaker[speaker].name);
+        let drawn = self.file.drawn_conditions();
+        if !task.conditions.iter().any(|condition| drawn.contains_key(condition.as_str())) {
+            return Ok([clip.clone(), name.clone(), clip.clone()]);
+        }
+        let of_task = self.shared[speaker].training[at].iter().chain(&self.shared[speaker].main[at]);
+        let others: Vec<&String> = of_task.filter(|other| *other != clip).collect();
+        ensure!(
+            !others.is_empty(),
+            "the task {} has one clip of the speaker {name}, but its mismatched condition needs at least 2: use more \
+             trials, or mismatched = \"fixed\" in [clips]",
+            task.name
+        );
+        let of_session = session.map_or(String::new(), |session| session.to_string());
+        let mut rng = stream(self.file.seed, &format!("{} mismatched {clip} {of_session}", task.name));
+        Ok([clip.clone(), name.clone(), others[rng.random_range(0..others.len())].clone()])
     }
 
     fn trial(&mut self, at: usize, phase: TrialPhase, clip: NamedClip, trial: AssignedTrial) -> Result<Trial> {
@@ -106,28 +139,31 @@ impl Designer<'_> {
         let shown = |index: &usize| (comparison[*index].name.clone(), (*index == numbered).then_some(number));
         let shown = row.iter().map(shown).collect();
         let sound = film_sound(task.task);
-        let clip = self.clip(check.speaker, self.shared[check.speaker].checks.get(check.assigned.clip))?;
+        let clip = self.shared[check.speaker].checks.get(check.assigned.clip);
+        let clip = self.clip(at, check.speaker, clip, None)?;
         let films = self.films(&clip, shown, sound)?;
         Ok(Trial { task: at, phase: TrialPhase::AttentionCheck, films, expected: Some(Response::Number(number)) })
     }
 
     /// Film with tones for the sound check; its clip occurs in no trial other than practice.
     pub(super) fn sound_check(&mut self) -> Result<String> {
-        let clip = self.clip(0, self.shared.first().and_then(|shared| shared.practice.first()))?;
         let comparison = self.tasks.first().and_then(|task| task.comparisons.first());
         let condition =
             comparison.and_then(|comparison| comparison.first()).context("the study compares no conditions")?;
         let n_avatars = if self.file.films.layout == FilmLayout::SideBySide { 2 } else { 1 };
         let shown = vec![(condition.name.clone(), None); n_avatars];
+        let clip = self.clip(0, 0, self.shared.first().and_then(|shared| shared.practice.first()), None)?;
         self.films(&clip, shown, FilmSound::Tones).map(|films| films.concat())
     }
 
     /// Names of the films of a clip, one per condition with the number that it shows, if any; one for both conditions of
     /// a side-by-side film.
     fn films(&mut self, clip: &NamedClip, shown: Vec<(String, Option<u16>)>, sound: FilmSound) -> Result<Vec<String>> {
-        let content = |(condition, number)| {
-            let [clip, speaker] = clip.clone();
-            FilmContent { motion_of: clip.clone(), clip, speaker, condition, number, sound, right: None }
+        let drawn = self.file.drawn_conditions();
+        let content = |(condition, number): (String, Option<u16>)| {
+            let [clip, speaker, other] = clip.clone();
+            let motion_of = if drawn.contains_key(condition.as_str()) { other } else { clip.clone() };
+            FilmContent { motion_of, clip, speaker, condition, number, sound, right: None }
         };
         let mut contents: Vec<FilmContent> = shown.into_iter().map(content).collect();
         if self.file.films.layout == FilmLayout::SideBySide {

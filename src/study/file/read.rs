@@ -3,6 +3,7 @@
 use super::layers::{self, StudyPreset};
 use super::rules;
 use super::study_file::{StudyFile, fill_defaults};
+use crate::pages::page_texts::text_keys;
 use anyhow::{Context, Result};
 use orator_base::input;
 use orator_base::stage::workdir;
@@ -58,6 +59,7 @@ pub(super) fn resolve(text: &str, file: &Path) -> Result<StudyFile, Vec<Problem>
     let mut study = read.map_err(|error| vec![problem_of_error(text, &error, &spans)])?;
     study.preset = None;
     fill_defaults(&mut study);
+    drop_unused_texts(&mut study, &spans);
     let folder = file.parent().unwrap_or(Path::new(""));
     paths_mut(&mut study).for_each(|path| *path = folder.join(&path));
     let line_of_key = |key: &str| spans.get(key).map(|span| line_of(text, span.start));
@@ -69,6 +71,18 @@ pub(super) fn resolve(text: &str, file: &Path) -> Result<StudyFile, Vec<Problem>
     let mut problems: Vec<Problem> = problems.collect();
     problems.sort_by(|a, b| (a.location, &a.key).cmp(&(b.location, &b.key)));
     if problems.is_empty() { Ok(study) } else { Err(problems) }
+}
+
+/// Drops texts of the preset in languages that the study does not have, and of tasks that it removes. Texts that the
+/// file itself contains, which are among the `spans`, are left to the rules.
+fn drop_unused_texts(study: &mut StudyFile, spans: &BTreeMap<String, Range<usize>>) {
+    let known = text_keys(study.task.iter().map(|task| task.name.as_str()));
+    let languages = &study.languages;
+    study.texts.retain(|language, texts| {
+        let is_used = languages.contains(language);
+        texts.retain(|key, _| is_used && known.contains(key) || spans.contains_key(&format!("texts.{language}.{key}")));
+        !texts.is_empty() || spans.contains_key(&format!("texts.{language}"))
+    });
 }
 
 /// Preset named by the file, or the byte offset and message of an error.
@@ -117,7 +131,7 @@ fn paths_mut(study: &mut StudyFile) -> impl Iterator<Item = &mut PathBuf> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::file::{ConditionSource, FilmLayout, HypothesisKind, TaskOrder};
+    use crate::file::{ConditionSource, FilmLayout, HypothesisKind, MismatchedClip, TaskOrder};
 
     const SMALLEST: &str = "title = \"t\"\npreset = \"rebol\"\n[[speaker]]\nname = \"ellen\"\ndataset = \"data\"\n\
                             [[condition]]\nname = \"model\"\nkind = \"checkpoint\"\ncheckpoint = \"models/{speaker}\"\n";
@@ -135,6 +149,9 @@ mod tests {
     fn a_minimal_file_takes_all_settings_from_its_preset() {
         let file = read(SMALLEST);
         assert_eq!((file.participants, file.n_sessions(), file.task_order), (100, 150, TaskOrder::Written));
+        assert_eq!((file.practice, file.training_first, file.exclusion.reloaded), (false, true, true));
+        assert_eq!(file.clips.mismatched, MismatchedClip::PerParticipant);
+        assert_eq!(file.drawn_conditions(), BTreeMap::from([("mismatched", "model")]));
         let tasks: Vec<_> = file.task.iter().map(|task| (task.trials, task.training, task.replay)).collect();
         assert_eq!(tasks, [(20, 3, false), (10, 3, false)]);
         assert_eq!((file.films.layout, file.films.layout.size()), (FilmLayout::SideBySide, [1000, 360]));
@@ -153,6 +170,26 @@ mod tests {
         let kinds: Vec<_> = file.hypothesis.iter().map(|hypothesis| hypothesis.kind).collect();
         use HypothesisKind::{DiffersFromChance, Equivalence, GreaterThanChance};
         assert_eq!(kinds, [DiffersFromChance, Equivalence, GreaterThanChance]);
+    }
+
+    #[test]
+    fn both_tasks_of_the_preset_ask_which_gestures_are_more_natural() {
+        let wording = "feels as a more natural representation of gestures for the presented speech fragment";
+        let file = read(&format!("languages = [\"en\", \"ar\"]\n{SMALLEST}"));
+        assert_eq!(file.texts.keys().collect::<Vec<_>>(), ["ar", "en"], "the texts of other languages are dropped");
+        for task in ["real-or-generated", "matched-or-mismatched"] {
+            assert!(file.texts["en"][&format!("question.{task}")].contains(wording));
+            let keys = ["question", "title", "instructions"].map(|part| format!("{part}.{task}"));
+            assert!(file.texts.values().all(|texts| keys.iter().all(|key| texts.contains_key(key))));
+        }
+        let removed = "[[task]]\nname = \"matched-or-mismatched\"\ntrials = 0\n";
+        let own = "[texts.en]\n\"question.real-or-generated\" = \"Which?\"\n";
+        let file = read(&format!("{SMALLEST}{removed}{own}"));
+        let texts = &file.texts["en"];
+        assert_eq!((texts.len(), texts["question.real-or-generated"].as_str()), (3, "Which?"));
+        let wrong = problems(&format!("{SMALLEST}{removed}[texts.en]\n\"title.matched-or-mismatched\" = \"Which?\"\n"));
+        assert!(wrong[0].contains("texts.en.title.matched-or-mismatched: unknown text of the page"), "{wrong:?}");
+        assert!(problems(&format!("{SMALLEST}[texts.de]\n"))[0].contains("\"de\" is not in languages"));
     }
 
     #[test]

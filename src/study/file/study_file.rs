@@ -38,6 +38,9 @@ pub struct StudyFile {
     /// Whether the first task starts with a trial that only shows how the page works.
     #[serde(default = "yes")]
     pub practice: bool,
+    /// Whether the training trials of all tasks precede the analysed trials of the first task.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub training_first: bool,
     /// Attention checks per session.
     #[serde(default = "two")]
     pub attention_checks: usize,
@@ -103,11 +106,13 @@ pub struct ClipSettings {
     /// Length of each film, seconds.
     pub seconds: f64,
     pub reuse: ClipReuse,
+    #[serde(skip_serializing_if = "MismatchedClip::is_fixed")]
+    pub mismatched: MismatchedClip,
 }
 
 impl Default for ClipSettings {
     fn default() -> Self {
-        Self { seconds: 12.0, reuse: ClipReuse::Never }
+        Self { seconds: 12.0, reuse: ClipReuse::Never, mismatched: MismatchedClip::Fixed }
     }
 }
 
@@ -153,6 +158,23 @@ impl FilmLayout {
             Self::Separate => [800, 600],
             Self::SideBySide => [1000, 360],
         }
+    }
+}
+
+/// Choice of the other clip whose motion a mismatched condition shows for a clip.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum MismatchedClip {
+    /// One other clip, from another recording if possible, for all participants.
+    #[default]
+    Fixed,
+    /// Drawn for each trial of each session from the other clips of the speaker in the task.
+    PerParticipant,
+}
+
+impl MismatchedClip {
+    fn is_fixed(&self) -> bool {
+        *self == Self::Fixed
     }
 }
 
@@ -223,11 +245,15 @@ pub struct ExclusionRules {
     /// Time without focus above which a trial is excluded, seconds.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub unfocused_secs: Option<f64>,
+    /// Whether a trial is excluded if the page was reloaded after one of its films began to play.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub reloaded: bool,
 }
 
 impl Default for ExclusionRules {
     fn default() -> Self {
-        Self { failed_checks: Some(1), incomplete: true, stalled_secs: Some(2.0), unfocused_secs: Some(5.0) }
+        let (stalled_secs, unfocused_secs) = (Some(2.0), Some(5.0));
+        Self { failed_checks: Some(1), incomplete: true, stalled_secs, unfocused_secs, reloaded: false }
     }
 }
 
@@ -281,6 +307,13 @@ pub enum HypothesisKind {
 }
 
 impl StudyFile {
+    /// Conditions whose mismatched clips are drawn per participant: name, and name of the condition of their motion.
+    pub fn drawn_conditions(&self) -> BTreeMap<&str, &str> {
+        let is_drawn = self.clips.mismatched == MismatchedClip::PerParticipant;
+        let drawn = self.condition.iter().filter(|_| is_drawn);
+        drawn.filter_map(|condition| Some((condition.name.as_str(), condition.source.mismatch_of()?))).collect()
+    }
+
     /// Number of planned sessions: one per participant, plus the extra ones.
     pub fn n_sessions(&self) -> usize {
         self.participants + (self.participants as f64 * self.extra_session_ratio).ceil() as usize

@@ -132,22 +132,29 @@ async function oneTrial({ position, n_trials: total, trial }) {
     instructed = trial.task;
   }
   const plays = recall("plays");
+  // Request that reports the start of the films once per load of the page, sent at their first play.
+  let started = null;
   const answer = await runTrial({
     task,
     trial,
     heading: t("trial.title", { n: position + 1, total }),
     playsBefore: plays?.position === position ? plays.n : 0,
-    onplay: (n) => keep("plays", { position, n }),
+    onplay(n) {
+      keep("plays", { position, n });
+      started ??= withRetries(() => backend.start(position), () => {}).catch(() => {});
+    },
   });
-  const { feedback, state } = await send({ position, ...answer });
+  const { feedback, state } = await send({ position, ...answer }, started);
   if (feedback) await showFeedback(task, answer.response, feedback);
   return state;
 }
 
-// Sends an answer until it is stored. If the server has a different answer or state, that of the server is used.
-async function send(answer) {
+// Sends an answer until it is stored, after the start of its films. If the server has a different answer or state, that
+// of the server is used.
+async function send(answer, started = null) {
   keep("pending", answer);
   announce(t("answer.saving"));
+  await started;
   let reply;
   try {
     reply = await withRetries(() => backend.answer(answer), onWait);

@@ -51,23 +51,33 @@ function parameters() {
   return Object.fromEntries(pairs);
 }
 
+// Random number of 32 hexadecimal digits.
+function randomNumber() {
+  const digits = (byte) => byte.toString(16).padStart(2, "0");
+  return Array.from(crypto.getRandomValues(new Uint8Array(16)), digits).join("");
+}
+
 // Random number by which the server recognises a repeated request to begin, where its reply was lost.
 function attempt() {
-  const digits = (byte) => byte.toString(16).padStart(2, "0");
-  if (!recall("attempt")) keep("attempt", Array.from(crypto.getRandomValues(new Uint8Array(16)), digits).join(""));
+  if (!recall("attempt")) keep("attempt", randomNumber());
   return recall("attempt");
 }
 
-async function post(path, body) {
+// Random number of this load of the page, by which the server recognises films that are seen again after a reload.
+const load = randomNumber();
+
+async function post(path, body, options = {}) {
   const headers = { "Content-Type": "application/json" };
   if (recall("token")) headers.Authorization = `Bearer ${recall("token")}`;
-  return request(path, { method: "POST", headers, body: JSON.stringify(body) });
+  return request(path, { method: "POST", headers, body: JSON.stringify(body), ...options });
 }
 
 export const backend = {
   study: () => request("api/study"),
   begin: (language) => post("api/begin", { consent: true, language, parameters: parameters(), attempt: attempt() }),
   state: () => request("api/state", { headers: { Authorization: `Bearer ${recall("token")}` } }),
+  // The request is completed even if the page is closed.
+  start: (position) => post("api/start", { position, load }, { keepalive: true }),
   answer: (answer) => post("api/answer", answer),
   withdraw: () => post("api/withdraw", {}),
 };

@@ -9,6 +9,7 @@ use super::study_server::App;
 use crate::plan::TrialPhase;
 use crate::store::answers::{self, RecordOutcome, SubmittedAnswer, TrialTerms, record};
 use crate::store::participants::{self, BeginOutcome, NewParticipant, PARAMETERS, Participant, Status};
+use crate::store::starts::{self, TrialStart};
 use crate::vote::Response;
 use axum::body::Body;
 use axum::extract::{FromRequestParts, Path, Request, State};
@@ -175,6 +176,19 @@ pub async fn state(
         Some(participant) => Ok(json_reply(&session_state(&app.study, &participant))),
         None => Err(unknown()),
     }
+}
+
+/// `POST /api/start`
+pub async fn start(
+    State(app): Shared,
+    AuthenticatedSession { session, id }: AuthenticatedSession,
+    JsonBody(start): JsonBody<TrialStart>,
+) -> Result<HttpResponse, ApiError> {
+    if !is_attempt(&start.load) {
+        return Err(ApiError::bad_request("The field load must be 32 hexadecimal digits."));
+    }
+    let known = app.store.write(move |db| starts::record(db, &id, session, &start)).await?;
+    if known { Ok(json_reply(&json!({ "known": true }))) } else { Err(unknown()) }
 }
 
 /// `POST /api/answer`

@@ -18,7 +18,7 @@ impl Bucket {
         Self { capacity, per_second, tokens: capacity, updated: Instant::now() }
     }
 
-    /// Bucket of one participant, who needs about two tokens per trial.
+    /// Bucket of one participant, who needs about three tokens per trial.
     fn of_participant() -> Self {
         Self::full(100.0, 5.0)
     }

@@ -110,6 +110,7 @@ fn router(app: App, hosts: AllowedHosts) -> Router {
         .route("/api/study", get(api::study))
         .route("/api/begin", post(api::begin))
         .route("/api/state", get(api::state))
+        .route("/api/start", post(api::start))
         .route("/api/answer", post(api::answer))
         .route("/api/withdraw", post(api::withdraw))
         .route("/api/operator", get(api::operator))

@@ -67,7 +67,7 @@ pub fn votes_needed(bound: f64, power: f64) -> Result<u64, StatisticsError> {
 mod tests {
     use super::*;
 
-    /// 1,050 of 2,000 votes, the pooled counts of Rebol, Guetl and Pietroszek 2021, table III.
+    /// 1,050 of 2,000 votes, the pooled counts of Rebol, Guetl and Pietroszek 2021, section 4.5.
     #[test]
     fn pooled_votes_of_the_paper_are_equivalent_to_chance() {
         let count = BinomialCount::new(1050, 2000).unwrap();

@@ -109,7 +109,7 @@ fn partition_point(mut low: u64, mut high: u64, holds: impl Fn(u64) -> bool) -> 
 mod tests {
     use super::*;
 
-    /// Counts of Rebol, Guetl and Pietroszek 2021, table III, with votes treated as independent.
+    /// Counts of Rebol, Guetl and Pietroszek 2021, section 4.5, with votes treated as independent.
     #[test]
     fn p_values_of_the_papers_votes_match() {
         let p = |successes, trials| BinomialCount::new(successes, trials).unwrap().test(0.5).unwrap();

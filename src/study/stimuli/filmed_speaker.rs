@@ -6,7 +6,7 @@ use super::condition_motion::{ConditionModels, ShownMotion, motions, sound_of};
 use super::cut::{CutSpeech, StudyClip, cut};
 use super::film::{self, FilmScene};
 use super::speaker_source::SpeakerSource;
-use crate::file::{StudyFile, StudySpeaker};
+use crate::file::{StudyCondition, StudyFile, StudySpeaker};
 use crate::pages::assets::SOUND_CHECK_TONES;
 use crate::plan::{FilmContent, FilmSound};
 use anyhow::{Context, Result, bail};
@@ -54,6 +54,11 @@ pub struct FilmedSpeaker {
     film_fps: FrameRate,
     /// By condition, then by clip: index of the clip of the motion, and the motion on the rig.
     performances: BTreeMap<String, Vec<(usize, Performance)>>,
+    /// By mismatched condition whose other clips the design draws, then by clip: the motions that it may show.
+    drawn: BTreeMap<String, Vec<ShownMotion>>,
+    /// Visibility of the films of each clip.
+    visibilities: Vec<CommonVisibility>,
+    body: CommonBody,
     stage: AvatarStage,
 }
 
@@ -99,12 +104,19 @@ impl CutSpeaker {
         let Self { source, models, cut, sounds, tones } = self;
         let n_segments = cut.clips.chunk_by(|a, b| a.segment == b.segment).count();
         let task = progress.begin(&format!("motion of {}", source.name), n_segments as u64);
-        let motions = motions(&source, &cut.clips, &file.condition, &models, &|| task.advance(1))?;
+        let drawn = file.drawn_conditions();
+        let is_drawn = |condition: &&StudyCondition| drawn.contains_key(condition.name.as_str());
+        let conditions: Vec<_> = file.condition.iter().filter(|condition| !is_drawn(condition)).cloned().collect();
+        let motions = motions(&source, &cut.clips, &conditions, &models, &|| task.advance(1))?;
         drop(task);
+        let drawn = drawn.into_iter().filter_map(|(name, of)| Some((name.to_owned(), motions.get(of)?.clone())));
+        let drawn: BTreeMap<String, Vec<ShownMotion>> = drawn.collect();
         let all: Vec<&ShownMotion> = motions.values().flatten().collect();
         let body = CommonBody::of(&source.bone_lengths, &all);
         let visibility = |clip: usize| {
-            let of_clip: Vec<&ShownMotion> = motions.values().map(|of_condition| &of_condition[clip]).collect();
+            let own = motions.values().map(|of_condition| &of_condition[clip]);
+            // The films of a clip are shared by participants for whom different motions are drawn.
+            let of_clip: Vec<&ShownMotion> = own.chain(drawn.values().flatten()).collect();
             CommonVisibility::of(&of_clip).context("the study has no conditions")
         };
         let visibilities: Vec<CommonVisibility> = (0..cut.clips.len()).map(visibility).collect::<Result<_>>()?;
@@ -126,7 +138,7 @@ impl CutSpeaker {
         let stage = film::stage(layout, &shown, size);
         let stage = stage.with_context(|| format!("the speaker {} has no clips", source.name))?;
         let (clips, film_fps) = (cut.clips, film::film_fps(layout, source.fps));
-        Ok(FilmedSpeaker { clips, sounds, tones, film_fps, performances, stage })
+        Ok(FilmedSpeaker { clips, sounds, tones, film_fps, performances, drawn, visibilities, body, stage })
     }
 }
 
@@ -153,7 +165,8 @@ impl FilmedSpeaker {
         self.clips.iter().position(|known| known.name == name)
     }
 
-    /// Name `speaker/clip` of the clip whose motion is shown in the film with this content, by its left avatar.
+    /// Name `speaker/clip` of the clip whose motion the left avatar shows in the film with this content, unless the
+    /// design draws it.
     ///
     /// # Errors
     /// The speaker does not have the clip or the condition.
@@ -171,8 +184,15 @@ impl FilmedSpeaker {
     /// Performance of the left avatar of the film with this content, at the film's rate.
     ///
     /// # Errors
-    /// The speaker does not have the clip or the condition.
+    /// The speaker does not have the clips or the condition.
     fn performance(&self, content: &FilmContent) -> Result<Performance> {
+        if let Some(motions) = self.drawn.get(&content.condition) {
+            let missing = || format!("no motion of the clip {} for the clip {}", content.motion_of, content.clip);
+            let visibility = self.find(&content.clip).and_then(|clip| self.visibilities.get(clip));
+            let motion = self.find(&content.motion_of).and_then(|of| motions.get(of));
+            let (visibility, motion) = visibility.zip(motion).with_context(missing)?;
+            return Ok(visibility.performance(motion, &self.body).resampled(self.film_fps));
+        }
         let (_, performance) = self.shown(content)?;
         Ok(performance.resampled(self.film_fps))
     }

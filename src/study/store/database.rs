@@ -9,7 +9,8 @@ use std::time::Duration;
 const BUSY_TIMEOUT: Duration = Duration::from_secs(10);
 
 /// Times are milliseconds since 1970. `position`: number of answers, which is the index of the next trial; `given_ms`:
-/// when that trial was first presented. `status`: see [`super::participants::Status`].
+/// when that trial was first presented. `status`: see [`super::participants::Status`]. `load`: last load of the page in
+/// which the films of a trial began; `loads`: number of these loads.
 const TABLES: &str = "
     CREATE TABLE IF NOT EXISTS about (name TEXT PRIMARY KEY, value TEXT NOT NULL) STRICT, WITHOUT ROWID;
     CREATE TABLE IF NOT EXISTS participant (
@@ -21,6 +22,10 @@ const TABLES: &str = "
         participant TEXT NOT NULL REFERENCES participant (id), position INTEGER NOT NULL, response TEXT NOT NULL,
         plays INTEGER NOT NULL, stalled_secs REAL NOT NULL, unfocused_secs REAL NOT NULL, response_secs REAL NOT NULL,
         PRIMARY KEY (participant, position)
+    ) STRICT, WITHOUT ROWID;
+    CREATE TABLE IF NOT EXISTS start (
+        participant TEXT NOT NULL REFERENCES participant (id), position INTEGER NOT NULL, load TEXT NOT NULL,
+        loads INTEGER NOT NULL, PRIMARY KEY (participant, position)
     ) STRICT, WITHOUT ROWID;
     INSERT OR IGNORE INTO about VALUES ('withdrawn', '0');";
 
@@ -68,6 +73,12 @@ pub fn open_for_reading(path: &Path) -> Result<Connection> {
         let db = Connection::open_with_flags(path, flags)?;
         db.busy_timeout(BUSY_TIMEOUT)?;
         db.query_row("SELECT value FROM about WHERE name = 'plan'", [], |row| row.get::<_, String>(0)).optional()?;
+        // Databases of earlier versions have no starts; a temporary table leaves the file as it is.
+        let has_starts = "SELECT COUNT(*) > 0 FROM sqlite_master WHERE name = 'start'";
+        if !db.query_row(has_starts, [], |row| row.get::<_, bool>(0))? {
+            db.pragma_update(None, "temp_store", "memory")?;
+            db.execute_batch("CREATE TEMP TABLE start (participant TEXT, position INTEGER, loads INTEGER)")?;
+        }
         Ok(db)
     };
     opened().with_context(|| format!("cannot read {}: is it the database of `orator study serve`?", path.display()))

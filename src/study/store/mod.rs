@@ -4,4 +4,5 @@
 pub mod answers;
 pub mod database;
 pub mod participants;
+pub mod starts;
 pub mod writer;

@@ -224,11 +224,14 @@ pub fn begin(
     let taken: BTreeSet<u32> = holders.map(|participant| participant.session).collect();
     let free = (0..quota.n_sessions).find(|session| !taken.contains(session));
     let Some(session) = free.filter(|_| taken.len() < quota.target as usize) else { return Ok(BeginOutcome::Full) };
+    let silent = "session = ?1 AND status = ?2 AND position = 0";
     for given_up in own.iter().map(|participant| participant.session).chain([session]) {
-        db.execute(
-            "DELETE FROM participant WHERE session = ?1 AND status = ?2 AND position = 0",
-            params![given_up, active],
-        )?;
+        for sql in [
+            format!("DELETE FROM start WHERE participant IN (SELECT id FROM participant WHERE {silent})"),
+            format!("DELETE FROM participant WHERE {silent}"),
+        ] {
+            db.execute(&sql, params![given_up, active])?;
+        }
         db.execute(
             "UPDATE participant SET status = ?1 WHERE session = ?2 AND status = ?3",
             params![replaced, given_up, active],
@@ -272,6 +275,7 @@ fn select(db: &Connection, condition: &str) -> rusqlite::Result<Vec<Participant>
 /// Deletes all data of a participant and counts the withdrawal; `false` if the identifier is unknown.
 pub fn withdraw(db: &Connection, id: &str) -> rusqlite::Result<bool> {
     db.execute("DELETE FROM answer WHERE participant = ?1", [id])?;
+    db.execute("DELETE FROM start WHERE participant = ?1", [id])?;
     let is_known = db.execute("DELETE FROM participant WHERE id = ?1", [id])? > 0;
     if is_known {
         increment(db, "withdrawn")?;

@@ -24,8 +24,8 @@ fn by(statistics: &Value, method: &str) -> Value {
     found.unwrap_or_else(|| panic!("no {method} in {statistics}")).clone()
 }
 
-/// Counts of Rebol, Guetl and Pietroszek 2021, table III: 512 and 538 of 1,000 votes chose the generated gestures as
-/// the real ones, 356 and 294 of 500 the matching ones.
+/// Counts of Rebol, Guetl and Pietroszek 2021, from the shares in section 4.5: 512 and 538 of 1,000 votes chose the
+/// generated gestures as the real ones, 356 and 294 of 500 the matching ones.
 #[test]
 fn counts_of_a_published_study_give_the_known_results() {
     let project = Project::with_clips("study-counts", 0, 1.0);
@@ -162,7 +162,13 @@ fn registered_hypotheses_are_judged_and_marked() {
             claim("fit", HypothesisKind::GreaterThanChance, true),
             claim("rate", HypothesisKind::Differs, false),
         ],
-        exclusion: ExclusionRules { failed_checks: None, incomplete: false, stalled_secs: None, unfocused_secs: None },
+        exclusion: ExclusionRules {
+            failed_checks: None,
+            incomplete: false,
+            stalled_secs: None,
+            unfocused_secs: None,
+            reloaded: false,
+        },
         settings: AnalysisSettings::default(),
     };
     let settings = StatisticSettings { n_draws: 200, ..StatisticSettings::from(&registration.settings) };

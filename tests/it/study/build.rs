@@ -161,14 +161,25 @@ fn the_command_line_builds_a_study() {
     speaker(dir);
     let (head, _) = STUDY.split_once("[[task]]").unwrap();
     let head = head.replace("attention_checks = 1", "attention_checks = 0\npractice = false");
+    let head = head.replace("seconds = 1.0", "seconds = 1.0\nmismatched = \"per-participant\"");
     let task =
-        "[[task]]\nname = \"fits\"\ndesign = \"mismatch\"\nconditions = [\"real\", \"mismatched\"]\ntrials = 1\n";
+        "[[task]]\nname = \"fits\"\ndesign = \"mismatch\"\nconditions = [\"real\", \"mismatched\"]\ntrials = 2\n";
     fs::write(dir.join("study.toml"), head.replace("participants = 4", "participants = 1") + task).unwrap();
     let output = orator(dir, "study build study.toml --out made/here");
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     let text = String::from_utf8_lossy(&output.stdout).into_owned();
-    let seal = StudySeal::verify(&StudyFolder::new(dir.join("made/here"))).unwrap();
-    assert!(text.contains("host: 2 clips") && text.contains(&seal.seal), "{text}");
+    let study = StudyFolder::new(dir.join("made/here"));
+    let seal = StudySeal::verify(&study).unwrap();
+    // The films of two trials, in which each clip can have only the other one's motion, and that of the sound check.
+    let key: StudyKey = serde_json::from_slice(&fs::read(study.key()).unwrap()).unwrap();
+    let shown: Vec<[&str; 3]> =
+        key.films.values().map(|film| [&*film.condition, &*film.clip, &*film.motion_of]).collect();
+    let natural: Vec<_> = shown.iter().filter(|film| film[0] == "real").collect();
+    assert!(shown.len() == 5 && natural.len() == 3 && natural.iter().all(|film| film[1] == film[2]), "{shown:?}");
+    for [_, clip, of] in shown.iter().filter(|film| film[0] == "mismatched") {
+        assert!(clip != of && natural.iter().any(|film| film[1] == *of), "{shown:?}");
+    }
+    assert!(text.contains("host: 3 clips") && text.contains(&seal.seal), "{text}");
     assert!(text.contains("next: orator study serve made/here"), "{text}");
 }
 

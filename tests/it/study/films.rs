@@ -57,6 +57,34 @@ trials = 1
 "#;
 
 #[test]
+fn a_drawn_mismatched_film_shows_the_motion_of_the_clip_that_is_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let dir = folder.path();
+    speaker(dir);
+    let (conditions, _) = STUDY.split_once("[[condition]]\nname = \"still\"").unwrap();
+    let study = conditions.replace("seconds = 2.0", "seconds = 2.0\nmismatched = \"per-participant\"")
+        + "[[task]]\nname = \"fits\"\ndesign = \"mismatch\"\nconditions = [\"real\", \"mismatched\"]\ntrials = 2\n";
+    std::fs::write(dir.join("study.toml"), study).unwrap();
+    let file = StudyFile::read(&dir.join("study.toml")).unwrap();
+    let host = CutSpeaker::new(&file, &file.speaker[0], 4, |name| name.len() as u64).unwrap();
+    let clips = host.cut.clips.clone();
+    let host = host.filmed(&file, SIZE, &Silent).unwrap();
+    let name = |clip: usize| clips.get(clip).map_or("host/none".to_owned(), |clip| format!("host/{}", clip.name));
+    let film = |condition: &str, clip: usize, of: usize| {
+        let (condition, speaker) = (condition.to_owned(), "host".to_owned());
+        let (clip, motion_of, sound) = (name(clip), name(of), FilmSound::Speech);
+        host.performance(&FilmContent { clip, speaker, condition, motion_of, number: None, sound })
+    };
+    for (clip, of) in [(0, 1), (0, 2), (0, 3), (3, 0)] {
+        let [mismatched, own] = [film("mismatched", clip, of), film("real", of, of)].map(|film| film.unwrap().clip);
+        assert!(mismatched == own, "{clip} {of}");
+        assert!(mismatched != film("real", clip, clip).unwrap().clip, "{clip} {of}");
+    }
+    let error = film("mismatched", 0, 9).unwrap_err().to_string();
+    assert!(error.contains("no motion of the clip host/none"), "{error}");
+}
+
+#[test]
 fn films_of_all_conditions_differ_only_in_motion() {
     let folder = tempfile::tempdir().unwrap();
     let dir = folder.path();

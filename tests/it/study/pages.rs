@@ -131,6 +131,9 @@ fn sessions_by_keyboard_and_by_touch_are_stored_as_answered() {
     }
     let plays = |at: usize| votes[at]["plays"].as_u64().unwrap();
     assert_eq!((plays(1), plays(11)), (1, 2), "a reload during a film counts as a play");
+    let reloads: Vec<Value> = votes.iter().map(|vote| vote["reloads"].clone()).collect();
+    let expected: Vec<Value> = (0..20).map(|at| json!(u32::from(at == 11))).collect();
+    assert_eq!(reloads, expected, "only the trial whose film was reloaded");
     // The page was hidden for a second, which counts as far as the film was still playing.
     assert!(votes[1]["unfocused_secs"].as_f64().unwrap() >= 0.3, "{}", votes[1]);
 }
@@ -157,7 +160,7 @@ fn sessions_resume_by_token_and_by_the_operators_link() {
     let expected = |headings: [&str; 2], begins: u32| json!({ "headings": headings, "begins": begins, "fragment": "" });
     assert_eq!(visit(&page("")), expected(["Your participant ID is missing", "Taking part"], 1));
     let recruited = page("?PROLIFIC_PID=p1");
-    assert_eq!(visit(&recruited), expected(["Which one is real?", "Welcome back"], 1));
+    assert_eq!(visit(&recruited), expected(["Which one is more natural?", "Welcome back"], 1));
 
     let operator = Client { token: served.operator_token.clone(), ..Client::new() };
     let progress = operator.get(&served.address, "/api/operator").unwrap().1;
@@ -195,6 +198,9 @@ fn sessions_resume_by_token_and_by_the_operators_link() {
 
     // The first reply is dropped and the browser has no storage: the address contains the token.
     let visited = script(&driver, "visit", &["--url", &page("?PROLIFIC_PID=p3"), "--adverse"]);
-    assert_eq!((&visited["headings"], &visited["begins"]), (&json!(["Which one is real?", "Welcome back"]), &json!(2)));
+    assert_eq!(
+        (&visited["headings"], &visited["begins"]),
+        (&json!(["Which one is more natural?", "Welcome back"]), &json!(2))
+    );
     assert!(visited["fragment"].as_str().unwrap().starts_with("#resume="), "{visited}");
 }

@@ -1,6 +1,11 @@
 //! `orator study serve` and `export`: a complete session, resumption, quotas, withdrawal, films.
 
 use crate::fixtures::served_study::{Client, MadeStudy, fitting};
+use orator_study::analyse::result::StatisticSettings;
+use orator_study::analyse::votes::columns::ColumnNames;
+use orator_study::analyse::votes::read::VotesRead;
+use orator_study::analyse::{Registration, analyse};
+use orator_study::file::StudyFile;
 use serde_json::{Value, json};
 use std::fs;
 use std::process::Command;
@@ -62,8 +67,54 @@ fn a_session_leads_from_consent_to_code_and_exported_tables() {
     study.export("csv");
     let table = fs::read_to_string(study.path().join("export/votes.csv")).unwrap();
     let row = table.lines().nth(2).unwrap();
-    assert!(row.ends_with(",ellen/1,ellen,real|model,42,42,0.25,0,1.5,1,true"), "{row}");
+    assert!(row.ends_with(",ellen/1,ellen,real|model,42,42,0.25,0,1.5,1,0,true"), "{row}");
     assert!(table.starts_with("participant,task,design,phase,trial,clip,"), "{table}");
+}
+
+/// A trial is excluded if the page was reloaded after its films began, and not if it was reloaded before.
+#[test]
+fn a_film_reloaded_after_it_began_excludes_its_trial() {
+    let study = MadeStudy::new(1, 1, 6, 5);
+    let served = study.serve(&[]);
+    let address = &served.address;
+    let mut client = Client::new();
+    assert_eq!(client.begin(address, "p1").unwrap().0, 200);
+    let load = |k: u32| format!("{k:032x}");
+    let start = |position: usize, load: &str| {
+        client.post(address, "/api/start", &json!({ "position": position, "load": load })).unwrap().0
+    };
+    for invalid in ["", "1", &load(1)[1..], &"x".repeat(32)] {
+        assert_eq!(start(0, invalid), 400, "{invalid}");
+    }
+    assert_eq!(Client::new().post(address, "/api/start", &json!({ "position": 0, "load": load(1) })).unwrap().0, 401);
+    // Loads of the page in which the films of each trial began. Repeated requests and other trials do not count.
+    let loads: [&[u32]; 6] = [&[1], &[1], &[1, 2], &[3, 3], &[], &[4, 5, 6]];
+    for (position, loads) in loads.into_iter().enumerate() {
+        for k in loads {
+            assert_eq!((start(position, &load(*k)), start(position + 1, &load(90))), (200, 200));
+        }
+        assert_eq!(client.answer(address, position, &fitting(position, true)).unwrap().0, 200);
+        assert_eq!(start(position, &load(91)), 200, "too late");
+    }
+    let reloads: Vec<Value> = study.exported("votes").iter().map(|vote| vote["reloads"].clone()).collect();
+    assert_eq!(reloads, [0, 0, 1, 0, 0, 2].map(|n| json!(n)));
+
+    let read = VotesRead::of_file(&study.path().join("export/votes.jsonl"), &ColumnNames::default(), None).unwrap();
+    let file = StudyFile::read(&study.folder.study_file()).unwrap();
+    let registration = Registration {
+        title: file.title.clone(),
+        seal: None,
+        notes: Vec::new(),
+        hypotheses: Vec::new(),
+        exclusion: file.exclusion.clone(),
+        settings: file.analysis.clone(),
+    };
+    let settings = StatisticSettings { n_draws: 0, with_models: false, ..StatisticSettings::default() };
+    let analysis = analyse(["A study", "votes.jsonl"], &read, Some(&registration), &settings).unwrap();
+    assert_eq!((analysis.exclusions.n_votes, analysis.exclusions.n_votes_analysed), (4, 2));
+    let rule = analysis.exclusions.rules.iter().find(|rule| rule.rule == "trial: page reloaded after a film began");
+    assert_eq!(rule.map(|rule| (rule.n_votes, rule.unknown.clone())), Some((2, None)));
+    assert!(analysis.methods.contains("trial: page reloaded after a film began (2 votes)"), "{}", analysis.methods);
 }
 
 #[test]

@@ -1,4 +1,4 @@
-//! Training losses of FineMotion's networks (GENEA 2020 entry, section on training), as pure functions of poses [B, T,
+//! Training losses of FineMotion's networks (GENEA 2020 entry, sections 4.1 and 4.3), as pure functions of poses [B, T,
 //! X] and of logits. Where paper and published code differ, both versions are implemented, and the code's is the
 //! default.
 

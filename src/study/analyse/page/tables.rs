@@ -2,7 +2,7 @@
 
 use crate::analyse::conclusions::scope;
 use crate::analyse::number_format::{bare_p, count, counted, percent, points};
-use crate::analyse::result::{ShareAnalysis, ShareMeasure, StudyAnalysis, TaskAnalysis};
+use crate::analyse::result::{ClipShare, ShareAnalysis, ShareMeasure, StudyAnalysis, TaskAnalysis};
 use crate::analyse::statistic::{StatisticOrigin, StatisticRow, StatisticSet, TestResult};
 use crate::analyse::votes::read::RejectedRow;
 use crate::stats::estimate::ConfidenceInterval;
@@ -59,6 +59,9 @@ pub(super) fn task(task: &TaskAnalysis) -> Vec<Node> {
         node("th").attr("scope", "col").class(class).text(title)
     });
     let mut body = vec![node("div").class("scroll").attr("tabindex", "0").child(table("figures", head, rows))];
+    if !task.clips.is_empty() {
+        body.push(clips(task));
+    }
     if let Some(alpha) = task.agreement {
         let text = format!("Agreement of participants: Krippendorff's alpha = {alpha:.3} (1: perfect, 0: chance).");
         body.push(node("p").class("small").text(text));
@@ -66,17 +69,38 @@ pub(super) fn task(task: &TaskAnalysis) -> Vec<Node> {
     body
 }
 
-fn share_title(share: &ShareAnalysis) -> String {
-    let what = match share.measure {
+/// Table of the shares per clip.
+fn clips(task: &TaskAnalysis) -> Node {
+    let row = |of: &ClipShare| {
+        let cell = |text: String| node("td").class("num").text(text);
+        let name = node("th").attr("scope", "row").text(&of.clip);
+        let (successes, votes) = (count(of.n_successes as usize), count(of.n_votes as usize));
+        let cells = [successes, votes, percent(of.share)].map(cell);
+        node("tr").child(name).child(node("td").text(&of.speaker)).children(cells)
+    };
+    let what = task.shares.first().map_or("", |share| measure_name(share.measure));
+    let head = [("Clip", ""), ("Speaker", ""), (what, "num"), ("Votes", "num"), ("Share", "num")]
+        .map(|(title, class)| node("th").attr("scope", "col").class(class).text(title));
+    let rows = task.clips.iter().map(row);
+    node("div").class("scroll").attr("tabindex", "0").child(table("figures clips", head, rows))
+}
+
+fn measure_name(measure: ShareMeasure) -> &'static str {
+    match measure {
         ShareMeasure::GeneratedChosen => "generated motion chosen",
         ShareMeasure::MatchedChosen => "matching motion chosen",
         ShareMeasure::Correct => "correct",
         ShareMeasure::JudgedReal => "judged real",
-    };
-    let (scope, percent) = (scope(share), percent(share.share));
+    }
+}
+
+fn share_title(share: &ShareAnalysis) -> String {
+    let (what, scope, percent) = (measure_name(share.measure), scope(share), percent(share.share));
+    let sd = share.participant_sd.map(|sd| format!("; standard deviation over participants {:.1} points", 100.0 * sd));
+    let sd = sd.unwrap_or_default();
     let (successes, votes) = (count(share.n_successes as usize), counted(share.n_votes as usize, "vote"));
     let sizes = sizes([share.n_participants, share.n_clips]);
-    format!("{scope}: {what} in {successes} of {votes}, {percent} ({sizes})")
+    format!("{scope}: {what} in {successes} of {votes}, {percent} ({sizes}{sd})")
 }
 
 /// Numbers of participants and of clips.

@@ -112,6 +112,7 @@ pub fn vote(cells: &RowCells, design: Option<TaskDesign>) -> RowResult<StudyVote
         unfocused_secs: cells.secs("unfocused_secs")?,
         response_secs: cells.secs("response_secs")?,
         plays: cells.integer("plays", [0, i64::from(u32::MAX)])?.unwrap_or(0) as u32,
+        reloads: cells.integer("reloads", [0, i64::from(u32::MAX)])?.unwrap_or(0) as u32,
         completed: cells.yes_or_no("completed")?.unwrap_or(true),
     };
     check(&vote)?;

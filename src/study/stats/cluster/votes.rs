@@ -65,6 +65,14 @@ pub fn participant_estimate(votes: &[ClipVote]) -> Result<StudentEstimate, Stati
     StudentEstimate::of_mean(&participant_means(votes)?)
 }
 
+/// Standard deviation of the participants' mean scores (divisor n - 1); `None` with fewer than two participants.
+pub fn participant_sd(votes: &[ClipVote]) -> Option<f64> {
+    let means = participant_means(votes).ok().filter(|means| means.len() > 1)?;
+    let n = means.len() as f64;
+    let mean = means.iter().sum::<f64>() / n;
+    Some((means.iter().map(|own| (own - mean).powi(2)).sum::<f64>() / (n - 1.0)).sqrt())
+}
+
 /// Difference of the mean scores in `first` and `second`, for each participant who voted in both.
 pub fn participant_differences(first: &[ClipVote], second: &[ClipVote]) -> Result<Vec<f64>, StatisticsError> {
     let differences = means_by_cell(&[first, second])?.into_iter().map(|means| means[0] - means[1]);
@@ -98,6 +106,7 @@ mod tests {
         assert_eq!(participant_means(&many), Ok(vec![1.0, 0.5, 0.0]));
         let estimate = participant_estimate(&many).unwrap();
         assert_eq!((estimate.value, estimate.degrees_of_freedom), (0.5, 2.0));
+        assert_eq!((participant_sd(&many), participant_sd(&many[..4])), (Some(0.5), None));
         assert!((estimate.standard_error - (0.25f64 / 3.0).sqrt()).abs() < 1e-15);
         let other = votes(&[(7, 5, 1.0), (9, 5, 1.0), (11, 5, 1.0)]);
         assert_eq!(participant_differences(&other, &many), Ok(vec![0.5, 1.0]));
