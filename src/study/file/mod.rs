@@ -10,6 +10,6 @@ pub use condition::{ConditionSource, StudyCondition, fill_pattern};
 pub use layers::StudyPreset;
 pub use read::EXAMPLE;
 pub use study_file::{
-    AnalysisSettings, ClipReuse, ClipSettings, ExclusionRules, FilmLayout, FilmSettings, HypothesisKind, MismatchedClip, StudyFile,
-    StudyHypothesis, StudySpeaker, StudyTask, TaskOrder,
+    AnalysisSettings, ClipReuse, ClipSettings, ExclusionRules, FilmLayout, FilmSettings, HypothesisKind,
+    MismatchedClip, StudyFile, StudyHypothesis, StudySpeaker, StudyTask, TaskOrder,
 };

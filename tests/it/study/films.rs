@@ -73,7 +73,8 @@ fn a_drawn_mismatched_film_shows_the_motion_of_the_clip_that_is_named() {
     let film = |condition: &str, clip: usize, of: usize| {
         let (condition, speaker) = (condition.to_owned(), "host".to_owned());
         let (clip, motion_of, sound) = (name(clip), name(of), FilmSound::Speech);
-        host.performance(&FilmContent { clip, speaker, condition, motion_of, number: None, sound })
+        let content = FilmContent { clip, speaker, condition, motion_of, number: None, sound, right: None };
+        host.performances(&content).map(|mut performances| performances.remove(0))
     };
     for (clip, of) in [(0, 1), (0, 2), (0, 3), (3, 0)] {
         let [mismatched, own] = [film("mismatched", clip, of), film("real", of, of)].map(|film| film.unwrap().clip);
