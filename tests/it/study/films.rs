@@ -174,6 +174,7 @@ fn films_of_all_conditions_differ_only_in_motion() {
 const MODEL_STUDY: &str = r#"
 title = "Settings of a model"
 participants = 4
+attention_checks = 0
 [clips]
 seconds = 2.0
 [[speaker]]

@@ -74,8 +74,8 @@ fn all_speakers_are_trained_by_the_papers_reading() {
     let speakers = trained["speakers"].as_array().unwrap();
     let of = |key: &str| speakers.iter().map(|trained| trained[key].clone()).collect::<Vec<_>>();
     assert_eq!(of("speaker"), ["anna", "ben"]);
-    // 99 frames at 15 fps: five segments of one second, in batches of three.
-    assert_eq!((of("segments"), of("steps")), (vec![5.into(), 5.into()], vec![4.into(), 4.into()]));
+    // 99 frames at 15 fps: six segments of 8 previous and 15 predicted poses, in batches of three.
+    assert_eq!((of("segments"), of("steps")), (vec![6.into(), 6.into()], vec![4.into(), 4.into()]));
     let facts = orator_formats::checkpoint::facts(&dir.join("work/seq2seq/ben/best.safetensors")).unwrap();
     let settings = &facts["settings"];
     assert_eq!((&settings["distance"], &settings["continuity"]), (&"mse".into(), &"poses".into()));

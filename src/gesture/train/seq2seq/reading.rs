@@ -1,5 +1,5 @@
 //! Readings: values for the keys of `[seq2seq]` that are `"auto"`. FineMotion's paper (GENEA 2020) and its published
-//! code differ in the losses, the words of a segment and the state at seams; [`FINEMOTION`] has both values of each key
+//! code differ in the losses, the words of a segment and the state at seams; [`READING_ROWS`] has both values of each key
 //! with their sources. The reading `auto` uses those of the code and chooses the number of epochs by the minutes of
 //! motion.
 
@@ -34,7 +34,7 @@ const UNSTATED: &str = "not stated; as in the code";
 
 /// Values of the readings `paper` and `code`; the first row of a key that names the network applies.
 #[rustfmt::skip]
-pub const FINEMOTION: [ReadingRow; 13] = [
+pub const READING_ROWS: [ReadingRow; 13] = [
     row("distance", &[], (Choice("mse"), "section 4: the mean squared error is minimised"), (Choice("l1"), "L1 loss")),
     row("continuity", &[], (Choice("poses"), "section 2: norm of the difference of consecutive poses"), (Choice("numbers"), "absolute differences per coordinate")),
     row("variance_loss", &[], (Choice("variance"), "section 2: negative variance"), (Choice("norm"), "norm over time, not centred")),
@@ -123,7 +123,7 @@ pub fn settings(requested: &Seq2seqConfig) -> Result<Seq2seqSettings> {
             let applies = |row: &&ReadingRow| {
                 row.key == key && (row.networks.is_empty() || row.networks.contains(&requested.network))
             };
-            let row = FINEMOTION.iter().find(applies)?;
+            let row = READING_ROWS.iter().find(applies)?;
             Some(match reading_value(row, requested) {
                 Number(value) => number(value),
                 Choice(value) => Value::from(value),
@@ -215,7 +215,7 @@ mod tests {
         Seq2seqConfig { reading, network, ..Seq2seqConfig::default() }
     }
 
-    /// Both readings in numbers, for FineMotion's 3 h 28 min. Sources: [`FINEMOTION`].
+    /// Both readings in numbers, for FineMotion's 3 h 28 min. Sources: [`READING_ROWS`].
     #[test]
     fn both_readings_set_every_value() {
         // Contextual: 12,480 segments of one second; words: one at every frame of 20 per second.

@@ -180,7 +180,7 @@ mod tests {
         assert_eq!(json.votes, std::slice::from_ref(&vote));
         let head = VOTE_COLUMNS.join(",");
         for response in ["\"{\"\"scores\"\":[60,0]}\"", "60|0"] {
-            let row = format!("p,t,sliders,main,3,ellen/4,ellen,N|M,{response},,0.5,0,4.25,2,true");
+            let row = format!("p,t,sliders,main,3,ellen/4,ellen,N|M,{response},,0.5,0,4.25,2,0,true");
             assert_eq!(read(&format!("{head}\n{row}\n")).unwrap().votes, std::slice::from_ref(&vote), "{response}");
         }
     }
