@@ -18,12 +18,14 @@ pub mod run;
 pub mod segment;
 pub mod sound;
 pub mod stages;
+pub mod stale_results;
 pub mod status;
 pub mod time_budget;
 pub mod timing;
 
 pub use pipeline::Pipeline;
 pub use run::{RunReport, RunState, Selection, StageCounts, UnitFailure, UnitReport};
+pub use stale_results::StaleResult;
 pub use status::{StagePlan, StatusReport, UnitState, UnitStatus};
 pub use time_budget::{BudgetKind, TimeBudget};
 

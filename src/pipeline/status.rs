@@ -3,6 +3,7 @@
 
 use super::pipeline::Pipeline;
 use super::stages;
+use super::stale_results::{self, StaleResult};
 use super::time_budget::{TimeBudget, VideoProgress};
 use anyhow::Result;
 use orator_base::stage::artifacts::StageName;
@@ -28,6 +29,9 @@ pub struct StatusReport {
     /// Total over all speakers.
     #[serde(skip)]
     pub total: TimeBudget,
+    /// Datasets and models made by an older lifter.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub stale: Vec<StaleResult>,
     /// Whether the seconds of every video add up to its duration.
     pub adds_up: bool,
 }
@@ -104,9 +108,10 @@ impl Pipeline {
     /// # Errors
     /// An unknown speaker; a video that is being deleted by `forget` (`BusyFolder`).
     pub fn status(&self, speakers: &[String]) -> Result<StatusReport> {
-        let _lock = FolderLock::shared(&self.config().settings.work.dir)?;
+        let work = &self.config().settings.work.dir;
+        let _lock = FolderLock::shared(work)?;
         let hashes = self.hashes();
-        let mut report = StatusReport::default();
+        let (mut report, mut has_other_lifter) = (StatusReport::default(), BTreeMap::new());
         for videos in self.videos(speakers)? {
             report.units.extend(videos.missing.iter().map(|message| UnitStatus {
                 unit: videos.speaker.clone(),
@@ -117,6 +122,13 @@ impl Pipeline {
             let ready = stages::ready(self.config(), &videos, &hashes).unwrap_or_default();
             let check = StatusCheck { pipeline: self, hashes: &hashes, videos: &videos, ready: &ready };
             let of_videos = StageName::OF_VIDEOS.map(|name| (name, check.stage(name)));
+            let lift =
+                of_videos.iter().find_map(|(name, stage)| stage.as_ref().ok().filter(|_| *name == StageName::Lift));
+            // Weights that cannot be read are reported as a failure of the stage.
+            let is_stale = lift
+                .and_then(|lift| stale_results::has_other_lifter(&**lift, &videos.units, work, &hashes).ok())
+                .unwrap_or(false);
+            has_other_lifter.insert(videos.speaker.clone(), is_stale);
             let mut speaker_waits_for = None;
             let mut total = TimeBudget::of_speaker(&videos.speaker);
             for unit in &videos.units {
@@ -134,7 +146,6 @@ impl Pipeline {
                     (None, None) => VideoProgress::Judged,
                 };
                 let is_extracted = stage_statuses.first().is_some_and(|status| status.state == UnitState::UpToDate);
-                let work = &self.config().settings.work.dir;
                 let budget = TimeBudget::of_video(work, unit, video_progress, is_extracted);
                 total.add(&budget);
                 report.time_budget.push(budget);
@@ -149,6 +160,7 @@ impl Pipeline {
         }
         // Failing to save the hash cache only costs recomputation.
         hashes.save().unwrap_or_default();
+        report.stale = stale_results::find(work, &has_other_lifter);
         report.plan = plan(&report.units);
         report.adds_up = report.total.n_mismatched == 0;
         Ok(report)

@@ -1,7 +1,7 @@
 //! `cargo bench -- lift`.
 
 use super::report::{Report, median};
-use anyhow::{Result, ensure};
+use anyhow::{Result, bail, ensure};
 use candle_core::{DType, Device, Tensor};
 use ndarray::{Array3, s};
 use orator_base::motion::upper_body::{COCO, L_WRIST, R_WRIST};
@@ -14,6 +14,7 @@ use orator_lab::train::scene::hand_shape;
 use orator_nn::Mode;
 use orator_nn::lifter::body::BodyLifter;
 use orator_nn::lifter::hand::HandLifter;
+use orator_pipeline::lift::weights::HandNetwork;
 use orator_pipeline::lift::{Lifter, weights};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -54,7 +55,10 @@ pub(crate) fn run(args: &Args, progress: &dyn Progress) -> Result<Report> {
     let (mut lifting, mut inference) = (Vec::new(), Vec::new());
     one_thread.install(|| -> Result<()> {
         let lifter = Lifter::new(&settings)?;
-        let (body, hands) = (weights::body(&settings.body_weights)?, weights::hands(&settings.hand_weights)?);
+        let body = weights::body(&settings.body_weights)?;
+        let HandNetwork::Coordinates(hands) = weights::hands(&settings.hand_weights)? else {
+            bail!("--hand-weights: expected weights of `orator-lab train lifter --part hands --network coordinates`")
+        };
         let keypoints = rule_based_keypoints(args.frames);
         lifter.lift(&keypoints)?;
         networks(&body, &hands, args.frames)?;

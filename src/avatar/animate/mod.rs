@@ -10,7 +10,7 @@ pub mod rig;
 pub mod solve;
 
 pub use draw::figure::{FigureView, draw_pose};
-pub use performance::{AnimationOptions, Performance, Yaw, perform};
+pub use performance::{AnimationOptions, Performance, Yaw, perform, perform_captured};
 pub use rig::constraints::Constraints;
 pub use solve::legs::Legs;
 pub use solve::smoothing::Smoothing;

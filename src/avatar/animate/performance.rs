@@ -1,6 +1,7 @@
 //! Pipeline from joint positions to an animation: the motion is smoothed, solved as rotations of a rig, resampled to
 //! the requested rate and clamped to the joint limits. Every exported file is written from its result.
 
+use super::retarget::captured_body::{CapturedBody, CapturedPart};
 use super::rig::constraints::{ClampCounter, Clamps, Constraints};
 use super::rig::rig::{CM, Rig};
 use super::solve::arm::{SolveFilters, rotations};
@@ -63,6 +64,9 @@ pub struct AnimationReport {
     pub face_frames: Option<usize>,
     /// Number of frames in which each limb was detected.
     pub detected: DetectedFrames,
+    /// Parts that move as in the capture the motion was read from.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub captured: Vec<CapturedPart>,
 }
 
 /// Number of frames, at the motion's own rate, in which a part of the body was detected; in all others it is
@@ -129,8 +133,26 @@ pub fn perform(motion: &Motion, posture: Option<&Posture>, options: &AnimationOp
     perform_on(Rig::from_motion(motion), motion, posture, options)
 }
 
+/// Animates a motion as [`perform`] does, with the head, trunk and legs of the capture that it was read from, which are
+/// neither smoothed nor limited.
+pub fn perform_captured(motion: &Motion, body: &CapturedBody, options: &AnimationOptions) -> Performance {
+    let mut rig = Rig::from_motion(motion);
+    body.fit(&mut rig);
+    animate(rig, motion, None, Some(body), options)
+}
+
 /// Animates a motion on a given rig, for example one shared by several motions of a speaker.
 pub fn perform_on(rig: Rig, motion: &Motion, posture: Option<&Posture>, options: &AnimationOptions) -> Performance {
+    animate(rig, motion, posture, None, options)
+}
+
+fn animate(
+    rig: Rig,
+    motion: &Motion,
+    posture: Option<&Posture>,
+    body: Option<&CapturedBody>,
+    options: &AnimationOptions,
+) -> Performance {
     let clip_of = |tracks: &[RotationTrack]| {
         let local = (0..motion.n_frames()).map(|t| tracks.iter().map(|track| track[t]).collect()).collect();
         BvhClip { root: rig.root, travel: Vec::new(), skeleton: rig.skeleton.clone(), fps: motion.fps, local }
@@ -156,11 +178,17 @@ pub fn perform_on(rig: Rig, motion: &Motion, posture: Option<&Posture>, options:
         }
     }
     let mut free = clip_of(&tracks);
-    trunk::turn(posture, options.legs, options.breath, &rig, &filters, &mut free);
+    match body {
+        Some(body) => body.apply(&rig, &mut free),
+        None => trunk::turn(posture, options.legs, options.breath, &rig, &filters, &mut free),
+    }
+    let captured = body.map(CapturedBody::parts).unwrap_or_default();
     let resampled = options.fps.filter(|&fps| fps != motion.fps).map(|fps| free.resampled(fps));
     let planted = |clip: BvhClip| {
         let mut clip = constrained(clip, &mut ClampCounter::default());
-        options.legs.plant(&rig, &mut clip);
+        if !captured.contains(&CapturedPart::Legs) {
+            options.legs.plant(&rig, &mut clip);
+        }
         clip
     };
     let (resampled, clip) = (resampled.map(planted), planted(free));
@@ -181,6 +209,7 @@ pub fn perform_on(rig: Rig, motion: &Motion, posture: Option<&Posture>, options:
         clamps: if options.constraints == Constraints::NONE { Vec::new() } else { counter.clamps() },
         face_frames,
         detected: DetectedFrames::count(motion),
+        captured,
     };
     Performance { clip: resampled.unwrap_or(clip), rig, report }
 }

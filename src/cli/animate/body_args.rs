@@ -2,13 +2,15 @@
 
 use super::input::InputMotion;
 use anyhow::{Result, ensure};
+use orator_avatar::animate::retarget::captured_body::{CapturedBody, CapturedPart};
 use orator_avatar::animate::solve::legs::Legs;
-use orator_avatar::animate::{AnimationOptions, Smoothing, Yaw};
+use orator_avatar::animate::{AnimationOptions, Performance, Smoothing, Yaw, perform, perform_captured};
+use orator_base::types::pose3d::Motion;
 use orator_base::types::posture::Posture;
 
 #[derive(clap::Args)]
 pub(super) struct BodyArgs {
-    /// Keep the head at rest even if the face was detected.
+    /// Keep the head at rest even if the face was detected or the head was captured.
     #[arg(long, conflicts_with = "keypoints")]
     neutral_head: bool,
     /// Rotation of the shoulders about the vertical axis: applied to spine and chest, or removed, so that the figure
@@ -17,7 +19,7 @@ pub(super) struct BodyArgs {
     shoulder_yaw: ShoulderYaw,
     /// Lower body: `seated` and `standing` plant the feet under hips that follow the trunk, `none` keeps legs and
     /// hips at rest. Defaults to `seated` if hips and knees were detected and the thighs extend downwards by less
-    /// than 0.4 of the height from hips to shoulders, else to `standing`.
+    /// than 0.4 of the height from hips to shoulders, else to `standing`; captured legs keep their motion.
     #[arg(long, value_enum, value_name = "POSE")]
     legs: Option<LegsName>,
     /// Do not animate breathing, which moves the neck by 3 mm and no joint relative to it.
@@ -57,6 +59,22 @@ impl BodyArgs {
             None => Legs::Standing,
         };
         AnimationOptions { legs, ..*options }
+    }
+
+    /// Animates a motion with the parts of its captured body that the options retain, or else with its posture.
+    pub(super) fn perform(
+        &self,
+        motion: &Motion,
+        posture: Option<&Posture>,
+        body: Option<CapturedBody>,
+        options: &AnimationOptions,
+    ) -> Performance {
+        let Some(body) = body.filter(|_| self.shoulder_yaw == ShoulderYaw::Spine) else {
+            return perform(motion, posture, options);
+        };
+        let body = if self.neutral_head { body.without(CapturedPart::Head) } else { body };
+        let body = if self.legs.is_some() { body.without(CapturedPart::Legs) } else { body };
+        perform_captured(motion, &body, options)
     }
 
     /// The parts of the posture that the options retain.

@@ -2,6 +2,7 @@
 
 use anyhow::{Context as _, Result, bail, ensure};
 use ndarray::{Array3, ArrayView3};
+use orator_avatar::animate::retarget::captured_body::CapturedBody;
 use orator_base::motion::posture::{self, LiftedBody};
 use orator_base::motion::units;
 use orator_base::stage::artifacts::{Artifact, StageName};
@@ -32,6 +33,8 @@ enum InputLocation {
 pub struct InputMotion {
     pub motion: Motion,
     pub posture: Option<Posture>,
+    /// Head, trunk and legs of a capture.
+    pub body: Option<CapturedBody>,
     /// Whether the person sits; `None` if hips and knees were not detected.
     pub is_seated: Option<bool>,
     pub sound: Option<Sound>,
@@ -146,7 +149,8 @@ impl MotionInput {
             InputLocation::File(path) => {
                 let MotionFile { motion, has_rate, notes } = motion_file::read_at(path, fps)?;
                 let has_rate = has_rate || fps.is_some();
-                InputMotion { motion, posture: None, is_seated: None, sound: None, has_rate, notes }
+                let body = CapturedBody::read(path)?;
+                InputMotion { motion, posture: None, body, is_seated: None, sound: None, has_rate, notes }
             }
         };
         check(&loaded.motion).with_context(|| format!("cannot animate {}", self.name))?;
@@ -204,7 +208,7 @@ impl InputMotion {
         let lifted = LiftedBody { joints: Some(motion.joints.view()), extra: extra.map(|extra| extra.view()) };
         let posture = Some(posture::estimate(body, lifted));
         let is_seated = posture::is_seated(body);
-        Self { posture, is_seated, motion, sound: None, has_rate: true, notes: Vec::new() }
+        Self { posture, body: None, is_seated, motion, sound: None, has_rate: true, notes: Vec::new() }
     }
 }
 

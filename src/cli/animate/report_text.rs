@@ -1,6 +1,7 @@
 //! Report of an animation as text.
 
 use orator_avatar::animate::performance::{AnimationReport, DetectedFrames, Jerk};
+use orator_avatar::animate::retarget::captured_body::CapturedPart;
 use orator_base::text::counted;
 
 /// Lines about jerk, head, detected frames and clamped angles.
@@ -10,8 +11,13 @@ pub(super) fn text(report: &AnimationReport) -> String {
     let mut text = format!("jerk, m/s\u{b3}: arms {}, hands {}\n", jerk(report.arms), jerk(report.hands));
     text += &match report.face_frames {
         Some(n) if n > 0 => format!("head: detected in {n} of {}\n", counted(report.n_frames, "frame")),
+        _ if report.captured.contains(&CapturedPart::Head) => String::new(),
         _ => "head: at rest\n".to_owned(),
     };
+    if !report.captured.is_empty() {
+        let parts: Vec<_> = report.captured.iter().map(|part| part.name()).collect();
+        text += &format!("from the capture: {}\n", parts.join(", "));
+    }
     text += &detected(report);
     let clamped: Vec<_> = report.clamps.iter().filter(|clamps| clamps.joint_frames > 0).collect();
     match (report.clamps.is_empty(), clamped.is_empty()) {

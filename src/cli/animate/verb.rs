@@ -17,7 +17,8 @@ use clap::builder::BoolishValueParser;
 use orator_avatar::animate::export::file::{ExportContent, ExportFormat};
 use orator_avatar::animate::export::film::{SecondPanel, smooth_rate};
 use orator_avatar::animate::export::film_source::SourceCamera;
-use orator_avatar::animate::{AnimationOptions, Constraints, Legs, Performance, perform};
+use orator_avatar::animate::retarget::captured_body::CapturedBody;
+use orator_avatar::animate::{AnimationOptions, Constraints, Legs, Performance};
 use orator_base::motion::units;
 use orator_base::stage::progress::Progress as _;
 use orator_base::text::{counted, length};
@@ -45,7 +46,8 @@ use std::time::Instant;
 /// .npy and .txt (joints of the figure), .mp4 (video).
 ///
 /// Head and trunk follow the detected face, shoulders and hips where 2D keypoints are available: those of the dataset
-/// or run, or of --keypoints. Otherwise they stay at rest. Bone lengths and palm shapes are medians over the motion;
+/// or run, or of --keypoints. A .bvh keeps its captured head, trunk and legs, with the lengths of the legs and the
+/// positions of the hips. Otherwise they stay at rest. Bone lengths and palm shapes are medians over the motion;
 /// a palm that does not point along its hand is replaced by that of the other hand, or else by a standard one.
 ///
 /// Smoothing removes noise that is estimated for each bone; motion without noise changes by a few millimetres at
@@ -223,10 +225,10 @@ fn animate(
 ) -> Result<AnimationSummary> {
     let loaded = input.read(args.input_fps, args.keypoints.as_deref())?;
     let options = &args.body.of(&loaded, options);
-    let InputMotion { motion, posture, sound: own, has_rate, mut notes, .. } = loaded;
+    let InputMotion { motion, posture, body, sound: own, has_rate, mut notes, .. } = loaded;
     let (sound, posture) = (sound.or(own), args.body.posture(posture));
     let started = Instant::now();
-    let performance = perform(&motion, posture.as_ref(), options);
+    let performance = args.body.perform(&motion, posture.as_ref(), body, options);
     let secs = started.elapsed().as_secs_f64();
     let source = source(args, input, &motion)?;
     let film_fps = options.fps.unwrap_or_else(|| smooth_rate(motion.fps));
@@ -238,7 +240,8 @@ fn animate(
             if !other.has_rate && args.input_fps.is_none() {
                 notes.push(format!("{} does not state its frame rate: {DEFAULT_FPS} is assumed", path.display()));
             }
-            Some(perform(&other.motion, None, &AnimationOptions { fps: Some(film_fps), ..*options }))
+            let options = AnimationOptions { fps: Some(film_fps), ..*options };
+            Some(args.body.perform(&other.motion, None, CapturedBody::read(path)?, &options))
         }
         _ => None,
     };

@@ -59,7 +59,7 @@ pub struct Args {
     /// Weights written by `orator-lab train lifter --part body`; defaults to the built-in ones.
     #[arg(long, value_name = "FILE")]
     body_weights: Option<PathBuf>,
-    /// Weights written by `orator-lab train lifter --part hands`; defaults to the built-in ones.
+    /// Weights written by `orator-lab train lifter --part hands`, of either network; defaults to the built-in ones.
     #[arg(long, value_name = "FILE")]
     hand_weights: Option<PathBuf>,
     /// Standard deviation of the Gaussian that smooths the arms, in frames at 15 fps; 0 disables it.

@@ -10,7 +10,7 @@ use orator_base::stage::artifacts;
 use orator_base::stage::artifacts::StageName;
 use orator_base::stage::ledger::longest_first;
 use orator_base::text::counted;
-use orator_pipeline::{Pipeline, StagePlan, StatusReport, TimeBudget, UnitState, UnitStatus};
+use orator_pipeline::{Pipeline, StagePlan, StaleResult, StatusReport, TimeBudget, UnitState, UnitStatus};
 use serde_json::json;
 use std::path::PathBuf;
 
@@ -20,7 +20,8 @@ const REASONS_SHOWN: usize = 3;
 /// Show the state of every stage and the use of every second of video.
 ///
 /// A stage of a video is up to date, stale, failed, or waiting for an earlier stage. A second of video is accepted,
-/// rejected with a reason, missing because a stage failed, or not yet decided.
+/// rejected with a reason, missing because a stage failed, or not yet decided. Datasets and models made by an older
+/// lifter are listed with the command that rebuilds them.
 #[derive(clap::Args)]
 pub struct Args {
     #[command(flatten)]
@@ -45,9 +46,13 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     let pipeline = Pipeline::open(args.config.load()?)?;
     let work = &pipeline.config().settings.work.dir;
     enter_sandbox([artifacts::hashes(work).as_path()], [&**work]);
-    let report = pipeline.status(&args.speaker)?;
+    let mut report = pipeline.status(&args.speaker)?;
+    let flags = args.config.flags();
+    for stale in &mut report.stale {
+        stale.command = format!("orator {}{flags}", stale.command);
+    }
     let verb = if report.datasets_are_up_to_date() { "train gan" } else { "run" };
-    let next = format!("orator {verb}{}", args.config.flags());
+    let next = format!("orator {verb}{flags}");
     let mut facts = json!(report);
     facts["next"] = json!(next);
     ui.summary(&text(&report, args.why), Some(&next), facts);
@@ -75,6 +80,8 @@ fn text(report: &StatusReport, why: bool) -> String {
     lines.extend(report.time_budget.iter().filter_map(not_judged));
     let offset = |account: &TimeBudget| account.sound_offset.map(|offset| format!("{}: {offset}", account.unit));
     lines.extend(report.time_budget.iter().filter_map(offset));
+    let rebuild = |StaleResult { name, reason, command }: &StaleResult| format!("{name}: {reason}: {command}");
+    lines.extend(report.stale.iter().map(rebuild));
     if why {
         lines.push(String::new());
         lines.extend(report.units.iter().map(|UnitStatus { unit, stage, state, reason }| match state {

@@ -37,6 +37,16 @@ pub fn read_unrotated(path: &Path) -> Result<CapturedMotion> {
     read_take(path, |alignment| alignment.unrotated().unwrap_or(alignment))
 }
 
+/// Alignment by which [`read_unrotated`] converts a take; `frames` are the positions of its joints.
+///
+/// # Errors
+///
+/// Those of [`read`].
+pub fn unrotated_alignment(bvh: &Bvh, frames: &[Vec<Vec3>]) -> Result<AxisAlignment> {
+    let alignment = AxisAlignment::fit(&torso(bvh, frames)?.1)?;
+    Ok(alignment.unrotated().unwrap_or(alignment))
+}
+
 /// Parses a take from the text of a BVH file, rotated as by [`read`].
 pub fn from_text(text: &str) -> Result<CapturedMotion> {
     from_bvh(&Bvh::parse(text)?, |alignment| alignment)
@@ -54,11 +64,8 @@ fn read_take(path: &Path, align: impl Fn(AxisAlignment) -> AxisAlignment) -> Res
 }
 
 fn from_bvh(bvh: &Bvh, align: impl Fn(AxisAlignment) -> AxisAlignment) -> Result<CapturedMotion> {
-    let names: Vec<&str> = bvh.joints.iter().map(|joint| joint.name.as_str()).collect();
-    let roles = joint_names::find(&names);
-    let map = joint_map(bvh, &names, roles)?;
     let frames = bvh.positions(Positions::Auto);
-    let landmarks: Vec<TorsoLandmarks> = frames.iter().map(|frame| landmarks(frame, &map, roles)).collect();
+    let (map, landmarks) = torso(bvh, &frames)?;
     let alignment = align(AxisAlignment::fit(&landmarks)?);
     let mut joints = Array3::from_elem((frames.len(), N_JOINTS, 3), f32::NAN);
     for (t, (frame, landmarks)) in frames.iter().zip(&landmarks).enumerate() {
@@ -78,6 +85,15 @@ fn from_bvh(bvh: &Bvh, align: impl Fn(AxisAlignment) -> AxisAlignment) -> Result
     });
     let motion = Motion::from_joints(rate(bvh.frame_secs), joints);
     Ok(CapturedMotion { motion, text: None, facts: facts.as_object().cloned().unwrap_or_else(Map::new) })
+}
+
+/// Index of the file's joint for each joint of `types::skeleton`, and the landmarks of each frame.
+fn torso(bvh: &Bvh, frames: &[Vec<Vec3>]) -> Result<([Option<usize>; N_JOINTS], Vec<TorsoLandmarks>)> {
+    let names: Vec<&str> = bvh.joints.iter().map(|joint| joint.name.as_str()).collect();
+    let roles = joint_names::find(&names);
+    let map = joint_map(bvh, &names, roles)?;
+    let landmarks = frames.iter().map(|frame| landmarks(frame, &map, roles)).collect();
+    Ok((map, landmarks))
 }
 
 /// Index of the file's joint for each joint of `types::skeleton`. Errors if neck or a shoulder is missing.

@@ -5,6 +5,7 @@
 
 use anyhow::{Context, Result, bail, ensure};
 use orator_base::math::order::upper_median;
+use orator_base::math::rotation::Rotation;
 use orator_base::math::vec3::{self, Vec3};
 
 /// Known units and their length in metres: metre, centimetre, millimetre, inch, and the 0.45 inch of old CMU files.
@@ -81,6 +82,12 @@ impl AxisAlignment {
         let faces_front = self.up == "+y" && self.turned_degrees.abs() <= MAX_FACING_DEGREES;
         let axes = [[1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, -1.0]];
         faces_front.then_some(Self { axes, turned_degrees: 0.0, ..*self })
+    }
+
+    /// Rotation from the axes of the source to those of an animation rig (x to the left, y up, z forward).
+    pub fn rotation(&self) -> Rotation {
+        let [x, y, z] = self.axes;
+        Rotation::from_axes(x, vec3::scale(y, -1.0), vec3::scale(z, -1.0)).inverse()
     }
 
     /// Position of a joint in the axes of `types::skeleton`, metres from the neck.

@@ -3,13 +3,13 @@
 
 use super::hand_depth;
 use super::observed::MAX_PX;
+use super::weights::HandNetwork;
 use anyhow::Result;
 use ndarray::{ArrayView3, ArrayViewMut2, ArrayViewMut3, Axis, s};
 use orator_base::math::vec3;
 use orator_base::motion::view::hand::{HandJoints, HandPoints, parent};
 use orator_base::types::pose2d::{HAND_VISIBLE_SCORE, N_HAND};
 use orator_base::types::skeleton::Side;
-use orator_nn::lifter::hand::HandLifter;
 
 /// Least number of visible points of a hand that is lifted.
 const MIN_POINTS: usize = 12;
@@ -22,7 +22,7 @@ const BATCH: usize = 1024;
 /// # Errors
 /// Those of the network.
 pub fn lift(
-    lifter: &HandLifter,
+    lifter: &HandNetwork,
     points: &ArrayView3<f32>,
     side: Side,
     frame_secs: f32,

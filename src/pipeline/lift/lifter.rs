@@ -2,6 +2,7 @@
 
 use super::body::{OUTLIER_FRAMES, SIZE_FRAMES, TRAINED_FPS};
 use super::camera::CameraTilt;
+use super::weights::HandNetwork;
 use super::{body, gaps, hands, lengths, rest, weights};
 use anyhow::{Result, ensure};
 use ndarray::{Array2, Array3, ArrayViewMut2, ArrayViewMut3, s};
@@ -13,7 +14,6 @@ use orator_base::types::pose3d::Motion;
 use orator_base::types::skeleton::{self, L_HAND, N_BONES, N_JOINTS, R_HAND, Side};
 use orator_dataset::config;
 use orator_nn::lifter::body::BodyLifter;
-use orator_nn::lifter::hand::HandLifter;
 
 /// Longest gap that is filled, in seconds. `config` limits the gaps that `[segment]` accepts to this.
 pub(crate) const MAX_GAP_SECS: f64 = 1.0;
@@ -34,7 +34,7 @@ pub fn context_secs(settings: &config::LiftConfig) -> f64 {
 /// Lifts 2D keypoints to 3D motion.
 pub struct Lifter {
     body: BodyLifter,
-    hands: HandLifter,
+    hands: HandNetwork,
     smooth_arms: f64,
     smooth_hands: f64,
     level: bool,

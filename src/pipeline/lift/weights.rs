@@ -2,8 +2,11 @@
 
 use anyhow::{Context, Result, ensure};
 use orator_base::input;
+use orator_base::motion::view::hand::{HandJoints, HandPoints};
+use orator_base::types::skeleton::Side;
 use orator_nn::lifter::body::BodyLifter;
 use orator_nn::lifter::hand::{self, HandLifter};
+use orator_nn::lifter::heatmap_network::{self, HeatmapLifter};
 use orator_nn::lifter::temporal;
 use orator_nn::params::Params;
 use orator_nn::weights::Contents;
@@ -23,7 +26,7 @@ pub const MAX_FRAMES: usize = 729;
 /// # Errors
 /// A file that cannot be read or does not contain a body lifter within the limits.
 pub fn body(path: &Path) -> Result<BodyLifter> {
-    load(path, BODY, "body-lifter", "body", |contents, params| {
+    load(path, BODY, &["body-lifter"], "body", |contents, params| {
         let config: temporal::Config = config(contents)?;
         let expected = BodyLifter::config(config.channels.clamp(1, MAX_WIDTH), &config.widths);
         let window = config.receptive_field();
@@ -39,41 +42,66 @@ pub fn body(path: &Path) -> Result<BodyLifter> {
     })
 }
 
-/// Loads the hand lifter from a file, or the built-in one if `path` is empty.
+/// Hand lifter of either kind.
+pub enum HandNetwork {
+    Coordinates(HandLifter),
+    Heatmap(HeatmapLifter),
+}
+
+impl HandNetwork {
+    /// Lifts hands of the given side: wrist at 0, axes of the picture, any unit; `None` where too few points are
+    /// visible.
+    ///
+    /// # Errors
+    /// Those of the network.
+    pub fn lift(&self, seen: &[HandPoints], side: Side) -> Result<Vec<Option<HandJoints>>> {
+        Ok(match self {
+            Self::Coordinates(lifter) => lifter.lift(seen, side)?,
+            Self::Heatmap(lifter) => lifter.lift(seen, side)?,
+        })
+    }
+}
+
+/// Loads the hand lifter from a file, whose metadata names its kind, or the built-in one if `path` is empty.
 ///
 /// # Errors
 /// A file that cannot be read or does not contain a hand lifter within the limits.
-pub fn hands(path: &Path) -> Result<HandLifter> {
-    load(path, HANDS, "hand-lifter", "hands", |contents, params| {
+pub fn hands(path: &Path) -> Result<HandNetwork> {
+    load(path, HANDS, &[hand::KIND, heatmap_network::KIND], "hands", |contents, params| {
+        if contents.facts["kind"] == heatmap_network::KIND {
+            contents.expect_numbers(heatmap_network::N_PARAMETERS)?;
+            return Ok(HandNetwork::Heatmap(HeatmapLifter::new(params, heatmap_network::NAME)?));
+        }
         let config: hand::Config = config(contents)?;
         let expected = hand::Config { hidden: config.hidden.clamp(1, MAX_WIDTH), ..hand::Config::default() };
         ensure!(config == expected, "its network is {config:?}, expected {expected:?}");
         contents.expect_numbers(config.hidden * config.hidden)?;
-        Ok(HandLifter::new(params, hand::NAME, &config)?)
+        Ok(HandNetwork::Coordinates(HandLifter::new(params, hand::NAME, &config)?))
     })
 }
 
 fn load<T>(
     path: &Path,
     builtin: &[u8],
-    kind: &str,
+    kinds: &[&str],
     part: &str,
     make: impl Fn(&Contents, &mut Params) -> Result<T>,
 ) -> Result<T> {
     if path.as_os_str().is_empty() {
-        return parse(builtin, kind, make).with_context(|| format!("invalid built-in {kind}"));
+        return parse(builtin, kinds, make).with_context(|| format!("invalid built-in weights of the {part} lifter"));
     }
     let bytes =
         input::read(path, input::MAX_DATA).with_context(|| format!("cannot read the weights {}", path.display()))?;
-    parse(&bytes, kind, make).with_context(|| {
-        format!("{} is not a {kind}: expected weights of `orator-lab train lifter --part {part}`", path.display())
+    parse(&bytes, kinds, make).with_context(|| {
+        let kinds = kinds.join(" or ");
+        format!("{} is not a {kinds}: expected weights of `orator-lab train lifter --part {part}`", path.display())
     })
 }
 
-fn parse<T>(bytes: &[u8], kind: &str, make: impl Fn(&Contents, &mut Params) -> Result<T>) -> Result<T> {
+fn parse<T>(bytes: &[u8], kinds: &[&str], make: impl Fn(&Contents, &mut Params) -> Result<T>) -> Result<T> {
     let contents = Contents::from_bytes(bytes)?;
     let found = &contents.facts["kind"];
-    ensure!(found == kind, "it is of kind {found}, expected {kind}");
+    ensure!(kinds.iter().any(|kind| found == kind), "it is of kind {found}, expected {}", kinds.join(" or "));
     let mut params = Params::frozen();
     let net = make(&contents, &mut params)?;
     params.load(&contents.tensors)?;

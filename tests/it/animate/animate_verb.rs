@@ -25,7 +25,7 @@ fn animate(dir: &Path, args: &str) -> (i32, Value, String) {
     (output.status.code().unwrap_or(-1), json, String::from_utf8_lossy(&output.stderr).into_owned())
 }
 
-fn done(dir: &Path, args: &str) -> Value {
+pub(super) fn done(dir: &Path, args: &str) -> Value {
     let (code, json, errors) = animate(dir, args);
     assert_eq!(code, 0, "{args}: {errors}");
     json

@@ -4,6 +4,7 @@ pub(crate) mod animate;
 pub(crate) mod animate_verb;
 pub(crate) mod bvh;
 pub(crate) mod captured;
+pub(crate) mod captured_body;
 pub(crate) mod film;
 pub(crate) mod gltf;
 pub(crate) mod motion_files;

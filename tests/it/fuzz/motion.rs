@@ -1,6 +1,7 @@
 //! Readers of motion capture: BVH, the authors' text format, hand labels, and the takes of an import.
 
 use crate::fixtures::fuzzing::harness::{corpus, fixtures, folder, fuzz_bytes, fuzz_file};
+use orator_avatar::animate::retarget::captured_body::CapturedBody;
 use orator_base::types::time::FrameRate;
 use orator_dataset::import::find::TakeFiles;
 use orator_dataset::import::take::{ImportedTake, TakeLimits};
@@ -25,7 +26,7 @@ fn bvh() {
 #[test]
 fn bvh_motion() {
     fuzz_file("bvh_motion", &corpus("motion", "a.bvh"), "a.bvh", |path| {
-        let _ = (motion_file::read(path, None), upper_body::read(path), fingers::read(path));
+        let _ = (motion_file::read(path, None), upper_body::read(path), fingers::read(path), CapturedBody::read(path));
     });
 }
 

@@ -20,10 +20,14 @@ use orator_formats::timeline_npz::Timeline;
 use orator_formats::{joints_npz, keypoints_npz};
 use orator_lab::mocap::upper_body;
 use orator_lab::train::scene::body::{FilmedScene, Filming};
+use orator_nn::lifter::heatmap_network::{self, HeatmapLifter};
+use orator_nn::params::Params;
+use orator_nn::weights::Contents;
 use orator_pipeline::lift::LiftStage;
 use orator_test_support::skip::real_data;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
+use std::collections::BTreeMap;
 use std::path::Path;
 use std::process::{Command, Output};
 
@@ -250,9 +254,14 @@ fn the_command_lifts_a_body_without_hands_and_reports_bad_input() {
     assert_eq!(std::fs::read(&out).unwrap(), before, "the existing output is unchanged");
 }
 
-#[test]
-fn the_stage_writes_joints_bones_and_ledger() {
-    let dir = tempfile::tempdir().unwrap();
+/// Intervals of the video of `stage_inputs`, if it had `n_frames` frames.
+fn stage_intervals(n_frames: usize) -> Vec<u8> {
+    let intervals = Intervals::new(FrameRate::new(15, 1), n_frames, vec![Interval { start: 2, end: 68 }]);
+    serde_json::to_vec(&intervals).unwrap()
+}
+
+/// Writes the files that the stage reads under `work`: 70 frames of a rule-based speaker, every third frame repeated.
+fn stage_inputs(work: &Path) -> (Unit, Ledger) {
     let unit = Unit { speaker: "host".into(), video: "clip-00000000".into(), source: "clip.mp4".into() };
     let mut rng = ChaCha8Rng::seed_from_u64(12);
     let keypoints = keypoints(&FilmedScene::from_rule(Filming::Training, 70, &mut rng), &mut rng);
@@ -264,8 +273,8 @@ fn the_stage_writes_joints_bones_and_ledger() {
         other_hand: ndarray::Array2::from_elem((70, 2), false),
         face: None,
     };
-    let [extract, pose2d, segment] = [StageName::Extract, StageName::Pose2d, StageName::Segment]
-        .map(|stage| artifacts::dir(dir.path(), stage, &unit));
+    let [extract, pose2d, segment] =
+        [StageName::Extract, StageName::Pose2d, StageName::Segment].map(|stage| artifacts::dir(work, stage, &unit));
     [&extract, &pose2d, &segment].into_iter().for_each(|folder| std::fs::create_dir_all(folder).unwrap());
     let timeline = Timeline {
         source_secs: vec![0.0; 70],
@@ -277,12 +286,17 @@ fn the_stage_writes_joints_bones_and_ledger() {
     };
     timeline.write(&extract.join("timeline.npz")).unwrap();
     keypoints_npz::write(&pose2d.join("keypoints.npz"), &keypoints, &extras).unwrap();
-    let intervals = |n_frames| Intervals::new(keypoints.fps, n_frames, vec![Interval { start: 2, end: 68 }]);
-    std::fs::write(segment.join("intervals.json"), serde_json::to_vec(&intervals(70)).unwrap()).unwrap();
+    std::fs::write(segment.join("intervals.json"), stage_intervals(70)).unwrap();
     let accepted = AcceptedInterval { start_secs: 0.0, end_secs: 4.4 };
     let ledger = Ledger { duration_secs: 4.4, accepted: vec![accepted], ..Ledger::default() };
     std::fs::write(segment.join("ledger.json"), serde_json::to_vec(&ledger).unwrap()).unwrap();
+    (unit, ledger)
+}
 
+#[test]
+fn the_stage_writes_joints_bones_and_ledger() {
+    let dir = tempfile::tempdir().unwrap();
+    let (unit, ledger) = stage_inputs(dir.path());
     let stage = LiftStage::new(&config::LiftConfig::default(), &config::SegmentConfig::default(), dir.path()).unwrap();
     assert!(stage.inputs(&unit).unwrap().iter().all(|input| input.path.exists()));
     let report = stage.run(&unit, dir.path(), &Silent).unwrap();
@@ -302,9 +316,57 @@ fn the_stage_writes_joints_bones_and_ledger() {
     let phalanx = lengths[skeleton::L_HAND + 9] / lengths[2];
     assert!((0.15..0.25).contains(&phalanx), "a phalanx is about a fifth of the forearm: {phalanx}");
 
-    std::fs::write(segment.join("intervals.json"), serde_json::to_vec(&intervals(71)).unwrap()).unwrap();
+    let segment = artifacts::dir(dir.path(), StageName::Segment, &unit);
+    std::fs::write(segment.join("intervals.json"), stage_intervals(71)).unwrap();
     let text = format!("{:#}", stage.run(&unit, dir.path(), &Silent).unwrap_err());
     assert!(text.contains("segment again"), "{text}");
+}
+
+#[test]
+fn hand_weights_of_either_network_are_loaded_by_their_file() {
+    let dir = tempfile::tempdir().unwrap();
+    let (unit, _) = stage_inputs(dir.path());
+    let path = dir.path().join("hands.safetensors");
+    let write = |kind: &str| {
+        let mut params = Params::new(3);
+        HeatmapLifter::new(&mut params, heatmap_network::NAME).unwrap();
+        let mut contents = Contents { facts: serde_json::json!({ "kind": kind }), tensors: BTreeMap::new() };
+        contents.add("", params.tensors().unwrap());
+        contents.write(&path).unwrap();
+    };
+    let settings = config::LiftConfig { hand_weights: path.clone(), ..config::LiftConfig::default() };
+    let stage = |settings: &config::LiftConfig| LiftStage::new(settings, &config::SegmentConfig::default(), dir.path());
+    write(heatmap_network::KIND);
+    assert!(stage(&settings).unwrap().inputs(&unit).unwrap().iter().any(|input| input.path == path));
+    let lifted = |settings: &config::LiftConfig| {
+        stage(settings).unwrap().run(&unit, dir.path(), &Silent).unwrap();
+        let bones: serde_json::Value =
+            serde_json::from_slice(&std::fs::read(dir.path().join("bones.json")).unwrap()).unwrap();
+        let lengths: Vec<f64> = serde_json::from_value(bones["lengths_metres"].clone()).unwrap();
+        (joints_npz::read(&dir.path().join("joints.npz")).unwrap().joints, lengths)
+    };
+    let (built_in, _) = lifted(&config::LiftConfig::default());
+    let (joints, lengths) = lifted(&settings);
+    let hands = |joints: &Array3<f32>| joints.slice(s![.., L_HAND.., ..]).to_owned();
+    let (hands, built_in) = (hands(&joints), hands(&built_in));
+    assert!(hands.iter().zip(&built_in).all(|(a, b)| a.is_finite() == b.is_finite()));
+    assert!(hands.iter().zip(&built_in).any(|(a, b)| (a - b).abs() > 0.01), "the hands are those of the file");
+    // An untrained network has no shape of a hand, but its size follows from the forearm.
+    let size = lengths[L_HAND..L_HAND + 20].iter().sum::<f64>() / lengths[2];
+    assert!((2.9..4.4).contains(&size), "the bones of a hand are {size} forearms long");
+
+    let error = || format!("{:#}", stage(&settings).err().unwrap());
+    write("voice");
+    let text = error();
+    assert!(text.contains("hands.safetensors") && text.contains("hand-lifter or hand-heatmap-lifter"), "{text}");
+    write(heatmap_network::KIND);
+    let bytes = std::fs::read(&path).unwrap();
+    std::fs::write(&path, &bytes[..bytes.len() / 2]).unwrap();
+    assert!(error().contains("hands.safetensors"), "{}", error());
+    let few = Contents { facts: serde_json::json!({ "kind": heatmap_network::KIND }), tensors: BTreeMap::new() };
+    few.write(&path).unwrap();
+    let text = error();
+    assert!(text.contains("hands.safetensors") && text.contains("0 weights"), "{text}");
 }
 
 #[test]

@@ -6,14 +6,20 @@ use orator_dataset::verify::verify::verify;
 use orator_dataset::{Dataset, Split};
 use orator_test_support::project::{Project, files_under};
 
+use candle_core::Tensor;
+use orator_base::stage::fingerprint::hash_file;
 use orator_base::stage::progress::Silent;
+use orator_base::stage::{Stage, Unit};
 use orator_base::types::sound::Sound;
 use orator_base::types::time::FrameRate;
-use orator_formats::{npy, wav};
+use orator_dataset::config::{LiftConfig, SegmentConfig};
+use orator_formats::{checkpoint, npy, wav};
+use orator_pipeline::lift::LiftStage;
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::process::Command;
 
 fn earlier(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/before").join(name)
@@ -73,6 +79,54 @@ fn status_reads_a_work_folder() {
         eprintln!("{unit} {stage}: {value}: {reason}");
     }
     assert!(status.errors.contains("max_bone_change"), "the former name of the key is reported: {}", status.errors);
+}
+
+#[test]
+fn status_names_results_of_an_older_lifter_and_the_commands_that_rebuild_them() {
+    let project = project();
+    let stale = || {
+        let results = project.answer(&["status"]).json["stale"].clone();
+        let work = format!("{}/", project.work().display());
+        let text = |result: &Value, key: &str| result[key].as_str().unwrap().replace(&work, "work/");
+        let line = |result: &Value| ["name", "reason", "command"].map(|key| text(result, key));
+        results.as_array().into_iter().flatten().map(line).collect::<Vec<_>>()
+    };
+    let dataset = ["dataset host", "lifted by an older lifter", "orator run"].map(str::to_owned);
+    assert_eq!(stale(), [dataset.clone()]);
+    let models = project.work().join("gan/host");
+    fs::create_dir_all(&models).unwrap();
+    let write_model = |dataset: &str| {
+        let facts = json!({ "speaker": { "name": "host", "dataset": dataset } });
+        let weights: [(String, Tensor); 0] = [];
+        fs::write(models.join("best.safetensors"), checkpoint::to_bytes(&facts, weights).unwrap()).unwrap();
+    };
+    let command = "orator train gan --speaker host --out work/gan/host-new";
+    let model = |reason: &str| ["model gan/host", reason, command].map(str::to_owned);
+    write_model(&hash_file(&project.work().join("dataset/host/checksums.b3")).unwrap());
+    assert_eq!(stale(), [dataset.clone(), model("trained on a dataset of an older lifter")]);
+    let output = Command::new(env!("CARGO_BIN_EXE_orator")).arg("status").current_dir(project.dir()).output().unwrap();
+    let text = String::from_utf8_lossy(&output.stdout).into_owned() + &String::from_utf8_lossy(&output.stderr);
+    assert!(text.contains("dataset host: lifted by an older lifter: orator run\n"), "{text}");
+    let line = "model gan/host: trained on a dataset of an older lifter: orator train gan --speaker host --out ";
+    assert!(text.contains(line), "{text}");
+    write_model("another");
+    assert_eq!(stale(), [dataset, model("trained on another version of its dataset")]);
+    write_model("");
+    assert_eq!(stale().len(), 1, "the dataset of the model is unknown");
+
+    // Lifted by the present program, dataset and model are not listed.
+    let path = project.work().join("lift/host/clip-1-f39adeef.record.json");
+    let mut record: Value = serde_json::from_slice(&fs::read(&path).unwrap()).unwrap();
+    let stage = LiftStage::new(&LiftConfig::default(), &SegmentConfig::default(), &project.work()).unwrap();
+    let unit = Unit { speaker: "host".into(), video: "clip-1-f39adeef".into(), source: PathBuf::new() };
+    record["fingerprint"]["version"] = json!(stage.version());
+    record["fingerprint"]["settings"] = stage.settings(&unit);
+    fs::write(&path, record.to_string()).unwrap();
+    write_model(&hash_file(&project.work().join("dataset/host/checksums.b3")).unwrap());
+    assert_eq!(stale(), Vec::<[String; 3]>::new());
+    record["fingerprint"]["settings"]["lift"]["hand_weights"] = json!("file");
+    fs::write(&path, record.to_string()).unwrap();
+    assert_eq!(stale().len(), 2);
 }
 
 #[test]

@@ -44,7 +44,7 @@ impl BvhRig {
             scale: 1.0,
             moves: !joint.channels.is_empty(),
         };
-        UserRig { joints: self.skeleton.joints.iter().map(joint).collect(), standing_pose: self.first_frame() }
+        UserRig { joints: self.skeleton.joints.iter().map(joint).collect(), standing_pose: self.local(&self.first) }
     }
 
     /// Text of the file with new motion: the local rotations of all joints for each frame.
@@ -52,10 +52,10 @@ impl BvhRig {
         self.skeleton.to_bvh(fps, frames.map(|local| self.channels(&local)))
     }
 
-    /// Local rotations of the first frame.
-    fn first_frame(&self) -> Vec<Rotation> {
+    /// Local rotations of all joints for the channel values of a frame.
+    pub fn local(&self, values: &[f64]) -> Vec<Rotation> {
         let joints = self.skeleton.joints.iter().zip(self.skeleton.first_channels());
-        joints.map(|(joint, first)| joint.rotation(&self.first[first..]).unwrap_or(Rotation::IDENTITY)).collect()
+        joints.map(|(joint, first)| joint.rotation(&values[first..]).unwrap_or(Rotation::IDENTITY)).collect()
     }
 
     fn channels(&self, local: &[Rotation]) -> Vec<f64> {

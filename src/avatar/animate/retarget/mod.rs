@@ -4,6 +4,7 @@
 pub mod bone_map;
 pub mod bone_names;
 pub mod bvh_rig;
+pub mod captured_body;
 pub mod glb_rig;
 pub mod retargeted;
 pub mod transfer;

@@ -69,14 +69,7 @@ impl<'a> Transfer<'a> {
     pub fn new(rig: &Rig, user: &'a UserRig, map: &BoneMap) -> Result<Self> {
         let ours = &rig.skeleton;
         let t_pose = ours.positions(rig.root, &vec![Rotation::IDENTITY; ours.joints.len()]);
-        let undetermined = "cannot determine left, right, up and down in the rest pose";
-        let (rest, standing) = (user.at_rest(), user.standing_pose());
-        let at_rest = facing(&rest, map);
-        let standing_axes = facing(&standing, map).or(at_rest).context(undetermined)?;
-        // If the zero pose is not upright like the standing pose, the standing pose is the reference.
-        let at_rest = at_rest.filter(|axes| dot(axes.axes()[1], standing_axes.axes()[1]) > MIN_UPRIGHT_COS);
-        let is_rest_pose = at_rest.is_some();
-        let (rest, axes) = at_rest.map_or_else(|| (standing, upright(standing_axes)), |axes| (rest, axes));
+        let ReferencePose { joints: rest, axes, is_rest_pose } = ReferencePose::of(user, map)?;
         let reference = ComparedPoses { t_pose: &t_pose, rest: &rest, axes, is_rest_pose };
         let mut moved = vec![None; user.joints.len()];
         for (n, bone) in ours.joints.iter().enumerate() {
@@ -146,6 +139,33 @@ impl<'a> Transfer<'a> {
     /// Whether a joint is moved.
     pub fn moves(&self, joint: usize) -> bool {
         self.moved[joint].is_some()
+    }
+}
+
+/// Pose of a user's skeleton that corresponds to our rest pose.
+pub struct ReferencePose {
+    pub joints: Vec<JointTransform>,
+    /// From our axes to those of the file.
+    pub axes: Rotation,
+    /// Whether it is the user's rest pose; otherwise it is the standing pose.
+    pub is_rest_pose: bool,
+}
+
+impl ReferencePose {
+    /// The rest pose, or the standing pose if the rest pose is not upright like it.
+    ///
+    /// # Errors
+    /// Left and right or up and down cannot be determined.
+    pub fn of(user: &UserRig, map: &BoneMap) -> Result<Self> {
+        let (rest, standing) = (user.at_rest(), user.standing_pose());
+        let at_rest = facing(&rest, map);
+        let undetermined = "cannot determine left, right, up and down in the rest pose";
+        let standing_axes = facing(&standing, map).or(at_rest).context(undetermined)?;
+        let at_rest = at_rest.filter(|axes| dot(axes.axes()[1], standing_axes.axes()[1]) > MIN_UPRIGHT_COS);
+        Ok(match at_rest {
+            Some(axes) => Self { joints: rest, axes, is_rest_pose: true },
+            None => Self { joints: standing, axes: upright(standing_axes), is_rest_pose: false },
+        })
     }
 }
 

@@ -70,9 +70,9 @@ pub enum LifterPart {
 
 #[derive(Clone, Copy, PartialEq, clap::ValueEnum)]
 enum HandNetwork {
-    /// Multi-layer perceptron on the keypoint coordinates, used by `lift`.
+    /// Multi-layer perceptron on the keypoint coordinates, the kind of the built-in weights.
     Coordinates,
-    /// Convolutional network on score maps (Zimmermann & Brox 2017), for comparison; slow.
+    /// Convolutional network on score maps (Zimmermann & Brox 2017); slow.
     Heatmap,
 }
 

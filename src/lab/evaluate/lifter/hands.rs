@@ -5,10 +5,7 @@
 
 use crate::mocap::fingers::files::FingerSet;
 use crate::mocap::fingers::take::Truth;
-use crate::train::lifter::heatmaps;
-use crate::train::lifter::heatmaps::HeatmapLifterTask;
 use crate::train::scene::hand_shape::{normal, random_rotation};
-use crate::train::supervised::start_from;
 use anyhow::{Result, ensure};
 use orator_base::math::order::median;
 use orator_base::math::procrustes;
@@ -17,8 +14,6 @@ use orator_base::motion::hand_bones::relaxed;
 use orator_base::motion::view::hand::{HandJoints, HandPoints, parent};
 use orator_base::types::pose2d::N_HAND;
 use orator_base::types::skeleton::Side;
-use orator_formats::checkpoint;
-use orator_nn::lifter::hand::HandLifter;
 use orator_pipeline::lift::weights;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -77,13 +72,8 @@ pub fn evaluate(lift: &LiftHands, sets: &[FingerSet], n_hands: usize, seed: u64)
 
 /// Loads a lifter of either network from a weights file (the built-in one if `path` is empty).
 pub fn lifter_of(path: &Path) -> Result<Box<LiftHands<'static>>> {
-    if !path.as_os_str().is_empty() && checkpoint::facts(path)?["kind"] == heatmaps::KIND {
-        let training_task = HeatmapLifterTask::new(0)?;
-        start_from(&training_task, path)?;
-        return Ok(Box::new(move |seen| Ok(training_task.lifter().lift(seen, Side::Right)?)));
-    }
-    let lifter: HandLifter = weights::hands(path)?;
-    Ok(Box::new(move |seen| Ok(lifter.lift(seen, Side::Right)?)))
+    let lifter = weights::hands(path)?;
+    Ok(Box::new(move |seen| lifter.lift(seen, Side::Right)))
 }
 
 fn row(lift: &LiftHands, set: &FingerSet, n_hands: usize, seed: u64) -> Result<HandRow> {

@@ -8,7 +8,7 @@ use orator_base::motion::view::hand::{HandView, N_IN, N_OUT};
 use orator_base::types::pose2d::N_HAND;
 use orator_base::types::skeleton::Side;
 use orator_nn::Mode;
-use orator_nn::lifter::hand::{Config, HandLifter, NAME};
+use orator_nn::lifter::hand::{Config, HandLifter, KIND, NAME};
 use orator_nn::params::Params;
 use rand_chacha::ChaCha8Rng;
 use serde_json::{Value, json};
@@ -37,7 +37,7 @@ impl HandLifterTask {
 
 impl TrainingTask for HandLifterTask {
     fn kind(&self) -> &'static str {
-        "hand-lifter"
+        KIND
     }
 
     fn metadata(&self) -> Value {

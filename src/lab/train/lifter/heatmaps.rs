@@ -2,8 +2,6 @@
 //! canonical frame and the rotation of that frame. The hands are those of the coordinate network's training, all of
 //! them right ones.
 
-use super::heatmap_network::{HeatmapLifter, NAME, right_sides};
-use super::score_maps::{Crop, MAP_SIZE, canonical, score_maps};
 use crate::train::scene::hand::{errors, sample_hand};
 use crate::train::scene::hand_shape::normal;
 use crate::train::supervised::TrainingTask;
@@ -12,13 +10,13 @@ use candle_core::Tensor;
 use orator_base::types::pose2d::N_HAND;
 use orator_base::types::skeleton::Side;
 use orator_nn::Mode;
+use orator_nn::lifter::heatmap_network::{HeatmapLifter, KIND, NAME, right_sides};
+use orator_nn::lifter::score_maps::{Crop, MAP_SIZE, canonical, score_maps};
 use orator_nn::params::Params;
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 use serde_json::{Value, json};
 
-/// Kind of the weights file.
-pub const KIND: &str = "hand-heatmap-lifter";
 /// Output rows of three numbers: the points, then the rows of the rotation matrix.
 const N_ROWS: usize = N_HAND + 3;
 
@@ -40,10 +38,6 @@ impl HeatmapLifterTask {
         let mut params = Params::new(seed);
         let lifter = HeatmapLifter::new(&mut params, NAME)?;
         Ok(Self { params, lifter })
-    }
-
-    pub fn lifter(&self) -> &HeatmapLifter {
-        &self.lifter
     }
 }
 
@@ -102,8 +96,8 @@ impl TrainingTask for HeatmapLifterTask {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::train::lifter::score_maps::N_MAPS;
     use candle_core::Device;
+    use orator_nn::lifter::score_maps::N_MAPS;
     use rand::SeedableRng;
 
     #[test]

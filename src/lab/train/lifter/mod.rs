@@ -1,9 +1,6 @@
-//! Training of the lifters: body, hands, and the hand heat-map baseline with its network.
+//! Training of the lifters: body, and hands with either network.
 
 pub mod body;
-pub mod conv3x3;
 pub mod errors;
 pub mod hands;
-pub mod heatmap_network;
 pub mod heatmaps;
-pub mod score_maps;

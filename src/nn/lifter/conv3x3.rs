@@ -1,9 +1,9 @@
 //! 2D convolution with 3 x 3 kernels, padding "same", channels last: the input patch of every output pixel becomes a
 //! row, and the layer one matrix product.
 
+use crate::cpu::axis::ConvAxis;
+use crate::params::{Init, Params};
 use candle_core::{Result, Tensor};
-use orator_nn::cpu::axis::ConvAxis;
-use orator_nn::params::{Init, Params};
 
 /// `<name>.weight` [O, C, 3, 3] (Glorot uniform) and `<name>.bias` [O] (1e-4).
 pub struct Conv3x3 {
@@ -51,8 +51,8 @@ fn input_indices(batch: usize, down: ConvAxis, across: ConvAxis) -> Vec<u32> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::ops::gradcheck::{pattern, worst};
     use candle_core::DType;
-    use orator_nn::ops::gradcheck::{pattern, worst};
 
     #[test]
     fn gradients_are_right_at_even_and_odd_sizes() -> Result<()> {
