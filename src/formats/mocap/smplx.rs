@@ -48,6 +48,11 @@ pub fn hands(path: &Path) -> Result<[(Side, Vec<HandFrame>); 2]> {
     Ok([(25, Side::Left), (40, Side::Right)].map(|(first, side)| (side, frames(first, side))))
 }
 
+/// Joints of the rest hand in the axes of the T-pose, relative to the wrist.
+pub fn rest_hand(side: Side) -> HandFrame {
+    hand(side, |_, _| Rotation::IDENTITY)
+}
+
 /// Computes one hand from its joint rotations, given by finger (in file order) and joint.
 fn hand(side: Side, rotation: impl Fn(usize, usize) -> Rotation) -> HandFrame {
     let mut joints: HandFrame = [[0.0; 3]; N_HAND];

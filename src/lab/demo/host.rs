@@ -20,7 +20,7 @@ pub fn scene(body: u64, seed: u64, secs: f64, fps: FrameRate) -> PersonScene {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let speech = Speech::free(secs, &mut rng);
     let motion = RuleGestures::with_variation(&speech, &[], secs, &mut rng).motion(fps.frames_in(secs), fps);
-    let clip = CapturedClip { motion, sound: Some(speech.sound(secs, &mut rng)) };
+    let clip = CapturedClip { motion, sound: Some(speech.sound(secs, &mut rng)), trunk: Vec::new() };
     let seeds = ClipSeeds { body, clothes: body, camera: body, motion: seed, voice: None };
     PersonScene::new(Condition::Front, seeds, secs, fps, Some(&clip))
 }

@@ -4,6 +4,7 @@
 //! truth of rendered persons. A take is one continuous excerpt: files are split where the body jumps, as after an
 //! initial T-pose.
 
+use super::neck::neck;
 use crate::rendered_truth::{BODY_JOINTS, RenderedTruth};
 use anyhow::{Context, Result, bail, ensure};
 use orator_base::math::order::upper_median;
@@ -16,6 +17,7 @@ use orator_formats::bvh::joint_names;
 use orator_formats::bvh::read::{Bvh, Positions};
 use orator_formats::npz::Npz;
 use orator_formats::search;
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 /// A continuous excerpt of captured motion.
@@ -36,10 +38,9 @@ impl BodyTake {
 }
 
 /// Indices of the ten joints (`joint_names::ROLES`) among the 38 of the CMU `.npz`.
-const CMU_38: [usize; 10] = [17, 18, 30, 31, 32, 21, 22, 23, 8, 2];
-
+pub(super) const CMU_38: [usize; 10] = [17, 18, 30, 31, 32, 21, 22, 23, 8, 2];
 /// Number of T-pose frames at the start of a CMU take, which are dropped.
-const T_POSE_FRAMES: usize = 1;
+pub(super) const T_POSE_FRAMES: usize = 1;
 /// Largest mean displacement of the points between two frames at 60 frames/s, metres; a take is split at larger ones.
 const LARGEST_JUMP: f64 = 0.1;
 /// Length of upper arm and forearm of the mean adult, metres.
@@ -125,7 +126,7 @@ fn read_bvh(path: &Path) -> Result<Vec<BodyTake>> {
 
 /// Index in `names` (root first) of each joint of `joint_names::ROLES`; the root replaces both hips if the skeleton
 /// has none. The error lists the missing joints and the existing names.
-fn named_joints(names: &[&str]) -> Result<[usize; 10]> {
+pub(super) fn named_joints(names: &[&str]) -> Result<[usize; 10]> {
     let mut found = joint_names::find(names);
     if found[8..] == [None, None] {
         found[8..].fill(Some(0));
@@ -204,7 +205,7 @@ fn read_ted(path: &Path, mut npz: Npz) -> Result<Vec<BodyTake>> {
     let pose = |t: usize| -> Pose {
         let point = |j: usize| -> Vec3 { std::array::from_fn(|k| joints[[t, j, k]]) };
         let (right, left) = (point(3), point(2));
-        let neck = vec3::scale(vec3::add(right, left), 0.5);
+        let neck = neck(right, left);
         let spine = vec3::scale(vec3::sub(point(0), point(1)), 0.5 / 0.26);
         let half = vec3::scale(vec3::sub(left, right), 0.25);
         let hips = [vec3::sub(spine, half), vec3::add(spine, half)].map(|p| vec3::add(p, neck));
@@ -234,7 +235,7 @@ fn read_cmu(mut npz: Npz) -> Result<Vec<BodyTake>> {
 /// 6 cm above and 11 cm in front of the head joint, perpendicular to the shoulders, because the sources lack the
 /// head's orientation.
 fn upper_body(joints: &[Vec3]) -> Pose {
-    let neck = vec3::scale(vec3::add(joints[2], joints[5]), 0.5);
+    let neck = neck(joints[2], joints[5]);
     let across = vec3::sub(joints[5], joints[2]);
     let up = vec3::sub(joints[1], joints[0]);
     let ahead = vec3::unit(vec3::cross(across, up), 1e-9).unwrap_or([0.0, 0.0, 1.0]);
@@ -250,16 +251,27 @@ fn upper_body(joints: &[Vec3]) -> Pose {
     })
 }
 
+/// Ranges of at least a second without jumps.
+pub(super) fn continuous(fps: f64, poses: &[Pose]) -> Vec<Range<usize>> {
+    let limit = LARGEST_JUMP * 60.0 / fps * N_POINTS as f64;
+    let jump = |a: &Pose, b: &Pose| a.iter().zip(b).map(|(a, b)| vec3::norm(vec3::sub(*a, *b))).sum::<f64>();
+    let mut end = 0;
+    let ranges = poses.chunk_by(|a, b| jump(a, b) <= limit).map(|part| {
+        end += part.len();
+        end - part.len()..end
+    });
+    ranges.filter(|range| range.len() as f64 >= SHORTEST_SECS * fps).collect()
+}
+
 /// Splits poses at jumps; excerpts that are too short are dropped.
 fn split_at_jumps(name: &str, fps: f64, poses: Vec<Pose>) -> Vec<BodyTake> {
-    let limit = LARGEST_JUMP * 60.0 / fps;
-    let jump =
-        |a: &Pose, b: &Pose| (0..N_POINTS).map(|j| vec3::norm(vec3::sub(a[j], b[j]))).sum::<f64>() / N_POINTS as f64;
-    let excerpts = poses.chunk_by(|a, b| jump(a, b) <= limit);
-    let long = excerpts.filter(|s| s.len() as f64 >= SHORTEST_SECS * fps);
-    long.enumerate()
-        .map(|(i, s)| BodyTake { name: format!("{name}#{i}"), fps, poses: s.to_vec(), rendered: false })
-        .collect()
+    let take = |(i, part): (usize, Range<usize>)| BodyTake {
+        name: format!("{name}#{i}"),
+        fps,
+        poses: poses[part].to_vec(),
+        rendered: false,
+    };
+    continuous(fps, &poses).into_iter().enumerate().map(take).collect()
 }
 
 #[cfg(test)]

@@ -7,6 +7,7 @@ use orator_base::types::time::FrameRate;
 use orator_lab::demo::people::condition::Condition;
 use orator_lab::demo::people::folder::{self, ClipSeeds, RenderPlan, SetPart};
 use orator_lab::demo::people::scene::PersonScene;
+use orator_lab::mocap::captured::source::MotionSource;
 use orator_lab::rendered_truth::{RenderedTruth, Visibility};
 use orator_media::ffmpeg::frames::FrameReader;
 use orator_test_support::project::Project;
@@ -18,8 +19,8 @@ const FPS: FrameRate = FrameRate::new(3, 1);
 const SEEDS: [u64; 3] = [2, 20, 28];
 
 fn plan(conditions: &[Condition]) -> RenderPlan {
-    let (conditions, motion) = (conditions.to_vec(), None);
-    RenderPlan { conditions, n_clips: 3, secs: 1.0, fps: FPS, seed: 4, motion, truth_only: false }
+    let (conditions, motions) = (conditions.to_vec(), vec![MotionSource::Generated]);
+    RenderPlan { conditions, n_clips: 3, secs: 1.0, fps: FPS, seed: 4, motions, truth_only: false }
 }
 
 fn bytes(dir: &Path, file: &Path) -> Vec<u8> {

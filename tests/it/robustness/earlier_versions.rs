@@ -92,7 +92,7 @@ fn status_names_results_of_an_older_lifter_and_the_commands_that_rebuild_them() 
         results.as_array().into_iter().flatten().map(line).collect::<Vec<_>>()
     };
     let dataset = ["dataset host", "lifted by an older lifter", "orator run"].map(str::to_owned);
-    assert_eq!(stale(), [dataset.clone()]);
+    assert_eq!(stale(), std::slice::from_ref(&dataset));
     let models = project.work().join("gan/host");
     fs::create_dir_all(&models).unwrap();
     let write_model = |dataset: &str| {

@@ -10,6 +10,7 @@ use crate::demo::more_speech;
 use crate::demo::people;
 use crate::demo::people::condition::Condition;
 use crate::demo::people::folder::RenderPlan;
+use crate::mocap::captured::source::MotionSource;
 use anyhow::{Context, Result, bail, ensure};
 use orator::cli::Outcome;
 use orator::cli::ui::Ui;
@@ -59,9 +60,11 @@ enum DemoVerb {
         /// --mocap DIR/truth`.
         #[arg(long, requires = "people")]
         truth_only: bool,
-        /// Captured motion of the rendered persons, a file or a folder; the audio is the .wav next to it.
-        #[arg(long, value_name = "FILE|DIR", requires = "people")]
-        motion: Option<PathBuf>,
+        /// Motion of the rendered persons; every clip is rendered with the motion of each source: generated (the
+        /// default), cmu, bandai, beat2, ted (captured motion below the folder ORATOR_DATA), or a motion file or
+        /// folder (the audio is the .wav next to it).
+        #[arg(long, value_name = "SOURCE|PATH", num_args = 1.., requires = "people")]
+        motion: Vec<MotionSource>,
         /// Render the speaker as a person for the models for real people (`orator models fetch`), instead of as a
         /// figure in a marker suit for the marker models.
         #[arg(long, conflicts_with = "people")]
@@ -162,7 +165,8 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
             if let Some(n_clips) = people {
                 let conditions = Condition::of_names(&conditions)?;
                 let secs = secs.unwrap_or(PEOPLE_SECS);
-                return render(&dir, &RenderPlan { conditions, n_clips, secs, fps, seed, motion, truth_only }, ui);
+                let motions = if motion.is_empty() { vec![MotionSource::Generated] } else { motion };
+                return render(&dir, &RenderPlan { conditions, n_clips, secs, fps, seed, motions, truth_only }, ui);
             }
             let defaults = DemoPlan::default();
             let plan = DemoPlan { n_videos: videos, secs: secs.unwrap_or(defaults.secs), fps, seed, ..defaults };

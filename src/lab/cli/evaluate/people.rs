@@ -2,6 +2,7 @@
 
 use crate::evaluate::people::page;
 use crate::evaluate::people::{grid, keypoint_statistics, table};
+use crate::mocap::captured::source::MotionSource;
 use anyhow::Result;
 use orator::cli::Outcome;
 use orator::cli::ui::Ui;
@@ -9,7 +10,7 @@ use orator_base::stage::workdir;
 use serde_json::json;
 use std::path::PathBuf;
 
-/// Measure the errors of a run on rendered persons, by condition.
+/// Measure the errors of a run on rendered persons, by condition or by source of the motion.
 ///
 /// Compared with the ground truth: 2D keypoints, hands (missed, detected on the other hand, swapped, false positives),
 /// falsely accepted and rejected seconds, and lifted joints. The errors of the joints are printed next to those of
@@ -25,6 +26,10 @@ pub struct Args {
     /// Measure only this part of the clips: first, middle or last.
     #[arg(long, value_name = "PART")]
     part: Option<String>,
+    /// Measure only clips with motion of these sources: generated, cmu, bandai, beat2, ted. If there is captured
+    /// motion, errors are printed by source, with the difference between captured and generated motion.
+    #[arg(long, value_name = "SOURCE", num_args = 1..)]
+    motion: Vec<MotionSource>,
     /// Configuration files of runs on real clips, whose keypoints are compared with the rendered ones: scores,
     /// jitter, detected hands.
     #[arg(long, value_name = "FILE", num_args = 1..)]
@@ -37,7 +42,7 @@ pub struct Args {
 pub fn run(args: &Args, ui: &Ui) -> Result<Outcome> {
     let default = [args.dir.join("pipeline.toml")];
     let config: &[PathBuf] = if args.config.is_empty() { &default } else { &args.config };
-    let rows = table::table(&args.dir, config, args.part.as_deref())?;
+    let rows = table::table(&args.dir, config, args.part.as_deref(), &args.motion)?;
     let files: Vec<&PathBuf> =
         if args.real.is_empty() { Vec::new() } else { config.iter().chain(&args.real).collect() };
     let statistics = files.into_iter().map(|file| keypoint_statistics::of_config(file)).collect::<Result<Vec<_>>>()?;

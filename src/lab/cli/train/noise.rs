@@ -33,7 +33,7 @@ pub fn run(args: &Args, ui: &Ui) -> Result<Outcome> {
     ensure!(!args.out.is_dir(), "invalid --out {}: it is a folder, expected a file", args.out.display());
     let mut measured = MeasuredNoise { bodies: Vec::new(), hands: Vec::new() };
     for file in &args.config {
-        let clips = clips::read(&args.dir, file, Some(&args.part))?;
+        let clips = clips::read(&args.dir, file, Some(&args.part), &[])?;
         let set = file.file_stem().unwrap_or_default().to_string_lossy();
         measured.bodies.push(noise::fit(&set, &clips));
         measured.hands.push(hand_noise::fit(&set, &clips));

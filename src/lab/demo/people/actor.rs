@@ -5,17 +5,18 @@ use super::condition::{GestureStyle, Seat};
 use super::contact::{Obstacles, Slab};
 use super::held::HeldObject;
 use super::motion::{ActorMotion, LeanStyle};
+use super::scene::CapturedClip;
 use super::trunk::SeatedRig;
 use super::vocabulary::{DESK_AHEAD, DESK_BELOW_NECK};
 use super::voice::Voice;
 use crate::demo::appearance;
+use crate::demo::captured_body::{self, TrunkRotations};
 use orator_avatar::animate::avatar::Avatar;
 use orator_avatar::animate::rig::rig::{CM, Rig};
 use orator_avatar::animate::{AnimationOptions, Constraints, Smoothing, Yaw, perform};
 use orator_avatar::render::Mesh;
 use orator_base::math::rotation::Rotation;
 use orator_base::math::vec3::{Vec3, add};
-use orator_base::types::pose3d::Motion;
 use orator_base::types::time::FrameRate;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -70,12 +71,12 @@ pub struct ActorSeeds {
 
 impl Actor {
     /// Creates a person that moves to a voice for `n_steps` steps at `fps`; captured motion replaces the procedural
-    /// arm gestures.
+    /// gestures of the arms, and of trunk and head if it has them.
     pub fn new(
         seeds: ActorSeeds,
         role: ActorRole,
         voice: &Voice,
-        captured: Option<&Motion>,
+        captured: Option<&CapturedClip>,
         fps: FrameRate,
         n_steps: usize,
     ) -> Self {
@@ -101,7 +102,8 @@ impl Actor {
         };
         let own_rig = build.rig();
         let performed = match captured {
-            Some(motion) => perform(motion, None, &options),
+            Some(clip) if clip.trunk.is_empty() => perform(&clip.motion, None, &options),
+            Some(clip) => captured_body::perform(&clip.motion, &build, &options, |secs| actor_motion.arms(secs)),
             None => {
                 let seated = SeatedRig { rig: &own_rig, seat: role.seat, knees, shins };
                 let obstacles = obstacles(&seated, &build, actor_motion.lean_style, front);
@@ -124,7 +126,12 @@ impl Actor {
                 let now = fps.secs(step);
                 let posture = actor_motion.trunk(now);
                 let mut local = performed.clip.local[step.min(last)].clone();
+                let chest = local[0] * local[rig.spine] * local[rig.chest];
                 seated.pose(&posture, &mut local);
+                let trunk = captured.and_then(|clip| TrunkRotations::at(&clip.trunk, now * clip.motion.fps.per_sec()));
+                if let Some(trunk) = trunk {
+                    trunk.apply(&rig, chest, &mut local);
+                }
                 local[0] = turn * local[0];
                 let root = add(turn.turn(seated.root(&posture)), shift);
                 let mouth = if role.speaks { voice.mouth(now) } else { voice.chewing(now) };

@@ -165,7 +165,8 @@ pub fn joints(build: &Build, arms: &[ArmPosture; 2], wrists: [Vec3; 2]) -> [Vec3
     joints
 }
 
-fn hand_joints(build: &Build, arm: &ArmPosture, elbow: Vec3, wrist: Vec3, sign: f64) -> [Vec3; N_HAND_JOINTS] {
+/// Joints of a hand in the posture `arm`, in the same axes as elbow and wrist.
+pub fn hand_joints(build: &Build, arm: &ArmPosture, elbow: Vec3, wrist: Vec3, sign: f64) -> [Vec3; N_HAND_JOINTS] {
     let ahead = [0.0, 0.0, -1.0];
     let direction = |a: Vec3| unit(a, 1e-9).unwrap_or(ahead);
     let forearm = direction(sub(wrist, elbow));

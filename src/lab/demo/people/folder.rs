@@ -3,6 +3,9 @@
 
 use super::condition::Condition;
 use super::scene::{CapturedClip, PersonScene};
+use crate::demo::captured_body;
+use crate::mocap::captured::source::{MotionSource, data_folder};
+use crate::mocap::captured::take::CapturedTake;
 
 pub use super::scene::ClipSeeds;
 use crate::rendered_truth::LIST;
@@ -48,9 +51,15 @@ pub struct PersonClip {
     /// Frame rate, frames/s, as a fraction.
     pub fps: [u32; 2],
     pub secs: f64,
-    /// File of the captured motion, if one was used.
+    /// File or excerpt of the captured motion, if one was used.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub motion: Option<PathBuf>,
+    /// Name of the source of the motion, unless it is generated.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub source: Option<String>,
+    /// Joints of captured motion that are generated, since the capture lacks them.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub generated_joints: Vec<usize>,
 }
 
 /// Rendering plan.
@@ -62,8 +71,8 @@ pub struct RenderPlan {
     pub secs: f64,
     pub fps: FrameRate,
     pub seed: u64,
-    /// File or folder of captured motion.
-    pub motion: Option<PathBuf>,
+    /// Sources of motion; every clip is rendered once with the motion of each.
+    pub motions: Vec<MotionSource>,
     /// Write only the ground truth, without videos: training motion for the lifters.
     pub truth_only: bool,
 }
@@ -91,50 +100,130 @@ pub fn draw(dir: &Path, plan: &RenderPlan, progress: &dyn Progress) -> Result<Ve
     let n = plan.n_clips;
     ensure!(n > 0 && n.is_multiple_of(3), "invalid --people {n}: expected a positive multiple of 3");
     ensure!((1.0..=600.0).contains(&plan.secs), "invalid --secs {}: expected 1 to 600", plan.secs);
-    let motions = plan.motion.as_deref().map(motions).transpose()?.unwrap_or_default();
     let (mut clips, mut configuration) = (Vec::new(), PIPELINE.to_owned());
-    for &condition in &plan.conditions {
-        let name = condition.name();
-        let mut files = [const { Vec::new() }; 3];
-        for number in 0..n {
-            let part = SetPart::ALL[3 * number / n];
-            let seeds = seeds(plan.seed, condition, number, part);
-            let motion = (!motions.is_empty()).then(|| motions[clips.len() % motions.len()].clone());
-            let captured = motion.as_deref().map(captured).transpose()?;
-            let secs = captured.as_ref().map_or(plan.secs, |clip| plan.secs.min(secs_of(&clip.motion)));
-            let scene = PersonScene::new(condition, seeds, secs, plan.fps, captured.as_ref());
-            let stem = format!("{name}-{}", number + 1);
-            let video = PathBuf::from(format!("videos/{name}/{stem}.mp4"));
-            let truth = PathBuf::from(format!("truth/{name}/{stem}.npz"));
-            let mut known = plan.truth_only.then(|| scene.truth_without_pictures());
-            if !plan.truth_only {
-                workdir::replace(&dir.join(&video), |attempt| {
-                    known = Some(scene.film(attempt, progress)?);
-                    Ok(())
-                })?;
+    for source in &plan.motions {
+        let motions = Motions::read(source, plan.secs)?;
+        let is_plain = match source {
+            MotionSource::Generated => true,
+            MotionSource::Files(_) => plan.motions.len() == 1,
+            _ => false,
+        };
+        for (order, &condition) in plan.conditions.iter().enumerate() {
+            let prefix = if is_plain { String::new() } else { format!("{}-", source.name()) };
+            let name = format!("{prefix}{}", condition.name());
+            let mut files = [const { Vec::new() }; 3];
+            for number in 0..n {
+                let part = SetPart::ALL[3 * number / n];
+                let place = ClipPlace { part, order, number, n_conditions: plan.conditions.len(), n };
+                let Some(SourceMotion { captured, motion, generated_joints }) = motions.of_clip(place)? else {
+                    continue;
+                };
+                let seeds = seeds(plan.seed, condition, number, part);
+                let secs = captured.as_ref().map_or(plan.secs, |clip| plan.secs.min(secs_of(&clip.motion)));
+                let scene = PersonScene::new(condition, seeds, secs, plan.fps, captured.as_ref());
+                let stem = format!("{name}-{}", number + 1);
+                let video = PathBuf::from(format!("videos/{name}/{stem}.mp4"));
+                let truth = PathBuf::from(format!("truth/{name}/{stem}.npz"));
+                let mut known = plan.truth_only.then(|| scene.truth_without_pictures());
+                if !plan.truth_only {
+                    workdir::replace(&dir.join(&video), |attempt| {
+                        known = Some(scene.film(attempt, progress)?);
+                        Ok(())
+                    })?;
+                }
+                known.context("the rendered clip has no ground truth")?.write(&dir.join(&truth))?;
+                files[3 * number / n].push(format!("\"{stem}.mp4\""));
+                clips.push(PersonClip {
+                    video,
+                    truth,
+                    condition: condition.name().to_owned(),
+                    part,
+                    seeds,
+                    size: scene.camera.size,
+                    focal_px: scene.camera.focal_px,
+                    fps: [plan.fps.num, plan.fps.den],
+                    secs: plan.fps.secs(scene.n_frames),
+                    motion,
+                    source: (*source != MotionSource::Generated).then(|| source.name().to_owned()),
+                    generated_joints,
+                });
             }
-            known.context("the rendered clip has no ground truth")?.write(&dir.join(&truth))?;
-            files[3 * number / n].push(format!("\"{stem}.mp4\""));
-            clips.push(PersonClip {
-                video,
-                truth,
-                condition: name.to_owned(),
-                part,
-                seeds,
-                size: scene.camera.size,
-                focal_px: scene.camera.focal_px,
-                fps: [plan.fps.num, plan.fps.den],
-                secs: plan.fps.secs(scene.n_frames),
-                motion,
-            });
+            let [train, validation, test] = files.map(|files| files.join(", "));
+            let splits = format!("train = [{train}]\nvalidation = [{validation}]\ntest = [{test}]");
+            configuration += &SPEAKER.replace("NAME", &name).replace("SPLITS", &splits);
         }
-        let [train, validation, test] = files.map(|files| files.join(", "));
-        let splits = format!("train = [{train}]\nvalidation = [{validation}]\ntest = [{test}]");
-        configuration += &SPEAKER.replace("NAME", name).replace("SPLITS", &splits);
     }
+    ensure!(!clips.is_empty(), "the sources of motion have no takes for these parts");
     workdir::write_file(&dir.join(LIST), &serde_json::to_vec_pretty(&clips)?)?;
     workdir::write_file(&dir.join("pipeline.toml"), configuration.as_bytes())?;
     Ok(clips)
+}
+
+/// Motion of the clips of one source.
+enum Motions {
+    Generated,
+    Files(Vec<PathBuf>),
+    /// Excerpts of each part.
+    Excerpts([Vec<CapturedTake>; 3]),
+}
+
+/// Position of a clip in a plan of `n` clips for each condition.
+#[derive(Clone, Copy)]
+struct ClipPlace {
+    part: SetPart,
+    /// Index of the condition, and of the clip within it.
+    order: usize,
+    number: usize,
+    n_conditions: usize,
+    n: usize,
+}
+
+#[derive(Default)]
+struct SourceMotion {
+    captured: Option<CapturedClip>,
+    motion: Option<PathBuf>,
+    generated_joints: Vec<usize>,
+}
+
+impl Motions {
+    fn read(source: &MotionSource, secs: f64) -> Result<Self> {
+        let excerpts = |data: &Path, part: SetPart| -> Result<Vec<CapturedTake>> {
+            Ok(source.takes(data, part)?.iter().flat_map(|take| take.excerpts(secs)).collect())
+        };
+        match source {
+            MotionSource::Generated => Ok(Self::Generated),
+            MotionSource::Files(path) => Ok(Self::Files(motion_files(path)?)),
+            _ => {
+                let data = data_folder()?;
+                let [first, middle, last] = SetPart::ALL.map(|part| excerpts(&data, part));
+                Ok(Self::Excerpts([first?, middle?, last?]))
+            }
+        }
+    }
+
+    /// Motion of a clip; `None` if the source has none for its part. The clips of a part take excerpts at even
+    /// distances.
+    fn of_clip(&self, place: ClipPlace) -> Result<Option<SourceMotion>> {
+        let ClipPlace { part, order, number, n_conditions, n } = place;
+        match self {
+            Self::Generated => Ok(Some(SourceMotion::default())),
+            Self::Files(files) => {
+                let file = &files[(order * n + number) % files.len()];
+                let captured = Some(captured(file)?);
+                Ok(Some(SourceMotion { captured, motion: Some(file.clone()), ..SourceMotion::default() }))
+            }
+            Self::Excerpts(excerpts) => {
+                let (excerpts, n_of_part) = (&excerpts[part as usize], n / 3);
+                let index = order * n_of_part + number % n_of_part;
+                let take = excerpts.get(index * excerpts.len() / (n_conditions * n_of_part));
+                Ok(take.map(|take| SourceMotion {
+                    captured: Some(captured_body::clip(take)),
+                    motion: Some(PathBuf::from(&take.name)),
+                    generated_joints: take.missing_joints(),
+                }))
+            }
+        }
+    }
 }
 
 /// Reads the clip list of a folder written by `draw`.
@@ -164,7 +253,7 @@ fn seeds(seed: u64, condition: Condition, number: usize, part: SetPart) -> ClipS
 }
 
 /// The motion files of a folder, sorted by name, or the file itself.
-fn motions(path: &Path) -> Result<Vec<PathBuf>> {
+fn motion_files(path: &Path) -> Result<Vec<PathBuf>> {
     if !path.is_dir() {
         return Ok(vec![path.to_owned()]);
     }
@@ -188,7 +277,7 @@ fn captured(path: &Path) -> Result<CapturedClip> {
     ensure!(secs_of(&motion) >= 1.0, "the motion {} is too short: expected at least 1 s", path.display());
     let audio = path.with_extension("wav");
     let sound = audio.is_file().then(|| read_sound(&audio)).transpose()?;
-    Ok(CapturedClip { motion, sound })
+    Ok(CapturedClip { motion, sound, trunk: Vec::new() })
 }
 
 #[cfg(test)]

@@ -11,6 +11,7 @@ use super::truth;
 use super::truth::{FrameTruth, PointOwners};
 use super::view;
 use super::voice::Voice;
+use crate::demo::captured_body::TrunkRotations;
 use crate::rendered_truth::RenderedTruth;
 use orator_avatar::render::{Background, Light, Mesh, PinholeCamera, Renderer};
 use orator_base::stage::progress::Progress;
@@ -43,11 +44,15 @@ pub struct ClipSeeds {
     pub voice: Option<u64>,
 }
 
-/// Captured motion with its sound.
+/// Captured motion with its sound, if it has one.
 #[derive(Clone, Debug)]
 pub struct CapturedClip {
     pub motion: Motion,
     pub sound: Option<Sound>,
+    /// Trunk and head of each frame. If they are given, the motion drives a standing body with the proportions of its
+    /// seed and a generated voice; otherwise the body has the bone lengths of the motion, and trunk and head are
+    /// generated.
+    pub trunk: Vec<TrunkRotations>,
 }
 
 /// A clip ready to be rendered.
@@ -77,13 +82,15 @@ impl PersonScene {
         let n_frames = fps.frames_in(secs);
         let n_steps = if condition == Condition::Fast { BLUR_STEPS } else { 1 };
         let step_fps = FrameRate::new(fps.num * n_steps as u32, fps.den);
+        let has_trunk = captured.is_some_and(|clip| !clip.trunk.is_empty());
         let voice = match captured {
-            Some(clip) => Voice::recorded(seeds.motion, secs, clip.sound.clone()),
-            None => Voice::new(seeds.motion, secs, seeds.voice),
+            Some(clip) if !has_trunk => Voice::recorded(seeds.motion, secs, clip.sound.clone()),
+            _ => Voice::new(seeds.motion, secs, seeds.voice),
         };
         let mut rng = ChaCha8Rng::seed_from_u64(seeds.camera);
         let seat = condition.seat().unwrap_or([Seat::Standing, Seat::Chair, Seat::Desk][rng.random_range(0..3)]);
         let seat = if condition == Condition::TwoPersons && seat == Seat::Desk { Seat::Chair } else { seat };
+        let seat = if has_trunk { Seat::Standing } else { seat };
         let role = ActorRole {
             gesture_style: condition.gesture_style(),
             seat,
@@ -92,12 +99,11 @@ impl PersonScene {
             turn: rng.random_range(-0.1..0.1),
             speaks: true,
         };
-        let act = |seeds: ActorSeeds, role: ActorRole, voice: &Voice, motion: Option<&Motion>| {
-            Actor::new(seeds, role, voice, motion, step_fps, n_frames * n_steps)
+        let act = |seeds: ActorSeeds, role: ActorRole, voice: &Voice, clip: Option<&CapturedClip>| {
+            Actor::new(seeds, role, voice, clip, step_fps, n_frames * n_steps)
         };
         let ClipSeeds { body, clothes, motion, .. } = seeds;
-        let mut actors =
-            vec![act(ActorSeeds { body, clothes, motion }, role, &voice, captured.map(|clip| &clip.motion))];
+        let mut actors = vec![act(ActorSeeds { body, clothes, motion }, role, &voice, captured)];
         if condition == Condition::TwoPersons {
             let side = if rng.random_bool(0.5) { 1.0 } else { -1.0 };
             let position = [side * rng.random_range(52.0..75.0), -rng.random_range(25.0..70.0)];

@@ -26,6 +26,9 @@ pub struct AcceptedSeconds {
     pub false_accepts: f64,
     /// Rejected although both hands and all arm points are visible and correctly detected.
     pub false_rejects: f64,
+    /// Share of the accepted seconds that are correct, and share of the correct ones that are accepted, 0..1.
+    pub precision: f64,
+    pub recall: f64,
 }
 
 impl AcceptedSeconds {
@@ -50,6 +53,9 @@ impl AcceptedSeconds {
                 }
             }
         }
+        let correct = sum.accepted - sum.false_accepts;
+        sum.precision = correct / sum.accepted;
+        sum.recall = correct / (correct + sum.false_rejects);
         sum
     }
 }
@@ -136,5 +142,6 @@ mod tests {
         let near = |a: f64, b: f64| (a - b).abs() < 1e-9;
         assert!(near(seconds.accepted, 25.0 / 15.0) && near(seconds.total, 40.0 / 15.0));
         assert!(near(seconds.false_accepts, 6.0 / 15.0) && near(seconds.false_rejects, 1.0), "{seconds:?}");
+        assert!(near(seconds.precision, 19.0 / 25.0) && near(seconds.recall, 19.0 / 34.0), "{seconds:?}");
     }
 }

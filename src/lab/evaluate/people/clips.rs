@@ -1,5 +1,6 @@
 //! Rendered clips: results of a run together with the ground truth, frame by frame at the dataset rate.
 
+use crate::mocap::captured::source::MotionSource;
 use crate::rendered_truth::{LIST, RenderedTruth, Visibility};
 use anyhow::{Context, Result, ensure};
 use ndarray::{Axis, s};
@@ -22,12 +23,26 @@ pub struct ListedClip {
     pub condition: String,
     /// first, middle or last: part of the split by bodies, cameras, clothes and motions.
     pub part: String,
+    /// Source of captured motion; generated motion has none.
+    pub source: Option<String>,
+    #[serde(default)]
+    pub generated_joints: Vec<usize>,
+}
+
+impl ListedClip {
+    fn source(&self) -> &str {
+        self.source.as_deref().unwrap_or(MotionSource::Generated.name())
+    }
 }
 
 /// A clip with the ground truth at the frames of its keypoints.
 #[derive(Clone, Debug)]
 pub struct RenderedClip {
     pub condition: String,
+    /// Name of the source of its motion.
+    pub source: String,
+    /// Joints of captured motion that are generated; errors exclude them.
+    pub generated_joints: Vec<usize>,
     pub keypoints: Keypoints,
     /// Ground truth of each frame of the keypoints.
     pub truth: RenderedTruth,
@@ -84,11 +99,12 @@ pub struct HandArrays<'a> {
     pub visibility: ndarray::ArrayView2<'a, Visibility>,
 }
 
-/// Reads the clips of the folder `dir` that the configuration's run has lifted, optionally only those of `part`.
+/// Reads the clips of the folder `dir` that the configuration's run has lifted, optionally only those of `part` and of
+/// the named `sources` of motion.
 ///
 /// # Errors
 /// A missing list or ground truth; a clip that the configuration does not name or that is not lifted yet.
-pub fn read(dir: &Path, config_file: &Path, part: Option<&str>) -> Result<Vec<RenderedClip>> {
+pub fn read(dir: &Path, config_file: &Path, part: Option<&str>, sources: &[MotionSource]) -> Result<Vec<RenderedClip>> {
     let config = config::load(config_file, &[])?;
     let path = dir.join(LIST);
     let text = std::fs::read_to_string(&path).with_context(|| {
@@ -100,12 +116,14 @@ pub fn read(dir: &Path, config_file: &Path, part: Option<&str>) -> Result<Vec<Re
     let list: Vec<ListedClip> =
         serde_json::from_str(&text).with_context(|| format!("invalid list of rendered clips {}", path.display()))?;
     let units = units(&config);
-    let selected = list.iter().filter(|clip| part.is_none_or(|part| clip.part == part));
+    let has_source = |clip: &ListedClip| sources.is_empty() || sources.iter().any(|s| s.name() == clip.source());
+    let selected = list.iter().filter(|clip| part.is_none_or(|part| clip.part == part) && has_source(clip));
     let clips = selected.map(|listed| read_clip(dir, listed, &units, &config)).collect::<Result<Vec<_>>>()?;
     ensure!(
         !clips.is_empty(),
-        "no clip{} in {}",
+        "no clip{}{} in {}",
         part.map_or(String::new(), |p| format!(" of part `{p}`")),
+        if sources.is_empty() { "" } else { " with motion of these sources" },
         path.display()
     );
     Ok(clips)
@@ -141,7 +159,15 @@ fn read_clip(dir: &Path, listed: &ListedClip, units: &[Unit], config: &Config) -
         keypoints.n_frames(),
         truth.n_frames()
     );
-    Ok(RenderedClip { condition: listed.condition.clone(), keypoints, truth, intervals })
+    let (condition, source) = (listed.condition.clone(), listed.source().to_owned());
+    Ok(RenderedClip {
+        condition,
+        source,
+        generated_joints: listed.generated_joints.clone(),
+        keypoints,
+        truth,
+        intervals,
+    })
 }
 
 /// Ground truth of the frames that are shown at `times`, seconds.
@@ -264,7 +290,8 @@ pub mod tests {
             speaks: Array1::from_elem(n, true),
         };
         let intervals = Intervals::new(fps, n, vec![Interval { start: 0, end: n }]);
-        RenderedClip { condition: "front".to_owned(), keypoints, truth, intervals }
+        let (condition, source) = ("front".to_owned(), "generated".to_owned());
+        RenderedClip { condition, source, generated_joints: Vec::new(), keypoints, truth, intervals }
     }
 
     #[test]

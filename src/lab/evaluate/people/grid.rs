@@ -1,6 +1,7 @@
 //! Text grids of the rows of rendered persons: one each for 2D points, for hands and head, for seconds, and for
 //! joints.
 
+use super::difference;
 use super::joints::LiftedErrors;
 use super::points::GROUPS;
 use super::table::ConditionRow;
@@ -19,7 +20,8 @@ pub struct Grid {
 
 /// Grids of the rows of one model set.
 pub fn grids(rows: &[ConditionRow]) -> Vec<Grid> {
-    vec![points(rows), hands(rows), seconds(rows), joints(rows)]
+    let grids = [points(rows), hands(rows), seconds(rows), joints(rows)];
+    grids.into_iter().chain(difference::grid(rows)).collect()
 }
 
 /// Grids of all model sets as text, followed by `last` if given.
@@ -47,7 +49,7 @@ impl Grid {
     }
 }
 
-fn heads(names: &[&str]) -> Vec<String> {
+pub fn heads(names: &[&str]) -> Vec<String> {
     names.iter().map(|&name| name.to_owned()).collect()
 }
 
@@ -117,15 +119,25 @@ fn seconds(rows: &[ConditionRow]) -> Grid {
     let cells = |ConditionRow { condition, seconds: s, mask: m, .. }: &ConditionRow| {
         let mut cells: Vec<String> =
             [s.total, s.accepted, s.false_accepts, s.false_rejects].map(|secs| number(secs, 1)).into();
-        cells.extend([m.visible_share, m.masked].map(percent));
+        cells.extend([s.precision, s.recall, m.visible_share, m.masked].map(percent));
         (condition.clone(), cells)
     };
     Grid {
         title: "seconds",
         note: "False accepts: a hand is a false positive, on the other hand, swapped or misplaced, or an arm point is \
-               far off; false rejects: both hands and arms are visible and correct. Mask precision: % of the joints \
-               marked visible that are visible; recall: % of the visible joints that are marked visible.",
-        heads: heads(&["total", "accepted", "false accepts", "false rejects", "mask precision", "mask recall"]),
+               far off; false rejects: both hands and arms are visible and correct; precision and recall of the \
+               accepted seconds in %. Mask precision: % of the joints marked visible that are visible; recall: % of \
+               the visible joints that are marked visible.",
+        heads: heads(&[
+            "total",
+            "accepted",
+            "false accepts",
+            "false rejects",
+            "precision",
+            "recall",
+            "mask precision",
+            "mask recall",
+        ]),
         rows: rows.iter().map(cells).collect(),
     }
 }
@@ -139,15 +151,31 @@ fn joints(rows: &[ConditionRow]) -> Grid {
             ("  mean pose of the clip".to_owned(), mean_pose),
         ];
         named.map(|(name, e)| {
-            let errors = [e.mpjpe, e.p_mpjpe, e.elbow, e.elbow_depth, e.wrist, e.wrist_depth, e.hand];
-            (name, errors.map(|mm| number(mm, 0)).into_iter().chain([e.n_frames.to_string()]).collect())
+            let body = [e.mpjpe, e.p_mpjpe, e.elbow, e.elbow_depth, e.wrist, e.wrist_depth];
+            let errors = body.into_iter().chain([e.wrist_velocity, e.hand, e.hand_depth]).chain(e.of_neck);
+            (name, errors.map(|mm| number(mm, 0)).chain([e.n_frames.to_string()]).collect())
         })
     };
     Grid {
         title: "3D joints, mm",
-        note: "Errors of shoulders, elbows and wrists relative to the neck in accepted frames, one scale factor per 60 \
-               frames; |dz|: along the line of sight; hand: fingers relative to their wrist.",
-        heads: heads(&["MPJPE", "P-MPJPE", "elbow", "|dz|", "wrist", "|dz|", "hand", "frames"]),
+        note: "Errors of shoulders, elbows and wrists relative to the midpoint of the shoulders in accepted frames, one \
+               scale factor per 60 frames; |dz|: along the line of sight; velocity: wrists, mm per frame; hand: \
+               fingers relative to their wrist. Neck: relative to the neck joint of each skeleton.",
+        heads: heads(&[
+            "MPJPE",
+            "P-MPJPE",
+            "elbow",
+            "|dz|",
+            "wrist",
+            "|dz|",
+            "velocity",
+            "hand",
+            "|dz|",
+            "neck: MPJPE",
+            "elbow",
+            "wrist",
+            "frames",
+        ]),
         rows: rows.iter().flat_map(lines).collect(),
     }
 }
