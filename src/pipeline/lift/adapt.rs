@@ -31,7 +31,7 @@ const MAX_STRETCHES: usize = 200;
 /// value still describes how much nearer points are enlarged better than none.
 const FOCAL: f64 = 1.5;
 /// Training steps per round, and the seed.
-const STEPS: usize = 80;
+const STEPS: usize = 50;
 const SEED: u64 = 1337;
 
 /// The step; its units are speakers.

@@ -95,9 +95,10 @@ impl Stage for LiftStage {
         let weights = [("body weights", &self.settings.body_weights), ("hand weights", &self.settings.hand_weights)];
         let given = weights.into_iter().filter(|(_, path)| !path.as_os_str().is_empty());
         inputs.extend(given.map(|(role, path)| input(role, path.clone())));
-        if self.is_adapted() {
-            inputs.push(input("adapted body weights", adapted_weights(&self.work, &unit.speaker)));
-        }
+        // Before the lifter is adapted, no lift has this input, so that all are stale.
+        let adapted =
+            Some(adapted_weights(&self.work, &unit.speaker)).filter(|path| self.is_adapted() && path.exists());
+        inputs.extend(adapted.map(|path| input("adapted body weights", path)));
         Ok(inputs)
     }
 

@@ -81,3 +81,39 @@ pub fn reprojection_error(lifted: &[LiftedStretch], lengths: &ArmLengths) -> f64
     }
     sum / f64::from(n)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::lifter::adapt::samples::KeypointStretch;
+    use orator_base::motion::upper_body::BodyPoints;
+
+    /// A body whose arms reach forward, with these lengths of its bones, and its picture.
+    #[test]
+    fn only_the_true_bone_lengths_have_no_reprojection_error() {
+        let lengths = [0.30, 0.36, 0.24];
+        let xs = [0.0, -0.2, -0.3, -0.1, 0.2, 0.3, 0.1, -0.1, 0.1];
+        let pose: Pose = std::array::from_fn(|j| [xs[j], 0.1 * j as f64 * xs[j].abs(), -0.3 * ((j % 3) as f64 - 1.0)]);
+        let mut pose = pose;
+        (pose[R_SHOULDER], pose[L_SHOULDER]) = ([-0.15, 0.0, 0.0], [0.15, 0.0, 0.0]);
+        let pose = with_lengths(&pose, &lengths);
+        let found = arm_lengths([pose].iter()).unwrap();
+        assert!(found.iter().zip(lengths).all(|(found, length)| (found - length).abs() < 1e-9), "{found:?}");
+
+        let (focal_px, neck) = (1500.0, [0.1, -0.2, 2.0]);
+        let picture = |p: Vec3| {
+            let [x, y, z] = vec3::add(p, neck);
+            Some([x, y].map(|v| (640.0 + focal_px * v / z) as f32))
+        };
+        let frames: Vec<BodyPoints> = vec![pose.map(picture); 3];
+        let keypoints = KeypointStretch { frames, step: 1.0, centre_px: [640.0; 2], focal_px };
+        let poses = vec![pose; 3];
+        let px: Vec<Pose> = poses.iter().map(|pose| pose.map(|p| vec3::scale(p, focal_px / neck[2]))).collect();
+        let metres_per_px = metres_per_px(&px, 1.0);
+        assert!((metres_per_px[1] - neck[2] / focal_px).abs() < 1e-9);
+        let lifted = [LiftedStretch { keypoints: &keypoints, poses, metres_per_px, usable: vec![0, 2] }];
+        assert!(reprojection_error(&lifted, &lengths) < 1e-5);
+        assert!(reprojection_error(&lifted, &[0.36, 0.29, 0.25]) > 0.01);
+        assert!(reprojection_error(&[], &lengths).is_nan());
+    }
+}
