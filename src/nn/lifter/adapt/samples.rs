@@ -184,5 +184,5 @@ impl LabelledWindows {
 
 /// Number of mean 0 and variance 1, within 3: the sum of three uniform ones.
 fn normal(rng: &mut ChaCha8Rng) -> f64 {
-    (0..3).map(|_| rng.random_range(-1.0..1.0)).sum()
+    (0..3).map(|_| rng.random_range(-1.0f64..1.0)).sum()
 }

@@ -92,9 +92,9 @@ mod tests {
     #[test]
     fn only_the_true_bone_lengths_have_no_reprojection_error() {
         let lengths = [0.30, 0.36, 0.24];
-        let xs = [0.0, -0.2, -0.3, -0.1, 0.2, 0.3, 0.1, -0.1, 0.1];
-        let pose: Pose = std::array::from_fn(|j| [xs[j], 0.1 * j as f64 * xs[j].abs(), -0.3 * ((j % 3) as f64 - 1.0)]);
-        let mut pose = pose;
+        let xs: [f64; 9] = [0.0, -0.2, -0.3, -0.1, 0.2, 0.3, 0.1, -0.1, 0.1];
+        let mut pose: Pose =
+            std::array::from_fn(|j| [xs[j], 0.1 * j as f64 * xs[j].abs(), -0.3 * ((j % 3) as f64 - 1.0)]);
         (pose[R_SHOULDER], pose[L_SHOULDER]) = ([-0.15, 0.0, 0.0], [0.15, 0.0, 0.0]);
         let pose = with_lengths(&pose, &lengths);
         let found = arm_lengths([pose].iter()).unwrap();
