@@ -133,7 +133,7 @@ fn any_number_of_threads_gives_the_same_weights() {
     assert!(one == bytes(2) && one == bytes(1));
 }
 
-/// A project with `videos` of 24 s, of which none is adapted yet.
+/// Pipeline of one speaker with these videos, and this value of `[lift] adapt`.
 fn project(root: &Path, videos: &[&str], adapt: &str) -> Pipeline {
     let file = root.join("pipeline.toml");
     std::fs::write(&file, format!("[[speaker]]\nname = \"host\"\nvideos = {videos:?}\n")).unwrap();
