@@ -19,7 +19,8 @@ pub mod videos;
 pub use auto::{Auto, number};
 pub use choices::{
     AdversarialLoss, BoneLoss, ComputeDevice, ContinuityLoss, DistanceLoss, FineMotionReading, FollowRule, GanRecipe,
-    MotionRepresentation, NetworkPreset, SeamState, SequenceNetwork, SpeechRule, SplitUnit, VarianceLoss,
+    LifterAdaptation, MotionRepresentation, NetworkPreset, SeamState, SequenceNetwork, SpeechRule, SplitUnit,
+    VarianceLoss,
 };
 pub use file::{Problem, SourceLocation};
 pub use former::to_stored;

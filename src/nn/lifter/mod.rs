@@ -1,6 +1,7 @@
 //! Networks for lifting from 2D to 3D: the temporal-convolution network and the body lifter based on it, and the hand
-//! lifters on coordinates and on score maps.
+//! lifters on coordinates and on score maps. `adapt` fits the body lifter to one speaker.
 
+pub mod adapt;
 pub mod body;
 pub mod conv3x3;
 pub mod hand;
