@@ -170,7 +170,8 @@ mod tests {
                         assert!(error(a, b) < 1.0, "body {body}, frame {t}, bone {a} to {b}: {}", error(a, b));
                     }
                     let fingers = (L_HAND + 1..N_JOINTS).filter(|&joint| !is_duplicate(joint));
-                    for joint in fingers.filter(|joint| with_fingers && !((joint - L_HAND - 1) % 21).is_multiple_of(4)) {
+                    for joint in fingers.filter(|joint| with_fingers && !((joint - L_HAND - 1) % 21).is_multiple_of(4))
+                    {
                         let error = error(parent(joint).unwrap(), joint);
                         assert!(error < 1.0, "body {body}, frame {t}, finger joint {joint}: {error}");
                     }
