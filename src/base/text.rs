@@ -4,6 +4,8 @@
 pub fn counted(n: usize, noun: &str) -> String {
     match noun.strip_suffix('y').filter(|stem| !stem.ends_with(['a', 'e', 'o', 'u'])) {
         _ if n == 1 => format!("1 {noun}"),
+        // The only noun in which "ch" is a k.
+        None if noun == "epoch" => format!("{n} epochs"),
         Some(stem) => format!("{n} {stem}ies"),
         None if ["s", "x", "ch", "sh"].iter().any(|end| noun.ends_with(end)) => format!("{n} {noun}es"),
         None => format!("{n} {noun}s"),

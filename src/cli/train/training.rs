@@ -110,9 +110,12 @@ pub(super) fn train_all(
     train_one: impl Fn(&String) -> Result<TrainedModel>,
 ) -> Result<Outcome> {
     let (mut text, mut facts, mut next, mut n_failed) = (String::new(), Vec::new(), None, 0);
+    let mut outcome = None;
     for speaker in config.settings.speaker.iter().map(|speaker| &speaker.name) {
         if ui.is_to_stop() {
-            break;
+            text += &format!("{speaker}: not trained: stopped on request\n");
+            outcome = Some(Outcome::Stopped);
+            continue;
         }
         match train_one(speaker) {
             Ok(trained) => {
@@ -132,7 +135,7 @@ pub(super) fn train_all(
         }
     }
     ui.summary(&text, next.as_deref(), json!({ "speakers": facts, "next": next }));
-    Ok(if n_failed == 0 { Outcome::Done } else { Outcome::SomeFailed })
+    Ok(outcome.unwrap_or(if n_failed == 0 { Outcome::Done } else { Outcome::SomeFailed }))
 }
 
 /// Steps per second of a call that trained from step `began_at` to `steps` in `secs`, as text and number.

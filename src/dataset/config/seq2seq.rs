@@ -38,7 +38,7 @@ auto_section! {
         #[serde(alias = "hears_context")]
         audio_context: bool = false,
         discriminator_blocks: usize = 2 => (2.0, 6.0, "blocks"),
-        autoencoder_steps: usize = 2_000 => (0.0, 1e9, "steps"),
+        autoencoder_steps: C = count => (0.0, 1e9, "steps"),
         seed: u64 = 1337,
         epoch_steps: C = count => (1.0, 1e9, "steps"),
         patience: usize = 0,
@@ -70,6 +70,7 @@ impl Default for Seq2seqSettings {
             stride_frames: 0,
             batch: 50,
             epochs: 1,
+            autoencoder_steps: 2_000,
             steps: 20_000,
             learning_rate: 1e-3,
             lambda_adversarial: 0.01,

@@ -123,11 +123,15 @@ pub fn write(
     outputs: &[(PathBuf, ExportFormat)],
     progress: &dyn Progress,
 ) -> Result<MotionReport> {
+    ensure!(
+        !speech.carry_state || speaker.has_state(),
+        "the model of {} has no decoder state: omit --carry-state",
+        speaker.name()
+    );
     match speaker {
         TrainedSpeaker::Gan(speaker) => {
             let name = speaker.name();
             ensure!(speech.transcript.is_none(), "the model of {name} does not use words: omit --transcript");
-            ensure!(!speech.carry_state, "the model of {name} does not generate in segments: omit --carry-state");
             write_motion(speaker, speech, outputs, progress)
         }
         TrainedSpeaker::Sequence(speaker) => write_sequence(speaker, speech, outputs, progress),

@@ -114,6 +114,11 @@ impl TrainedSpeaker {
         }
     }
 
+    /// Whether the model has a decoder, whose state can be carried from segment to segment.
+    pub fn has_state(&self) -> bool {
+        matches!(self, Self::Sequence(speaker) if speaker.has_state())
+    }
+
     /// Whether the model reads words.
     pub fn reads_words(&self) -> bool {
         self.architecture().is_some_and(|of| architecture::word_encoder(of).is_some())

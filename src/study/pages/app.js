@@ -141,7 +141,7 @@ async function oneTrial({ position, n_trials: total, trial }) {
     playsBefore: plays?.position === position ? plays.n : 0,
     onplay(n) {
       keep("plays", { position, n });
-      started ??= withRetries(() => backend.start(position), () => {}).catch(() => {});
+      started ??= withRetries(() => backend.start(position), onWait).catch(() => {});
     },
   });
   const { feedback, state } = await send({ position, ...answer }, started);

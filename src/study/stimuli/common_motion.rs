@@ -43,6 +43,11 @@ impl CommonVisibility {
         Some(Self { joints, angles })
     }
 
+    /// Number of visible joints of all frames.
+    pub fn n_visible(&self) -> usize {
+        self.joints.iter().filter(|seen| **seen).count()
+    }
+
     /// Performance of a motion at its own rate, restricted to the common visibility and on the common body.
     pub fn performance(&self, shown: &ShownMotion, body: &CommonBody) -> Performance {
         let mut motion = shown.motion.clone();

@@ -60,15 +60,14 @@ impl ConditionModels {
 fn open(condition: &StudyCondition, path: &Path, speaker: &str) -> Result<Vec<EvaluatedCheckpoint>> {
     let mut opened = EvaluatedCheckpoint::open_all(&[fill_pattern(path, speaker, "")], speaker)?;
     for EvaluatedCheckpoint { speaker, .. } in &opened {
-        let (name, reads_words, is_sequence) =
-            (speaker.name(), speaker.reads_words(), speaker.architecture().is_some());
+        let (name, reads_words) = (speaker.name(), speaker.reads_words());
         ensure!(
             condition.words.is_none() || reads_words,
             "the model of {name} does not read words: remove the key words"
         );
         ensure!(
-            !condition.carry_state || is_sequence,
-            "the model of {name} does not generate in segments: remove the key carry_state"
+            !condition.carry_state || speaker.has_state(),
+            "the model of {name} has no decoder state: remove the key carry_state"
         );
     }
     let words = condition.words.as_ref().map(|path| WordVectors::open(&fill_pattern(path, speaker, "")));

@@ -3,13 +3,13 @@
 
 use super::common_motion::{CommonBody, CommonVisibility};
 use super::condition_motion::{ConditionModels, ShownMotion, motions, sound_of};
-use super::cut::{CutSpeech, StudyClip, cut};
+use super::cut::{CutSpeech, MAX_HIDDEN, StudyClip, cut};
 use super::film::{self, FilmScene};
 use super::speaker_source::SpeakerSource;
 use crate::file::{StudyCondition, StudyFile, StudySpeaker};
 use crate::pages::assets::SOUND_CHECK_TONES;
 use crate::plan::{FilmContent, FilmSound};
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result, bail, ensure};
 use orator_avatar::animate::Performance;
 use orator_avatar::animate::export::film_avatar::AvatarStage;
 use orator_base::audio::loudness;
@@ -114,10 +114,18 @@ impl CutSpeaker {
         let all: Vec<&ShownMotion> = motions.values().flatten().collect();
         let body = CommonBody::of(&source.bone_lengths, &all);
         let visibility = |clip: usize| {
-            let own = motions.values().map(|of_condition| &of_condition[clip]);
+            let own: Vec<&ShownMotion> = motions.values().map(|of_condition| &of_condition[clip]).collect();
             // The films of a clip are shared by participants for whom different motions are drawn.
-            let of_clip: Vec<&ShownMotion> = own.chain(drawn.values().flatten()).collect();
-            CommonVisibility::of(&of_clip).context("the study has no conditions")
+            let of_clip: Vec<&ShownMotion> = own.iter().copied().chain(drawn.values().flatten()).collect();
+            let [of_own, of_all] = [&own, &of_clip].map(|shown| CommonVisibility::of(shown));
+            let (of_own, of_all) = of_own.zip(of_all).context("the study has no conditions")?;
+            ensure!(
+                of_all.n_visible() as f64 >= (1.0 - MAX_HIDDEN) * of_own.n_visible() as f64,
+                "the motions drawn for mismatched films have too many undetected joints, which would be hidden in all \
+                 films of {}: set mismatched = \"fixed\" in [clips]",
+                source.name
+            );
+            Ok(of_all)
         };
         let visibilities: Vec<CommonVisibility> = (0..cut.clips.len()).map(visibility).collect::<Result<_>>()?;
         let task = progress.begin(&format!("avatar of {}", source.name), all.len() as u64);

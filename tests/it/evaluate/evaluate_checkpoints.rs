@@ -159,7 +159,7 @@ fn networks_of_both_trainings_are_evaluated_in_one_table() {
     assert!(fails(&["gan", "--words", "table.safetensors"]).contains("omit --words"));
     assert!(
         fails(&["gan", "words", "--words", "table.safetensors"])
-            .contains("have 2 dimensions, those of the model of host 100")
+            .contains("the model of host was trained without a table of word vectors")
     );
     assert!(fails(&["gan", "nowhere"]).contains("nowhere does not exist"));
     assert!(fails(&["data"]).contains("no checkpoint in data"));

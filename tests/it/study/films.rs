@@ -222,7 +222,7 @@ fn a_model_condition_may_carry_its_state_and_read_word_vectors() {
     assert_ne!(of("carry_state = true"), plain);
     assert_ne!(of("words = \"{speaker}.safetensors\""), plain);
     for (key, error) in [
-        ("carry_state = true", "the model of host does not generate in segments: remove the key carry_state"),
+        ("carry_state = true", "the model of host has no decoder state: remove the key carry_state"),
         ("words = \"host.safetensors\"", "the model of host does not read words: remove the key words"),
     ] {
         let text = format!("{:#}", joints("gan.safetensors", key).unwrap_err());

@@ -30,7 +30,7 @@ fn settings(network: SequenceNetwork) -> Seq2seqConfig {
     match network {
         SequenceNetwork::Audio => Seq2seqConfig { scheduled_sampling: 0.5, ..settings },
         SequenceNetwork::Adversarial => Seq2seqConfig { discriminator_blocks: 3, ..settings },
-        SequenceNetwork::Autoencoder => Seq2seqConfig { autoencoder_steps: 3, ..settings },
+        SequenceNetwork::Autoencoder => Seq2seqConfig { autoencoder_steps: 3.into(), ..settings },
         SequenceNetwork::Contextual | SequenceNetwork::Words => settings,
     }
 }
@@ -234,6 +234,10 @@ fn doubtful_transcripts_and_changed_captures_are_reported() {
     assert!(log.contains(late) && log.contains("1 of 2 words have pretrained vectors"), "{log}");
     assert_eq!(open().rate, 16_000);
     assert!(SequenceGenerator::open(&out("a")).unwrap().metadata.vocabulary.words() == ["hello", "world"]);
+    assert!(SequenceGenerator::open(&out("a")).unwrap().metadata.has_word_vectors);
+    let audio = settings(SequenceNetwork::Audio);
+    let rejected = train(TrainingSource::Captures(&open()), Some(&english), &audio, &out("audio"), &Silent);
+    assert!(rejected.unwrap_err().to_string().contains("the network \"audio\" does not read words: omit --words"));
     let german = table("hallo 1 2\n").unwrap();
     assert!(training_log(&open(), Some(&german), &out("b")).unwrap().contains("0 of 2 words have pretrained vectors"));
     let error = format!("{:#}", training_log(&open(), Some(&german), &out("a")).unwrap_err());

@@ -78,14 +78,14 @@ impl EvaluatedCheckpoint {
             "none of the checkpoints is of a network that reads words: omit --words"
         );
         ensure!(
-            !carry_state || checkpoints.iter().any(|of| of.seams().is_some()),
-            "none of the checkpoints is of a network that generates in segments: omit --carry-state"
+            !carry_state || checkpoints.iter().any(|of| of.speaker.has_state()),
+            "none of the checkpoints is of a network with a decoder state: omit --carry-state"
         );
         for of in checkpoints {
             if let Some(words) = words.filter(|_| of.speaker.reads_words()) {
                 of.speaker.set_word_vectors(words.clone())?;
             }
-            of.carry_state = carry_state && of.seams().is_some();
+            of.carry_state = carry_state && of.speaker.has_state();
         }
         Ok(())
     }

@@ -1,7 +1,7 @@
 //! Generates poses for a sound of any length segment by segment; each segment starts from the last poses of the
 //! previous one.
 
-use super::architecture;
+use super::architecture::{self, Architecture};
 use super::metadata::{self, SequenceMetadata};
 use super::poses::PoseFormat;
 use super::vocabulary::{NumberedWord, UNKNOWN};
@@ -64,10 +64,14 @@ impl SequenceGenerator {
     /// it, all have the vector of the unknown word.
     ///
     /// # Errors
-    /// A network that does not read words, or whose word vectors have another dimension.
+    /// A network that does not read words or was trained without a table, or whose word vectors have another dimension.
     pub fn set_word_vectors(&mut self, vectors: Arc<WordVectors>) -> Result<()> {
         let (name, dim) = (&self.metadata.name, self.metadata.network.word);
         ensure!(self.reads_words(), "the model of {name} does not read words: omit --words");
+        ensure!(
+            self.metadata.has_word_vectors,
+            "the model of {name} was trained without a table of word vectors (`orator train seq2seq --words`): omit --words"
+        );
         ensure!(
             vectors.dim() == dim,
             "the word vectors in {} have {} dimensions, those of the model of {name} {dim}: expected the table that it \
@@ -79,10 +83,19 @@ impl SequenceGenerator {
         Ok(())
     }
 
+    /// Whether the network has a decoder, whose state can be carried over segment seams.
+    pub fn has_state(&self) -> bool {
+        self.metadata.architecture != Architecture::Autoencoder
+    }
+
     /// Initial decoder state of the segments, for all callers: carried from segment to segment if requested, or if the
     /// model was trained to.
     pub fn seams(&self, carry_state: bool) -> StateAtSeams {
-        if carry_state || self.metadata.carries_state { StateAtSeams::Carried } else { StateAtSeams::Renewed }
+        if self.has_state() && (carry_state || self.metadata.carries_state) {
+            StateAtSeams::Carried
+        } else {
+            StateAtSeams::Renewed
+        }
     }
 
     /// Frame rate of the generated motion.

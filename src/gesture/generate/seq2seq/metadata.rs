@@ -38,9 +38,12 @@ pub struct SequenceMetadata {
     /// Word context of the network `words` on either side of a segment, seconds.
     #[serde(default = "around_segment_secs")]
     pub words_around_secs: f64,
-    /// Whether the decoder's state is carried over segment seams unless the user requests otherwise.
+    /// Whether the decoder's state is carried over segment seams without being requested.
     #[serde(default)]
     pub carries_state: bool,
+    /// Whether a table of word vectors initialised the word embeddings.
+    #[serde(default)]
+    pub has_word_vectors: bool,
     /// Hash of the training data.
     pub dataset: String,
 }

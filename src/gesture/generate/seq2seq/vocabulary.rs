@@ -49,9 +49,13 @@ impl Vocabulary {
         self.words.is_sorted_by(|a, b| a < b)
     }
 
-    /// Index of a word as written in a transcript.
+    /// Index of a word as written in a transcript. A word that is unknown with its surrounding punctuation is looked up
+    /// without it.
     pub fn number(&self, word: &str) -> u32 {
-        self.words.binary_search(&canonical(word)).map_or(UNKNOWN, |at| (N_SPECIAL + at) as u32)
+        let word = canonical(word);
+        let bare = word.trim_matches(|character: char| !character.is_alphanumeric());
+        let found = [&*word, bare].into_iter().find_map(|word| self.words.binary_search_by(|of| (**of).cmp(word)).ok());
+        found.map_or(UNKNOWN, |at| (N_SPECIAL + at) as u32)
     }
 
     /// Indices and times of words, sorted by start time.
@@ -103,7 +107,7 @@ mod tests {
         let words = [word("The"), word("dog."), word("the"), word(" ")];
         let vocabulary = Vocabulary::of(&words);
         assert_eq!((vocabulary.words().len(), vocabulary.n_indices(), vocabulary.is_sorted()), (2, 4, true));
-        assert_eq!(["dog", "DOG.", "the", "cat", ""].map(|word| vocabulary.number(word)), [2, 2, 3, UNKNOWN, UNKNOWN]);
+        assert_eq!(["dog", "DOG.", "the,", "cat", ""].map(|word| vocabulary.number(word)), [2, 2, 3, UNKNOWN, UNKNOWN]);
         let numbered = vocabulary.numbered(&words[1..2]);
         assert_eq!(numbered, [NumberedWord { number: 2, start_secs: 0.5, end_secs: 1.0 }]);
         let numbered = vocabulary.numbered_with(&[word("Cat"), word("dog")], |word| 10 + word.word.len() as u32);

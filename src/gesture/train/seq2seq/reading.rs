@@ -6,7 +6,7 @@
 use anyhow::{Context, Result, ensure};
 use orator_base::text::counted;
 use orator_base::types::time::FrameRate;
-use orator_dataset::config::{FineMotionReading, Seq2seqConfig, Seq2seqSettings, SequenceNetwork, number};
+use orator_dataset::config::{FineMotionReading, SeamState, Seq2seqConfig, Seq2seqSettings, SequenceNetwork, number};
 use serde_json::{Value, json};
 
 /// Value of a key in one reading.
@@ -28,26 +28,32 @@ pub struct ReadingRow {
     pub code: (ReadingValue, &'static str),
 }
 
-/// Networks of section 4.1.
-const SEGMENT_NETWORKS: &[SequenceNetwork] = &[SequenceNetwork::Audio, SequenceNetwork::Words];
+/// Networks of section 4.1, and that of section 4.2.
+const SEGMENT: &[SequenceNetwork] = &[SequenceNetwork::Audio, SequenceNetwork::Words];
+const CONTEXTUAL: &[SequenceNetwork] = &[SequenceNetwork::Contextual];
 const UNSTATED: &str = "not stated; as in the code";
 
 /// Values of the readings `paper` and `code`; the first row of a key that names the network applies.
 #[rustfmt::skip]
-pub const READING_ROWS: [ReadingRow; 13] = [
+pub const READING_ROWS: [ReadingRow; 18] = [
     row("distance", &[], (Choice("mse"), "section 4: the mean squared error is minimised"), (Choice("l1"), "L1 loss")),
     row("continuity", &[], (Choice("poses"), "section 2: norm of the difference of consecutive poses"), (Choice("numbers"), "absolute differences per coordinate")),
     row("variance_loss", &[], (Choice("variance"), "section 2: negative variance"), (Choice("norm"), "norm over time, not centred")),
     row("words_around_secs", &[], (Number(0.5), "section 4.1: a window of 2 s, for segments of 1 s"), (Number(2.0), "2 s on either side of a segment")),
     row("state_at_seams", &[], (Choice("carried"), "section 4.1: the state is supplied to the next segment"), (Choice("renewed"), "the state is not passed on")),
-    row("batch", SEGMENT_NETWORKS, (Number(512.0), "section 4.1"), (Number(512.0), "command in its README")),
-    row("batch", &[], (Number(50.0), "section 4.2"), (Number(50.0), "default of its trainer")),
-    row("stride_frames", SEGMENT_NETWORKS, (Number(1.0), UNSTATED), (Number(1.0), "command in its README")),
+    row("batch", SEGMENT, (Number(512.0), "section 4.1"), (Number(512.0), "command in its README")),
+    row("batch", CONTEXTUAL, (Number(50.0), "section 4.2"), (Number(50.0), "default of its trainer")),
+    row("batch", &[], (Number(50.0), UNSTATED), (Number(50.0), "default of its trainer")),
+    row("stride_frames", SEGMENT, (Number(1.0), UNSTATED), (Number(1.0), "command in its README")),
     row("stride_frames", &[], (Number(0.0), UNSTATED), (Number(0.0), "default of its trainer: length of a segment")),
+    row("learning_rate", SEGMENT, (Number(1e-3), "section 4.1: Adam"), (Number(1e-3), "Adam")),
+    row("learning_rate", CONTEXTUAL, (Number(1e-3), "section 4.2: Adam"), (Number(1e-3), "Adam")),
+    row("learning_rate", &[SequenceNetwork::Adversarial], (Number(1e-3), UNSTATED), (Number(1e-3), "Adam of both networks")),
     row("learning_rate", &[SequenceNetwork::Autoencoder], (Number(3e-4), UNSTATED), (Number(3e-4), "Adam, audio baseline")),
-    row("learning_rate", &[], (Number(1e-3), "sections 4.1 and 4.2: Adam"), (Number(1e-3), "Adam")),
     row("lambda_adversarial", &[], (Number(0.1), "section 4.3: small weights around 0.1"), (Number(0.01), "default of its trainer")),
-    row("epochs", &[], (Number(100.0), "sections 4.1 and 4.2"), (Number(100.0), "command in its README")),
+    row("epochs", SEGMENT, (Number(100.0), "section 4.1"), (Number(100.0), "command in its README")),
+    row("epochs", CONTEXTUAL, (Number(100.0), "section 4.2"), (Number(100.0), "command in its README")),
+    row("epochs", &[], (Number(100.0), UNSTATED), (Number(100.0), "as for its other networks")),
 ];
 
 const fn row(
@@ -112,13 +118,14 @@ pub fn check(requested: &Seq2seqConfig) -> Result<()> {
 }
 
 /// Settings of a training before its data are read: `requested`, with the values of its reading filled in. The length
-/// of the training ([`Seq2seqSettings::steps`], `epochs`, `epoch_steps`) follows from the data; see [`set_length`].
+/// of the training ([`Seq2seqSettings::steps`], `epochs`, `epoch_steps`, `autoencoder_steps`) follows from the data; see
+/// [`set_length`].
 ///
 /// # Errors
 /// An `"auto"` key without a value.
 pub fn settings(requested: &Seq2seqConfig) -> Result<Seq2seqSettings> {
     let value = |key: &str| match key {
-        "steps" | "epoch_steps" => Some(number(1.0)),
+        "steps" | "epoch_steps" | "autoencoder_steps" => Some(number(1.0)),
         _ => {
             let applies = |row: &&ReadingRow| {
                 row.key == key && (row.networks.is_empty() || row.networks.contains(&requested.network))
@@ -130,7 +137,12 @@ pub fn settings(requested: &Seq2seqConfig) -> Result<Seq2seqSettings> {
             })
         }
     };
-    requested.filled(value).context("a key of [seq2seq] has no value in this reading")
+    let mut settings = requested.filled(value).context("a key of [seq2seq] has no value in this reading")?;
+    if requested.network == SequenceNetwork::Autoencoder {
+        // It has no decoder.
+        settings.state_at_seams = SeamState::Renewed;
+    }
+    Ok(settings)
 }
 
 /// Value of a row in the requested reading. The reading `auto` trains every network on batches of 50 segments that do not
@@ -140,7 +152,6 @@ fn reading_value(row: &ReadingRow, requested: &Seq2seqConfig) -> ReadingValue {
         (FineMotionReading::Paper, _) => row.paper.0,
         (FineMotionReading::Auto, "batch") => Number(50.0),
         (FineMotionReading::Auto, "stride_frames") => Number(0.0),
-        (FineMotionReading::Auto, "learning_rate") => Number(1e-3),
         (FineMotionReading::Code | FineMotionReading::Auto, _) => row.code.0,
     }
 }
@@ -152,30 +163,40 @@ pub fn epoch_length(settings: &Seq2seqSettings, n_segments: usize) -> usize {
 
 /// Sets the length of a training with `n_segments` training segments of `predicted` poses at `fps`: an epoch is one
 /// pass over the segments; a validation follows the smallest number of epochs with at least 100 steps.
+///
+/// # Errors
+/// `autoencoder_steps` or `decay_start` of at least the number of steps.
 pub fn set_length(
     settings: &mut Seq2seqSettings,
     requested: &Seq2seqConfig,
     n_segments: usize,
     predicted: usize,
     fps: FrameRate,
-) {
+) -> Result<()> {
     let per_epoch = epoch_length(settings, n_segments);
     let stride = if settings.stride_frames == 0 { predicted } else { settings.stride_frames };
     let minutes = fps.secs(n_segments * stride) / 60.0;
     settings.epochs = match (requested.epochs.given(), requested.reading) {
         (Some(epochs), _) => epochs,
-        (None, FineMotionReading::Auto) => auto_epochs(minutes),
+        // Every frame is in `predicted / stride` segments.
+        (None, FineMotionReading::Auto) => (auto_epochs(minutes) * stride).div_ceil(predicted.max(1)),
         (None, FineMotionReading::Paper | FineMotionReading::Code) => settings.epochs,
     };
-    match requested.steps.given() {
-        Some(steps) => {
-            settings.steps = steps;
-            settings.epochs = steps.div_ceil(per_epoch);
-        }
-        None => settings.steps = settings.epochs * per_epoch,
-    }
+    settings.steps = requested.steps.given().unwrap_or(settings.epochs * per_epoch);
+    settings.epochs = settings.steps.div_ceil(per_epoch);
     let validation = MIN_EPOCH_STEPS.div_ceil(per_epoch) * per_epoch;
     settings.epoch_steps = requested.epoch_steps.given().unwrap_or(validation);
+    settings.autoencoder_steps = requested.autoencoder_steps.given().unwrap_or(settings.steps / 2);
+    let steps = settings.steps;
+    for (key, value) in [("autoencoder_steps", settings.autoencoder_steps), ("decay_start", settings.decay_start)] {
+        let is_used = key == "decay_start" || settings.network == SequenceNetwork::Autoencoder;
+        ensure!(
+            !is_used || value == 0 || value < steps,
+            "seq2seq.{key} is {value}, expected fewer than the {} of the training",
+            counted(steps, "step")
+        );
+    }
+    Ok(())
 }
 
 fn auto_epochs(minutes: f64) -> usize {
@@ -202,12 +223,12 @@ pub fn line(settings: &Seq2seqSettings) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use orator_dataset::config::{ContinuityLoss, DistanceLoss, SeamState, VarianceLoss};
+    use orator_dataset::config::{ContinuityLoss, DistanceLoss, VarianceLoss};
 
     /// Settings for `n_segments` at 20 fps.
     fn resolved(requested: &Seq2seqConfig, n_segments: usize) -> Seq2seqSettings {
         let mut settings = settings(requested).unwrap();
-        set_length(&mut settings, requested, n_segments, 20, FrameRate::new(20, 1));
+        set_length(&mut settings, requested, n_segments, 20, FrameRate::new(20, 1)).unwrap();
         settings
     }
 
@@ -223,6 +244,8 @@ mod tests {
             (SequenceNetwork::Contextual, 12_480, 50, 0, 250),
             (SequenceNetwork::Words, 249_600, 512, 1, 488),
             (SequenceNetwork::Audio, 249_600, 512, 1, 488),
+            (SequenceNetwork::Adversarial, 12_480, 50, 0, 250),
+            (SequenceNetwork::Autoencoder, 12_480, 50, 0, 250),
         ] {
             let shared = Seq2seqSettings {
                 network,
@@ -231,7 +254,8 @@ mod tests {
                 epochs: 100,
                 steps: 100 * per_epoch,
                 epoch_steps: per_epoch,
-                learning_rate: 1e-3,
+                autoencoder_steps: 50 * per_epoch,
+                learning_rate: if network == SequenceNetwork::Autoencoder { 3e-4 } else { 1e-3 },
                 lambda_continuity: 0.01,
                 lambda_variance: 1.0,
                 scheduled_sampling: 1.0,
@@ -248,7 +272,10 @@ mod tests {
                 continuity: ContinuityLoss::Poses,
                 variance_loss: VarianceLoss::Variance,
                 words_around_secs: 0.5,
-                state_at_seams: SeamState::Carried,
+                state_at_seams: match network {
+                    SequenceNetwork::Autoencoder => SeamState::Renewed,
+                    _ => SeamState::Carried,
+                },
                 lambda_adversarial: 0.1,
                 ..shared.clone()
             };
@@ -266,8 +293,6 @@ mod tests {
                 assert_eq!(resolved(&requested(expected.reading, network), n_segments), expected);
             }
         }
-        let baseline = requested(FineMotionReading::Code, SequenceNetwork::Autoencoder);
-        assert_eq!(settings(&baseline).unwrap().learning_rate, 3e-4);
         // Single keys override the reading.
         let overridden = Seq2seqConfig {
             distance: DistanceLoss::L1,
@@ -290,8 +315,23 @@ mod tests {
         assert_eq!(length(auto(1_800)), (100, 3_600, 108));
         assert_eq!(length(auto(12_480)), (80, 20_000, 250));
         assert_eq!((auto(1).epochs, auto(100_000).epochs), (400, 80));
+        // A segment at every frame of 20 is 20 times the segments of as many minutes.
+        let overlapping = Seq2seqConfig { stride_frames: 1.into(), ..Seq2seqConfig::default() };
+        assert_eq!(length(resolved(&overlapping, 12_000)), (10, 2_400, 240));
         let given = Seq2seqConfig { steps: 50.into(), epoch_steps: 20.into(), ..Seq2seqConfig::default() };
         assert_eq!(length(resolved(&given, 600)), (5, 50, 20));
+        assert!(line(&auto(600)).contains("2400 steps of 50 segments (200 epochs)"), "{}", line(&auto(600)));
+        let error = |settings: Seq2seqConfig| {
+            let mut resolved = super::settings(&settings).unwrap();
+            let length = set_length(&mut resolved, &settings, 600, 20, FrameRate::new(20, 1));
+            length.err().map(|error| error.to_string()).unwrap_or_default()
+        };
+        let of = |network| Seq2seqConfig { steps: 50.into(), network, ..Seq2seqConfig::default() };
+        let text = "seq2seq.decay_start is 50, expected fewer than the 50 steps of the training";
+        assert_eq!(error(Seq2seqConfig { decay_start: 50, ..of(SequenceNetwork::Words) }), text);
+        let autoencoder = of(SequenceNetwork::Autoencoder);
+        assert!(error(Seq2seqConfig { autoencoder_steps: 60.into(), ..autoencoder.clone() }).contains("60"));
+        assert_eq!(resolved(&autoencoder, 600).autoencoder_steps, 25);
     }
 
     #[test]

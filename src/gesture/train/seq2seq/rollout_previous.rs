@@ -88,6 +88,7 @@ mod tests {
             vocabulary: Vocabulary::default(),
             words_around_secs: 2.0,
             carries_state: false,
+            has_word_vectors: true,
             dataset: String::new(),
         };
         let frames = Array2::from_shape_fn((60, 1), |(t, _)| t as f32);

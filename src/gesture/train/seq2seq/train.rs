@@ -23,7 +23,7 @@ use orator_base::stage::progress::Progress;
 use orator_base::stage::workdir::{self, FolderLock};
 use orator_base::text::counted;
 use orator_dataset::Split;
-use orator_dataset::config::{Auto, SeamState, Seq2seqConfig, Seq2seqSettings};
+use orator_dataset::config::{Auto, FineMotionReading, SeamState, Seq2seqConfig, Seq2seqSettings};
 use orator_formats::checkpoint;
 use orator_formats::word_vectors::WordVectors;
 use orator_nn::cpu::spin_pool::with_spinning_workers;
@@ -63,6 +63,11 @@ pub fn train_with_callback(
     validated: &mut dyn FnMut(ValidatedStep),
 ) -> Result<TrainingOutcome<SequenceValidation>> {
     check(requested)?;
+    ensure!(
+        vectors.is_none() || architecture::word_encoder(requested.network).is_some(),
+        "the network {} does not read words: omit --words",
+        serde_json::to_value(requested.network)?
+    );
     let Config { previous, predicted, .. } = network_config(source.fps(), 0, 0, [0, 0]);
     let needed = NeededFrames { name: "a segment", n_frames: previous + predicted, key: None };
     if let TrainingSource::Dataset(dataset) = source {
@@ -95,6 +100,10 @@ pub fn train_with_callback(
         }
         None => {
             let initial = initialise(source, vectors, requested)?;
+            let reads_words = architecture::word_encoder(requested.network).is_some();
+            if reads_words && vectors.is_none() && requested.reading == FineMotionReading::Paper {
+                progress.say("the word vectors are random: the paper's are GloVe's (`--words FILE`)");
+            }
             if let Some(vectors) = vectors {
                 let words = initial.0.metadata.vocabulary.words();
                 let n_known = vectors.n_known(words.iter().map(String::as_str));
@@ -107,11 +116,17 @@ pub fn train_with_callback(
     let train = SegmentLoader::new(splits.train, &trainer.metadata, trainer.settings.stride_frames);
     if resumed.is_none() {
         let Config { predicted, .. } = trainer.metadata.network;
-        reading::set_length(&mut trainer.settings, requested, train.len(), predicted, source.fps());
-        progress.say(&reading::line(&trainer.settings));
-    } else if let (Some(epochs), None) = (requested.epochs.given(), requested.steps.given()) {
-        trainer.settings.steps = epochs * reading::epoch_length(&trainer.settings, train.len());
+        reading::set_length(&mut trainer.settings, requested, train.len(), predicted, source.fps())?;
+    } else {
+        let per_epoch = reading::epoch_length(&trainer.settings, train.len());
+        let settings = &mut trainer.settings;
+        match (requested.steps.given(), requested.epochs.given()) {
+            (Some(_), _) => settings.epochs = settings.steps.div_ceil(per_epoch),
+            (None, Some(epochs)) => settings.steps = epochs * per_epoch,
+            (None, None) => {}
+        }
     }
+    progress.say(&reading::line(&trainer.settings));
     ensure!(
         !train.is_empty(),
         "{}: no training motion is as long as a segment ({} frames)",
@@ -171,6 +186,7 @@ fn initialise(
         vocabulary,
         words_around_secs: settings.words_around_secs,
         carries_state: settings.state_at_seams == SeamState::Carried,
+        has_word_vectors: vectors.is_some(),
         dataset: source.hash()?,
     };
     let trainer = SequenceTrainer::new(metadata, settings)?;
