@@ -58,10 +58,7 @@ pub fn read_all(paths: &[PathBuf]) -> Result<Vec<BodyTake>> {
         if path.is_dir() { files.extend(search::below(path, &["bvh", "npz"])?) } else { files.push(path.clone()) }
     }
     ensure!(!files.is_empty(), "no .bvh or .npz file in {paths:?}");
-    let mut takes = Vec::new();
-    for file in files {
-        takes.extend(read(&file)?);
-    }
+    let takes = files.iter().map(|file| read(file)).collect::<Result<Vec<_>>>()?.concat();
     ensure!(!takes.is_empty(), "no continuous motion of at least {SHORTEST_SECS} s in {paths:?}");
     Ok(takes)
 }

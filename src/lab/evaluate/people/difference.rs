@@ -13,7 +13,7 @@ const COLUMNS: [(&str, usize); 14] = [
     ("shoulders", 1),
     ("elbows", 1),
     ("missed", 1),
-    ("other hand", 1),
+    ("wrong hand", 1),
     ("false pos.", 1),
     ("MPJPE", 0),
     ("elbow", 0),

@@ -28,8 +28,13 @@ const fn entry(
 /// All entries.
 pub const SPLIT: [SplitEntry; 9] = [
     entry("cmu", SetPart::First, &["train_basketball_*"], "free terms; training data of the shipped lifter"),
-    entry("cmu", SetPart::Middle, &["train_directing_traffic_1"], "other activity; partly training data of the lifter"),
-    entry("cmu", SetPart::Last, &["test_washwindow_1"], "other activity; never training data"),
+    entry(
+        "cmu",
+        SetPart::Middle,
+        &["train_directing_traffic_1*"],
+        "other activity; partly training data of the lifter",
+    ),
+    entry("cmu", SetPart::Last, &["test_washwindow_1*"], "other activity; never training data"),
     entry(
         "bandai",
         SetPart::Middle,

@@ -116,9 +116,11 @@ async function participate(browser, seed) {
   // Waits for `seen` after a press of the play button, and presses again whenever the page reports a failed load.
   const seenAfter = async (button, seen) => {
     const isSettled = (button, seen) => document.querySelector(seen) ?? document.querySelector(`${button}:not(:disabled)`);
+    // A server that does not run fails each press at once.
     for (let presses = 1; ; presses += 1) {
       await page.waitForFunction(isSettled, {}, button, seen);
-      if ((await page.$(seen)) || presses === 20) break;
+      if ((await page.$(seen)) || presses === 60) break;
+      await new Promise((resolve) => setTimeout(resolve, 500));
       await input.press(button);
     }
     await page.waitForSelector(seen);
