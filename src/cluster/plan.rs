@@ -1,4 +1,5 @@
-//! A sealed plan: the units, and the program, configuration and models, which must be identical for all workers.
+//! A sealed plan: the units, and the program, configuration and models that process them. Workers on any machine check
+//! that theirs are identical before they claim a unit.
 
 use super::job::shell;
 use super::sealed_input::SealedInput;
@@ -7,7 +8,7 @@ use orator_base::stage::fingerprint::{HashCache, hash_file};
 use orator_base::stage::progress::Progress;
 use orator_base::stage::{Unit, workdir};
 use orator_dataset::config::videos::Videos;
-use orator_dataset::config::{Config, GanConfig, LifterAdaptation, Seq2seqConfig};
+use orator_dataset::config::{Config, GanConfig, Seq2seqConfig};
 use orator_pipeline::Pipeline;
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
@@ -39,9 +40,6 @@ pub struct ClusterPlan {
     pub models: BTreeMap<String, String>,
     /// The units in the order in which workers claim them: the longest first.
     pub units: Vec<PlannedUnit>,
-    /// Whether the lifter is adapted to the speakers: `lift` then follows when all units have ended.
-    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
-    pub adapts: bool,
     /// BLAKE3 of all other fields.
     pub seal: String,
 }
@@ -201,7 +199,6 @@ impl ClusterPlan {
             settings: settings_hash(config)?,
             models: pipeline.model_hashes()?,
             units: split_and_sort(units, part_secs),
-            adapts: config.settings.lift.adapt != LifterAdaptation::Off,
             seal: String::new(),
         };
         plan.seal = plan.compute_seal()?;
@@ -253,7 +250,7 @@ impl ClusterPlan {
 
     /// Command line with which `program` builds the datasets after all units have ended.
     pub fn datasets_command(&self, program: &str) -> String {
-        self.command(program, &["run"]) + if self.adapts { " --from lift" } else { " --only dataset" }
+        format!("{} --only dataset", self.command(program, &["run"]))
     }
 
     /// Command line with which `program` trains a model; the caller appends the speaker's name.

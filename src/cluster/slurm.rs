@@ -145,7 +145,6 @@ mod tests {
             settings: String::new(),
             models: BTreeMap::new(),
             units: ["guest's", "host"].map(|speaker| PlannedUnit::example(speaker, "talk")).to_vec(),
-            adapts: false,
             seal: String::new(),
         };
         let options = ["--partition=long".to_owned()];

@@ -1,5 +1,5 @@
-//! Network architectures and their operators: tensors in, tensors out. `weights` reads and writes weight files;
-//! `optim` is the optimiser of all trainings.
+//! Network architectures and their operators: tensors in, tensors out. `weights` reads and writes weight files. The
+//! optimisers are elsewhere.
 //!
 //! candle's operators are used only where finite differences confirm their gradients (`tests/it/train/operators.rs`
 //! lists them and rejects the others); convolution, batch norm and recurrent layers are implemented here. The layers
@@ -10,7 +10,6 @@ pub mod gan;
 pub mod lifter;
 pub mod motion_encoder;
 pub mod ops;
-pub mod optim;
 pub mod params;
 pub mod seq2seq;
 pub mod weights;

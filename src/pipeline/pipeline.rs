@@ -7,7 +7,7 @@ use orator_base::stage::artifacts::{self, StageName};
 use orator_base::stage::fingerprint::HashCache;
 use orator_base::stage::{Stage, Unit};
 use orator_dataset::config::videos::Videos;
-use orator_dataset::config::{Config, LifterAdaptation, videos};
+use orator_dataset::config::{Config, videos};
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 
@@ -51,17 +51,6 @@ impl Pipeline {
         match asked.unwrap_or(self.config.settings.work.jobs) {
             0 => std::thread::available_parallelism().map_or(1, NonZeroUsize::get),
             n => n,
-        }
-    }
-
-    /// Per-video stages that need only their video, and those that need all videos of the speaker before them: `lift`,
-    /// if the lifter is adapted to the speaker.
-    pub fn video_stages(&self) -> (&'static [StageName], &'static [StageName]) {
-        match self.config.settings.lift.adapt {
-            LifterAdaptation::Off => (&StageName::OF_VIDEOS, &[]),
-            LifterAdaptation::Auto => {
-                (&[StageName::Extract, StageName::Pose2d, StageName::Segment], &[StageName::Lift])
-            }
         }
     }
 

@@ -1,13 +1,12 @@
 //! Running the pipeline or a part of it: the per-video stages, video by video, then the datasets of the speakers.
 
-use super::lift::adapt::AdaptStage;
 use super::pipeline::Pipeline;
 use super::pose2d::models;
 use super::segment::speech_rule::SpeechDetector;
 use super::stages::{self, HookedStage, UnitWork};
 use super::timing::{StageClock, StageTime};
 use anyhow::{Context, Result, ensure};
-use orator_base::stage::artifacts::{Artifact, StageName, speaker_dir};
+use orator_base::stage::artifacts::{StageName, speaker_dir};
 use orator_base::stage::fingerprint::HashCache;
 use orator_base::stage::progress::{Event, Progress};
 use orator_base::stage::runner::StageOutcome;
@@ -191,14 +190,8 @@ impl Pipeline {
                 });
             }
         }
-        let names = |all: &[StageName]| all.iter().copied().filter(|name| selection.has(*name)).collect::<Vec<_>>();
-        let (each, after_all) = self.video_stages();
-        run.stages(&names(each), &[], &mut remaining)?;
-        let after_all = names(after_all);
-        if !after_all.is_empty() {
-            run.adapt(&mut remaining)?;
-            run.stages(&after_all, &[], &mut remaining)?;
-        }
+        let names: Vec<StageName> = StageName::OF_VIDEOS.into_iter().filter(|name| selection.has(*name)).collect();
+        run.stages(&names, &[], &mut remaining)?;
         if selection.has(StageName::Dataset) {
             let ready = run.ready(&remaining)?;
             let failed = run.stages(&[StageName::Dataset], &ready, &mut remaining)?;
@@ -270,36 +263,6 @@ impl StageRun<'_> {
             }
         }
         Ok(failed)
-    }
-
-    /// Adapts the body lifter to each speaker, from all segmented videos. If that fails, the speaker's videos are removed
-    /// from `remaining`.
-    fn adapt(&mut self, remaining: &mut [Videos]) -> Result<()> {
-        let config = self.pipeline.config();
-        let work = &config.settings.work.dir;
-        let is_segmented = |unit: &&Unit| {
-            [Artifact::Keypoints, Artifact::SegmentIntervals].iter().all(|file| file.path(work, unit).exists())
-        };
-        let segmented = |videos: &Videos| videos.units.iter().filter(is_segmented).cloned().collect::<Vec<_>>();
-        let all = remaining.iter().map(|videos| (videos.speaker.clone(), segmented(videos)));
-        let all: BTreeMap<String, Vec<Unit>> = all.filter(|(_, units)| !units.is_empty()).collect();
-        let units: Vec<Unit> = all.keys().map(|speaker| stages::speaker_unit(config, speaker)).collect();
-        let stage = AdaptStage::new(&config.settings.lift, work, all, (self.hashes, self.limits.1));
-        let outcomes = runner::run(&stage, &units, work, self.hashes, self.limits, self.progress);
-        self.hashes.save()?;
-        for (unit, outcome) in units.iter().zip(outcomes) {
-            let StageOutcome::Failed(error) = outcome else { continue };
-            self.report.failures.push(UnitFailure {
-                speaker: None,
-                unit: Some(unit.to_string()),
-                stage: StageName::Lift,
-                error: format!("{error:#}"),
-                cause: Some(error),
-            });
-            let of_speaker = remaining.iter_mut().filter(|videos| videos.speaker == unit.speaker);
-            of_speaker.for_each(|videos| videos.units.clear());
-        }
-        Ok(())
     }
 
     /// Videos that the datasets are built from. A video with an earlier stage that is not fresh is left out, reported

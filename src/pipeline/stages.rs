@@ -52,12 +52,8 @@ pub fn units(name: StageName, config: &Config, videos: &Videos) -> Vec<Unit> {
     if name != StageName::Dataset {
         return videos.units.clone();
     }
-    vec![speaker_unit(config, &videos.speaker)]
-}
-
-/// A whole speaker as a unit.
-pub fn speaker_unit(config: &Config, speaker: &str) -> Unit {
-    Unit { speaker: speaker.to_owned(), video: String::new(), source: config.file.clone() }
+    let speaker = videos.speaker.clone();
+    vec![Unit { speaker, video: String::new(), source: config.file.clone() }]
 }
 
 /// Videos of a speaker that are fresh at every stage before `dataset`: the dataset is built from them.

@@ -162,19 +162,6 @@ pub fn faces(work: &Path, speaker: &str) -> PathBuf {
     work.join("faces").join(format!("{speaker}.png"))
 }
 
-/// Step between `segment` and `lift` that adapts the body lifter to a speaker, and its folder in the work folder.
-pub const ADAPTED: &str = "adapted";
-
-/// Folder of the body lifter that is adapted to a speaker.
-pub fn adapted(work: &Path, speaker: &str) -> PathBuf {
-    work.join(ADAPTED).join(speaker)
-}
-
-/// Weights of the body lifter for a speaker: adapted, or the general ones if they were not improved.
-pub fn adapted_weights(work: &Path, speaker: &str) -> PathBuf {
-    adapted(work, speaker).join("body.safetensors")
-}
-
 /// Cache of file hashes in a work folder.
 pub fn hashes(work: &Path) -> PathBuf {
     work.join("hashes.json")

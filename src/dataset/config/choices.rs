@@ -163,17 +163,6 @@ pub enum SpeechRule {
     Vad,
 }
 
-/// Whether the body lifter is adapted to each speaker.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum LifterAdaptation {
-    /// One set of weights for all speakers.
-    #[default]
-    Off,
-    /// Fine-tuned on the keypoints of the speaker; used if that lowers the error on held-out keypoints.
-    Auto,
-}
-
 /// Unit that is assigned to a split.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]

@@ -19,8 +19,7 @@ pub mod videos;
 pub use auto::{Auto, number};
 pub use choices::{
     AdversarialLoss, BoneLoss, ComputeDevice, ContinuityLoss, DistanceLoss, FineMotionReading, FollowRule, GanRecipe,
-    LifterAdaptation, MotionRepresentation, NetworkPreset, SeamState, SequenceNetwork, SpeechRule, SplitUnit,
-    VarianceLoss,
+    MotionRepresentation, NetworkPreset, SeamState, SequenceNetwork, SpeechRule, SplitUnit, VarianceLoss,
 };
 pub use file::{Problem, SourceLocation};
 pub use former::to_stored;

@@ -1,7 +1,7 @@
 //! Sections of `pipeline.toml` with the type, default and range of each key. `pipeline.toml` and the guide
 //! (`configuration`) document the meaning and unit of each key.
 
-use super::choices::{FollowRule, LifterAdaptation, SpeechRule, SplitUnit};
+use super::choices::{FollowRule, SpeechRule, SplitUnit};
 use super::gan::GanConfig;
 use super::seq2seq::Seq2seqConfig;
 use orator_base::types::time::FrameRate;
@@ -204,7 +204,6 @@ section! {
     LiftConfig {
         body_weights: PathBuf = PathBuf::new(),
         hand_weights: PathBuf = PathBuf::new(),
-        adapt: LifterAdaptation = LifterAdaptation::Off,
         smooth_arms: f64 = 0.8 => (0.0, 30.0, "frames"),
         smooth_hands: f64 = 1.5 => (0.0, 30.0, "frames"),
         level: bool = false,

@@ -120,11 +120,6 @@ impl Removal {
                 .extend([record::record_path(&dir), record::failure_path(&dir)].into_iter().filter(|p| p.exists()));
         }
         removal.paths.extend(left_over);
-        // The lifter of the speaker is made from all videos; the next run adapts it again.
-        let adapted = artifacts::adapted(work, speaker);
-        let of_lifter = [record::record_path(&adapted), record::failure_path(&adapted), adapted.clone()];
-        removal.paths.extend(of_lifter.into_iter().filter(|path| path.exists()));
-        removal.paths.extend(workdir::left_over(&adapted));
         // One picture shows the faces of all videos; the dataset stage draws it again.
         removal.paths.extend(Some(artifacts::faces(work, speaker)).filter(|picture| picture.exists()));
         let splits = artifacts::splits(work, speaker);

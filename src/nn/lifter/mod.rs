@@ -1,7 +1,6 @@
 //! Networks for lifting from 2D to 3D: the temporal-convolution network and the body lifter based on it, and the hand
-//! lifters on coordinates and on score maps. `adapt` fits the body lifter to one speaker.
+//! lifters on coordinates and on score maps.
 
-pub mod adapt;
 pub mod body;
 pub mod conv3x3;
 pub mod hand;

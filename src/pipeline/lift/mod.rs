@@ -2,9 +2,8 @@
 //! `hands` (the networks, `hand_depth`) -> smoothing; then `lengths` (one set per video) -> `camera` (levelling on
 //! request) -> bone lengths applied, hands attached to the wrists. A joint hidden for up to a second is filled and
 //! masked; one missing for longer is NaN, with its descendants. Size is a convention (`upper_body::REFERENCE_SIZE`).
-//! `reject` rejects frames in which lifting reveals errors; `adapt` fits the network to a speaker.
+//! `reject` rejects frames in which lifting reveals errors.
 
-pub mod adapt;
 pub mod body;
 pub mod camera;
 pub mod gaps;

@@ -7,7 +7,7 @@ use super::reject::{exclude_frames, max_gap_frames};
 use super::{Lifted, Lifter, weights};
 use anyhow::{Context, Result, ensure};
 use ndarray::{Array1, s};
-use orator_base::stage::artifacts::{Artifact, StageName, adapted_weights};
+use orator_base::stage::artifacts::{Artifact, StageName};
 use orator_base::stage::ledger::Ledger;
 use orator_base::stage::progress::Progress;
 use orator_base::stage::{Input, Report, Stage, Unit, write_json};
@@ -38,19 +38,16 @@ impl LiftStage {
     /// Weights that cannot be loaded.
     pub fn new(settings: &config::LiftConfig, rules: &config::SegmentConfig, work: &Path) -> Result<Self> {
         let lifter = Lifter::new(settings)?;
-        let weights = [
-            weights::identity(&settings.body_weights, weights::BODY),
-            weights::identity(&settings.hand_weights, weights::HANDS),
-        ];
+        let hash = |file: &Path, builtin: &[u8]| {
+            let is_builtin = file.as_os_str().is_empty();
+            if is_builtin { blake3::hash(builtin).to_hex().to_string() } else { "file".to_owned() }
+        };
+        let weights = [hash(&settings.body_weights, weights::BODY), hash(&settings.hand_weights, weights::HANDS)];
         Ok(Self { lifter, settings: settings.clone(), rules: rules.clone(), work: work.to_owned(), weights })
     }
 
     fn file(&self, file: Artifact, unit: &Unit) -> PathBuf {
         file.path(&self.work, unit)
-    }
-
-    fn is_adapted(&self) -> bool {
-        self.settings.adapt == config::LifterAdaptation::Auto
     }
 }
 
@@ -64,7 +61,7 @@ impl Stage for LiftStage {
     }
 
     fn settings(&self, _unit: &Unit) -> serde_json::Value {
-        let mut settings = json!({
+        json!({
             "lift": {
                 "body_weights": self.weights[0],
                 "hand_weights": self.weights[1],
@@ -77,11 +74,7 @@ impl Stage for LiftStage {
                 "min_frames": self.rules.min_frames,
                 "max_body_gap_secs": self.rules.max_body_gap_secs,
             },
-        });
-        if self.is_adapted() {
-            settings[StageName::Lift.as_str()]["adapt"] = json!(self.settings.adapt);
-        }
-        settings
+        })
     }
 
     fn inputs(&self, unit: &Unit) -> Result<Vec<Input>> {
@@ -95,25 +88,34 @@ impl Stage for LiftStage {
         let weights = [("body weights", &self.settings.body_weights), ("hand weights", &self.settings.hand_weights)];
         let given = weights.into_iter().filter(|(_, path)| !path.as_os_str().is_empty());
         inputs.extend(given.map(|(role, path)| input(role, path.clone())));
-        // Before the lifter is adapted, no lift has this input, so that all are stale.
-        let adapted =
-            Some(adapted_weights(&self.work, &unit.speaker)).filter(|path| self.is_adapted() && path.exists());
-        inputs.extend(adapted.map(|path| input("adapted body weights", path)));
         Ok(inputs)
     }
 
     fn run(&self, unit: &Unit, out: &Path, _progress: &dyn Progress) -> Result<Report> {
-        let (mut keypoints, intervals) = read_video(&self.work, unit)?;
+        let mut keypoints = keypoints_npz::read(&self.file(Artifact::Keypoints, unit))?;
+        let timeline = self.file(Artifact::Timeline, unit);
+        let repeated = Timeline::read(&timeline)?.repeated;
+        ensure!(
+            repeated.len() == keypoints.n_frames(),
+            "the keypoints have {} frames, {} has {}: run the stage pose2d again",
+            keypoints.n_frames(),
+            timeline.display(),
+            repeated.len()
+        );
+        hide_repeated_frames(&mut keypoints, &repeated);
+        let path = self.file(Artifact::SegmentIntervals, unit);
+        let bytes = std::fs::read(&path).with_context(|| format!("cannot read {}", path.display()))?;
+        let intervals: Intervals = serde_json::from_slice(&bytes)
+            .with_context(|| format!("{} is not a list of intervals: run the stage segment again", path.display()))?;
+        ensure!(
+            intervals.n_frames == keypoints.n_frames(),
+            "the keypoints have {} frames, {} states {}: run the stage segment again",
+            keypoints.n_frames(),
+            path.display(),
+            intervals.n_frames
+        );
         let ledger = Ledger::read(&self.file(Artifact::SegmentLedger, unit))?;
-        let own;
-        let lifter = if self.is_adapted() {
-            let body_weights = adapted_weights(&self.work, &unit.speaker);
-            own = Lifter::new(&config::LiftConfig { body_weights, ..self.settings.clone() })?;
-            &own
-        } else {
-            &self.lifter
-        };
-        let (lifted, intervals, ledger) = self.lift(lifter, &mut keypoints, intervals, ledger, out)?;
+        let (lifted, intervals, ledger) = self.lift(&mut keypoints, intervals, ledger, out)?;
         joints_npz::write_lifted(&Artifact::Joints.within(out), &lifted.motion, &lifted.extra)?;
         let bones = json!({ "lengths_metres": lifted.lengths.to_vec(), "n_frames": lifted.n_frames });
         write_json(&Artifact::Bones.within(out), &bones)?;
@@ -141,53 +143,25 @@ impl LiftStage {
     /// [T], the largest relative deviation of a bone in each frame from its length in the video.
     fn lift(
         &self,
-        lifter: &Lifter,
         keypoints: &mut Keypoints,
         mut intervals: Intervals,
         mut ledger: Ledger,
         out: &Path,
     ) -> Result<(Lifted, Intervals, Ledger)> {
         let (most, min_frames) = (self.settings.max_bone_change, self.rules.min_frames);
-        let mut raw = lifter.raw(keypoints, &intervals.intervals, &intervals.resting)?;
+        let mut raw = self.lifter.raw(keypoints, &intervals.intervals, &intervals.resting)?;
         let change = BoneChange::measure(&raw.motion);
         if change.exceeds(most) {
             let rejections = change.judge(most, max_gap_frames(&self.rules, keypoints.fps), keypoints);
             (intervals, ledger) = exclude_frames(&intervals, &ledger, &rejections, min_frames)?;
-            raw = lifter.raw(keypoints, &intervals.intervals, &intervals.resting)?;
+            raw = self.lifter.raw(keypoints, &intervals.intervals, &intervals.resting)?;
         }
         let open = outliers::missing_joint_rejections(&raw.motion, &intervals.intervals);
         (intervals, ledger) = exclude_frames(&intervals, &ledger, &open, min_frames)?;
         let largest = Array1::from_vec(change.largest());
         npz::write(&Artifact::BoneChange.within(out), |npz| npz.add_array("bone_change", &largest))?;
-        Ok((lifter.finish(raw, &intervals.intervals), intervals, ledger))
+        Ok((self.lifter.finish(raw, &intervals.intervals), intervals, ledger))
     }
-}
-
-/// Reads the keypoints of a video, without those of repeated frames, and its accepted intervals.
-pub(super) fn read_video(work: &Path, unit: &Unit) -> Result<(Keypoints, Intervals)> {
-    let mut keypoints = keypoints_npz::read(&Artifact::Keypoints.path(work, unit))?;
-    let timeline = Artifact::Timeline.path(work, unit);
-    let repeated = Timeline::read(&timeline)?.repeated;
-    ensure!(
-        repeated.len() == keypoints.n_frames(),
-        "the keypoints have {} frames, {} has {}: run the stage pose2d again",
-        keypoints.n_frames(),
-        timeline.display(),
-        repeated.len()
-    );
-    hide_repeated_frames(&mut keypoints, &repeated);
-    let path = Artifact::SegmentIntervals.path(work, unit);
-    let bytes = std::fs::read(&path).with_context(|| format!("cannot read {}", path.display()))?;
-    let intervals: Intervals = serde_json::from_slice(&bytes)
-        .with_context(|| format!("{} is not a list of intervals: run the stage segment again", path.display()))?;
-    ensure!(
-        intervals.n_frames == keypoints.n_frames(),
-        "the keypoints have {} frames, {} states {}: run the stage segment again",
-        keypoints.n_frames(),
-        path.display(),
-        intervals.n_frames
-    );
-    Ok((keypoints, intervals))
 }
 
 /// Hides the points of repeated frames, so that the motion between their neighbours is interpolated and masked instead

@@ -21,11 +21,6 @@ const MAX_WIDTH: usize = 2048;
 /// Longest accepted receptive field in frames; the published networks have up to 243.
 pub const MAX_FRAMES: usize = 729;
 
-/// Hash of the built-in weights, or `file` if weights come from the file at `path`, which is then an input of its stage.
-pub fn identity(path: &Path, builtin: &[u8]) -> String {
-    if path.as_os_str().is_empty() { blake3::hash(builtin).to_hex().to_string() } else { "file".to_owned() }
-}
-
 /// Loads the body lifter from a file, or the built-in one if `path` is empty.
 ///
 /// # Errors
@@ -65,18 +60,6 @@ impl HandNetwork {
             Self::Heatmap(lifter) => lifter.lift(seen, side)?,
         })
     }
-}
-
-/// Contents of the file of the body lifter, or of the built-in one if `path` is empty.
-///
-/// # Errors
-/// Those of `body`.
-pub fn body_contents(path: &Path) -> Result<Contents> {
-    body(path)?;
-    if path.as_os_str().is_empty() {
-        return Contents::from_bytes(BODY);
-    }
-    Contents::from_bytes(&input::read(path, input::MAX_DATA)?)
 }
 
 /// Loads the hand lifter from a file, whose metadata names its kind, or the built-in one if `path` is empty.

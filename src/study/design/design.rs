@@ -289,7 +289,7 @@ mod tests {
                 }
             }
         }
-        // Six clips, each with the seven others of the task: 36 degrees of freedom, of which 80 is the quantile 0.9999.
+        // Six clips, each with the seven others of the task: 36 degrees of freedom; 80 is their 0.9999 quantile.
         assert_eq!((counts.len(), in_task.len()), (6 * 7, 8));
         assert!(counts.keys().all(|(_, other)| in_task.contains(other)));
         let expected = 900.0 / 7.0;

@@ -1,7 +1,6 @@
 //! Lifting of 2D keypoints to 3D joints.
 
 pub(crate) mod lift;
-pub(crate) mod lift_adaptation;
 pub(crate) mod lift_bad_input;
 pub(crate) mod lift_camera;
 pub(crate) mod lift_joints;

@@ -3,12 +3,12 @@
 //! number of threads.
 
 use super::adam_fallback::{self, AdamScalars};
-use crate::cpu::spin_pool::{parallel_for, parallel_map};
-use crate::params::Params;
 use anyhow::{Context, ensure};
 use candle_core::backprop::GradStore;
 use candle_core::{CpuStorage, Device, InplaceOp2, Layout, Result, Tensor, Var};
 use candle_nn::Optimizer;
+use orator_nn::cpu::spin_pool::{parallel_for, parallel_map};
+use orator_nn::params::Params;
 use std::cell::RefCell;
 use std::collections::BTreeMap;
 use std::sync::Mutex;
@@ -169,7 +169,7 @@ impl Optimizer for Adam {
         let mut squares = 0.0;
         for gradient in gradients.iter().flatten() {
             squares += if gradient.device().is_cpu() {
-                crate::cpu::tensor::read::<f32, _>(gradient, |g| Ok(sum_of_squares(g)))?
+                orator_nn::cpu::tensor::read::<f32, _>(gradient, |g| Ok(sum_of_squares(g)))?
             } else {
                 adam_fallback::sum_of_squares(gradient)?
             };
@@ -256,7 +256,7 @@ impl InplaceOp2 for AdamUpdate<'_> {
     fn cpu_fwd(&self, values: &mut CpuStorage, layout: &Layout, grad: &CpuStorage, grad_layout: &Layout) -> Result<()> {
         let CpuStorage::F32(values) = values else { candle_core::bail!("Adam needs f32 tensors") };
         let Some((start, end)) = layout.contiguous_offsets() else { candle_core::bail!("Adam: not contiguous") };
-        let grad = crate::cpu::tensor::slice::<f32>(grad, grad_layout)?;
+        let grad = orator_nn::cpu::tensor::slice::<f32>(grad, grad_layout)?;
         let moments = &mut *self.moments.borrow_mut();
         let AdamScalars { beta1, beta2, eps, scale, rate, correction, keep } = self.scalars;
         let update = |value: &mut f32, grad: &f32, first: &mut f32, second: &mut f32, largest: Option<&mut f32>| {
@@ -296,7 +296,7 @@ impl InplaceOp2 for AdamUpdate<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::params::Init;
+    use orator_nn::params::Init;
 
     /// Reference implementation for one f64 parameter that starts at 1.
     fn reference(gradients: &[f64], rate: f64, amsgrad: bool) -> f64 {
