@@ -10,8 +10,8 @@ pub(super) struct WordCollector {
     words: Vec<Word>,
     /// Words without times.
     waiting: Vec<String>,
-    /// Earliest start of the waiting words, seconds.
-    earliest_secs: f64,
+    /// Time before which no waiting word starts, seconds.
+    after_secs: f64,
     /// Whether any time was stated.
     has_times: bool,
 }
@@ -20,13 +20,13 @@ impl WordCollector {
     /// Starts a sentence: words without times that follow are not placed before it.
     pub(super) fn begin(&mut self, secs: f64) {
         self.place(secs);
-        self.earliest_secs = secs.max(0.0);
+        self.after_secs = secs.max(0.0);
     }
 
     /// Ends a sentence or word: waiting words are placed before `secs`.
     pub(super) fn end(&mut self, secs: f64) {
         self.place(secs);
-        self.earliest_secs = self.earliest_secs.max(secs);
+        self.after_secs = self.after_secs.max(secs);
     }
 
     /// Adds the words of `text`, spoken from `start` to `end` seconds; one time alone limits the estimated other one.
@@ -43,7 +43,7 @@ impl WordCollector {
         if let (Some(start), Some(end)) = times {
             self.place(start);
             word::push(&mut self.words, text, (start, end), confidence)?;
-            self.earliest_secs = end;
+            self.after_secs = end;
             return Ok(());
         }
         if let Some(start) = times.0 {
@@ -67,7 +67,7 @@ impl WordCollector {
     }
 
     /// Appends punctuation to the last word.
-    pub(super) fn attach(&mut self, punctuation: &str) {
+    pub(super) fn append(&mut self, punctuation: &str) {
         let last = self.waiting.last_mut().or_else(|| self.words.last_mut().map(|word| &mut word.word));
         if let Some(last) = last {
             last.push_str(punctuation.trim());
@@ -84,7 +84,7 @@ impl WordCollector {
             self.waiting.is_empty() || self.has_times,
             "word 1: none of the words has times: expected `start` and `end`, or another format of `orator guide dataset`"
         );
-        self.place(self.earliest_secs);
+        self.place(self.after_secs);
         Ok(self.words)
     }
 
@@ -92,7 +92,7 @@ impl WordCollector {
     fn place(&mut self, until: f64) {
         self.has_times = true;
         let until = until.max(0.0);
-        let start = self.earliest_secs.min(until);
+        let start = self.after_secs.min(until);
         let secs = (until - start) / self.waiting.len().max(1) as f64;
         for (nth, word) in self.waiting.drain(..).enumerate() {
             let [start_secs, end_secs] = [nth, nth + 1].map(|n| start + secs * n as f64);
@@ -116,7 +116,7 @@ mod tests {
         collector.end(3.0);
         collector.push("we", (Some(4.0), None), None).unwrap();
         collector.push("go", (None, Some(5.0)), None).unwrap();
-        collector.attach(".");
+        collector.append(".");
         collector.push("on", (Some(6.0), Some(6.5)), Some(0.5)).unwrap();
         collector.push("late", (None, None), None).unwrap();
         let words = collector.finish().unwrap();

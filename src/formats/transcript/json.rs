@@ -3,7 +3,7 @@
 //! words, and the `.words.json` of a dataset. The words of a sentence without word times share the time of the sentence.
 
 use super::collector::WordCollector;
-use super::json_fields::{confidence, list, parse, text, times};
+use super::json_values::{confidence, list, parse, text, times};
 use super::tiers;
 use super::word::{self, Word};
 use anyhow::{Context, Result, anyhow, bail};
@@ -185,7 +185,7 @@ impl JsonReader {
         for (item, n) in items.iter().zip(1..) {
             let Some((text, confidence)) = content(item) else { continue };
             if item.get("type").is_some_and(|kind| kind == "punctuation") {
-                self.collector.attach(text);
+                self.collector.append(text);
             } else {
                 let times = self.times(item);
                 self.collector.push(text, times, confidence).with_context(|| format!("item {n}"))?;

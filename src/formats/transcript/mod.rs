@@ -6,7 +6,7 @@ pub mod choice;
 mod collector;
 pub mod encoding;
 pub mod json;
-mod json_fields;
+mod json_values;
 mod marks;
 pub mod subtitles;
 pub mod textgrid;
