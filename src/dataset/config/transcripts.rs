@@ -7,14 +7,14 @@ use orator_base::stage::Unit;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
-/// Transcripts of the speaker's videos, by the work name of the video. Messages about entries without files,
-/// transcripts without a video and further transcripts of a video are added to `missing`.
+/// Files that may be the transcript of the speaker's videos, sorted, by the work name of the video. Messages about
+/// entries without files and transcripts without a video are added to `missing`.
 pub fn of_speaker(
     speaker: &SpeakerConfig,
     units: &[Unit],
     root: &SearchRoot,
     missing: &mut Vec<String>,
-) -> BTreeMap<String, PathBuf> {
+) -> BTreeMap<String, Vec<PathBuf>> {
     let mut paths = BTreeSet::new();
     for entry in &speaker.transcripts {
         match patterns::expand(entry, root, ("transcript", &TRANSCRIPT_EXTENSIONS), missing) {
@@ -22,7 +22,7 @@ pub fn of_speaker(
             Err(message) => missing.push(format!("transcripts: {message}")),
         }
     }
-    let mut found: BTreeMap<String, PathBuf> = BTreeMap::new();
+    let mut found: BTreeMap<String, Vec<PathBuf>> = BTreeMap::new();
     for path in &paths {
         let named = || {
             units
@@ -35,13 +35,7 @@ pub fn of_speaker(
         match unit {
             _ if !path.is_file() => missing.push(format!("transcripts: {file} is not a file")),
             None => missing.push(format!("transcripts: {file} matches no video: name it after its video")),
-            Some(unit) => {
-                let first = found.entry(unit.video.clone()).or_insert_with(|| path.clone());
-                if first != path {
-                    let (first, video) = (first.display(), unit.source.display());
-                    missing.push(format!("transcripts: {first} and {file} both belong to {video}: remove one"));
-                }
-            }
+            Some(unit) => found.entry(unit.video.clone()).or_default().push(path.clone()),
         }
     }
     found
@@ -79,12 +73,14 @@ mod tests {
             let speaker = SpeakerConfig { transcripts, ..SpeakerConfig::default() };
             let mut missing = Vec::new();
             let found = of_speaker(&speaker, units, &SearchRoot::new(dir.path(), &[]), &mut missing);
-            let name = |path: PathBuf| path.file_name().unwrap().to_string_lossy().into_owned();
-            (found.into_iter().map(|(video, path)| format!("{video} {}", name(path))).collect::<Vec<_>>(), missing)
+            let names = |paths: Vec<PathBuf>| {
+                paths.iter().map(|path| path.file_name().unwrap().to_string_lossy()).collect::<Vec<_>>().join(" ")
+            };
+            (found.into_iter().map(|(video, paths)| format!("{video} {}", names(paths))).collect::<Vec<_>>(), missing)
         };
         let (found, missing) = find(&["t"], &units);
-        assert_eq!(found, ["a.b.mp4 a.b.json", "a.mp4 A.en.srt", "c.mp4 c.txt"]);
-        assert!(missing[0].contains("c.txt and ") && missing[1].contains("d.srt"), "{missing:?}");
+        assert_eq!(found, ["a.b.mp4 a.b.json", "a.mp4 A.en.srt", "c.mp4 c.txt c.vtt"]);
+        assert!(missing[0].contains("d.srt") && missing.len() == 1, "{missing:?}");
         // A single transcript and a single video are matched regardless of their names.
         assert_eq!(find(&["t/d.srt"], &units[..1]).0, ["a.mp4 d.srt"]);
         let (found, missing) = find(&["gone.srt", "t/*.ctm"], &units);

@@ -18,8 +18,8 @@ pub struct Videos {
     pub units: Vec<Unit>,
     /// Videos given as keypoints of other programs, by work name.
     pub keypoints: BTreeMap<String, KeypointSource>,
-    /// Paths of transcripts, by the work name of the video.
-    pub transcripts: BTreeMap<String, PathBuf>,
+    /// Files that may be the transcript, by the work name of the video.
+    pub transcripts: BTreeMap<String, Vec<PathBuf>>,
     /// Splits named in the configuration, by the work name of the video.
     pub splits: BTreeMap<String, Split>,
     /// Messages about entries of the configuration that have no effect, each with advice.

@@ -12,13 +12,14 @@ use orator_formats::{search, transcript};
 use std::io::{BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
 
-/// Motion file with its sound and transcript.
+/// Motion file with its sound, and the files that may be its transcript.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct TakeFiles {
     pub kind: MotionKind,
     pub motion: PathBuf,
     pub sound: Option<PathBuf>,
-    pub transcript: Option<PathBuf>,
+    /// In order of preference.
+    pub transcripts: Vec<PathBuf>,
 }
 
 /// Files found in the sources.
@@ -120,17 +121,18 @@ fn with_companions(kind: MotionKind, motion: PathBuf) -> TakeFiles {
     let mut stems = vec![stem.as_str()];
     // The sound of gt_interval_3821.txt is 3821.wav.
     stems.extend(["gt_interval_", "prediction_interval_"].iter().filter_map(|prefix| stem.strip_prefix(prefix)));
-    let sound = find_companion(&motion, &stems, &SOUND_EXTENSIONS, SOUND_FOLDERS);
-    let transcript = find_companion(&motion, &stems, &transcript::ENDINGS, TRANSCRIPT_FOLDERS);
-    TakeFiles { kind, motion, sound, transcript }
+    let sound = companions(&motion, &stems, &SOUND_EXTENSIONS, SOUND_FOLDERS).into_iter().next();
+    let transcripts = companions(&motion, &stems, &transcript::ENDINGS, TRANSCRIPT_FOLDERS);
+    TakeFiles { kind, motion, sound, transcripts }
 }
 
-/// First existing file `<stem>.<ending>` in the folder of `motion`, then in its sibling folders named in `folders`
-/// (separated by spaces).
-fn find_companion(motion: &Path, stems: &[&str], endings: &[&str], folders: &str) -> Option<PathBuf> {
-    let own_folder = motion.parent()?;
+/// Existing files `<stem>.<ending>` in the folder of `motion`, then in its sibling folders named in `folders` (separated
+/// by spaces).
+fn companions(motion: &Path, stems: &[&str], endings: &[&str], folders: &str) -> Vec<PathBuf> {
+    let Some(own_folder) = motion.parent() else { return Vec::new() };
     let mut folders_to_search = vec![own_folder.to_owned()];
-    let parent = if own_folder.as_os_str().is_empty() { Path::new("..") } else { own_folder.parent()? };
+    let parent =
+        if own_folder.as_os_str().is_empty() { Path::new("..") } else { own_folder.parent().unwrap_or(own_folder) };
     let parent = if parent.as_os_str().is_empty() { Path::new(".") } else { parent };
     let mut siblings: Vec<PathBuf> =
         std::fs::read_dir(parent).into_iter().flatten().flatten().map(|e| e.path()).collect();
@@ -143,7 +145,7 @@ fn find_companion(motion: &Path, stems: &[&str], endings: &[&str], folders: &str
     let candidates = folders_to_search.iter().flat_map(|place| {
         stems.iter().flat_map(move |stem| endings.iter().map(move |ending| place.join(format!("{stem}.{ending}"))))
     });
-    candidates.filter(|path| path != motion).find(|path| path.is_file())
+    candidates.filter(|path| path != motion && path.is_file()).collect()
 }
 
 fn ending(path: &Path) -> String {
@@ -167,7 +169,8 @@ mod tests {
         let clip = file("clips/gt_interval_38.txt", &numbers);
         let clip_sound = file("clips/38.wav", "");
         let flat = file("flat/a.bvh", "");
-        let (flat_sound, flat_words) = (file("flat/a.wav", ""), file("flat/a.json", ""));
+        let flat_sound = file("flat/a.wav", "");
+        let flat_words = ["flat/a.json", "flat/a.TextGrid"].map(|name| file(name, ""));
         let apart = file("trn/bvh/b.BVH", "");
         let (apart_sound, apart_words) = (file("trn/wav/b.flac", ""), file("trn/tsv/b.tsv", ""));
         let alone = file("trn/bvh/c.bvh", "");
@@ -175,17 +178,17 @@ mod tests {
         let broken = file("d.npz", "no zip");
         let tar = file("train-000.tar", "");
         let found = find(&[dir.path().to_owned()], None).unwrap();
-        let take = |kind, motion: &PathBuf, sound: Option<PathBuf>, transcript: Option<PathBuf>| TakeFiles {
+        let take = |kind, motion: &PathBuf, sound: Option<PathBuf>, transcripts: &[PathBuf]| TakeFiles {
             kind,
             motion: motion.clone(),
             sound,
-            transcript,
+            transcripts: transcripts.to_vec(),
         };
         let expected = [
-            take(MotionKind::Authors, &clip, Some(clip_sound), None),
-            take(MotionKind::Bvh, &flat, Some(flat_sound), Some(flat_words)),
-            take(MotionKind::Bvh, &apart, Some(apart_sound), Some(apart_words)),
-            take(MotionKind::Bvh, &alone, None, None),
+            take(MotionKind::Authors, &clip, Some(clip_sound), &[]),
+            take(MotionKind::Bvh, &flat, Some(flat_sound), &flat_words),
+            take(MotionKind::Bvh, &apart, Some(apart_sound), &[apart_words]),
+            take(MotionKind::Bvh, &alone, None, &[]),
         ];
         assert_eq!(found.takes, expected);
         assert_eq!((found.tars, found.unknown[0].0.clone()), (vec![tar], broken));

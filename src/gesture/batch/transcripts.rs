@@ -2,7 +2,7 @@
 
 use super::sounds::BatchSound;
 use anyhow::{Result, ensure};
-use orator_formats::transcript::ENDINGS;
+use orator_formats::transcript::{ENDINGS, TranscriptChoice};
 use std::path::{Path, PathBuf};
 
 /// Finds the transcript of every sound without one: in `folder`, with the name of the motion or of the sound, or else
@@ -39,10 +39,17 @@ pub fn find(sounds: &mut [BatchSound], folder: Option<&Path>) -> Result<()> {
     Ok(())
 }
 
-/// First existing file whose name is `path` followed by a transcript extension.
+/// Existing file whose name is `path` followed by a transcript extension: of several the first usable one, or else the
+/// first one.
 fn with_transcript_extension(path: &Path) -> Option<PathBuf> {
     let named = |ending: &&str| PathBuf::from(format!("{}.{ending}", path.display()));
-    ENDINGS.iter().map(named).find(|path| path.is_file())
+    let existing: Vec<PathBuf> = ENDINGS.iter().map(named).filter(|path| path.is_file()).collect();
+    if existing.len() > 1
+        && let Some((path, _)) = TranscriptChoice::first(&existing, "", |_, _| Ok(())).found
+    {
+        return Some(path);
+    }
+    existing.into_iter().next()
 }
 
 #[cfg(test)]
@@ -72,6 +79,10 @@ mod tests {
         assert_eq!(found(None, None).unwrap(), [Some(at("a.1.srt")), Some(at("b.tsv")), None]);
         let own = found(Some("said"), Some(sound("b.mp3", "d", Some("own.ctm")))).unwrap();
         assert_eq!(own, [None, Some(at("said/b.vtt")), Some(at("said/sub/c.txt")), Some(at("own.ctm"))]);
+        // The JSON of a face tracker beside the words of an aligner.
+        std::fs::write(at("c.json"), r#"{"names": ["jawOpen"], "frames": []}"#).unwrap();
+        std::fs::write(at("c.ctm"), "c 1 0 1 so\n").unwrap();
+        assert_eq!(found(None, None).unwrap()[2], Some(at("c.ctm")));
         assert!(found(Some("b.tsv"), None).unwrap_err().to_string().contains("not a folder"));
         std::fs::create_dir(at("empty")).unwrap();
         assert!(found(Some("empty"), None).unwrap_err().to_string().contains("no transcript in"));

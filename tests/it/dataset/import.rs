@@ -26,7 +26,7 @@ use std::path::{Path, PathBuf};
 const FPS: FrameRate = FrameRate::new(15, 1);
 
 /// A BVH take of `n_frames` at 30 fps: the reference's nine frames back and forth.
-fn bvh(n_frames: usize) -> String {
+pub(crate) fn bvh(n_frames: usize) -> String {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/reference/bvh_take.bvh");
     let text = fs::read_to_string(path).unwrap();
     let (head, frames) = text.split_once("Frames: 9\nFrame Time: 0.0333333\n").unwrap();
@@ -37,19 +37,19 @@ fn bvh(n_frames: usize) -> String {
 }
 
 /// Writes seeded noise.
-fn wav(path: &Path, secs: f64, seed: u64) {
+pub(crate) fn wav(path: &Path, secs: f64, seed: u64) {
     let mut noise = rand_chacha::ChaCha8Rng::seed_from_u64(seed);
     let samples = (0..(secs * 22_050.0) as usize).map(|_| noise.random_range(-0.5f32..0.5)).collect();
     fs::create_dir_all(path.parent().unwrap()).unwrap();
     orator_formats::wav::write(path, &Sound { rate: 22_050, samples }).unwrap();
 }
 
-fn write(path: PathBuf, text: &str) {
+pub(crate) fn write(path: PathBuf, text: &str) {
     fs::create_dir_all(path.parent().unwrap()).unwrap();
     fs::write(path, text).unwrap();
 }
 
-fn plan(sources: &[&Path]) -> ImportPlan {
+pub(crate) fn plan(sources: &[&Path]) -> ImportPlan {
     ImportPlan {
         sources: sources.iter().map(|path| path.to_path_buf()).collect(),
         kind: None,
@@ -68,7 +68,7 @@ fn imported(sources: &[&Path], out: &Path) -> Imported {
 }
 
 /// Samples in the shards of a dataset by key, with their JSON.
-fn samples(dir: &Path) -> BTreeMap<String, (Sample, Vec<u8>)> {
+pub(crate) fn samples(dir: &Path) -> BTreeMap<String, (Sample, Vec<u8>)> {
     let tars: Vec<PathBuf> = files_under(dir).into_iter().map(|(_, path)| path).filter(|path| is_tar(path)).collect();
     let loose = shards::open(&tars);
     let all = loose.videos.into_iter().flat_map(|video| video.samples);

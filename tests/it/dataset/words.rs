@@ -156,6 +156,31 @@ fn transcript_errors_are_reported_and_exclude_no_video() {
 }
 
 #[test]
+fn the_next_transcript_of_a_video_is_read() {
+    let talks = TwoTalks::new();
+    let [tracker, subtitles, cut] = [
+        ("b.json", r#"{"names": ["jawOpen"], "frames": [{"weights": [0.5], "time": 0.1}]}"#.to_owned()),
+        ("b.srt", srt(20, "so")),
+        ("a.json", "{".to_owned()),
+    ]
+    .map(|(name, text)| {
+        let path = talks.dir.path().join(name);
+        fs::write(&path, text).unwrap();
+        path
+    });
+    let [first, second] = &talks.videos;
+    let transcripts = [(first, cut), (second, tracker), (second, subtitles)];
+    let named: Vec<_> = talks.videos.iter().map(|unit| (unit, Split::Train)).collect();
+    let (report, out) = shard_with_words(&settings(talks.dir.path()), &talks.videos, &named, &transcripts, "out");
+    let line = report.unwrap().line;
+    assert!(line.contains("b.json is not a valid transcript") && line.contains("b.srt was read instead"), "{line}");
+    assert!(line.contains("a.json is not a valid transcript"), "{line}");
+    let of_second = transcript_report(&out, "second");
+    assert_eq!((of_second.file.as_deref(), of_second.count.n_accepted), (Some("b.srt"), 20));
+    assert_eq!(verify(&out, true, &Silent).unwrap().problems, []);
+}
+
+#[test]
 fn an_invalid_word_count_is_detected() {
     let talks = TwoTalks::new();
     let (_, out) = talks.dataset([Some(("a.srt", srt(20, "so").as_bytes())), None], "out");

@@ -7,6 +7,7 @@ use crate::fixtures::media::foreign_keypoints as foreign;
 use crate::fixtures::motion_folders;
 use crate::fixtures::samples::constant_sample;
 use crate::fixtures::write_dataset::write_dataset;
+use crate::foreign::transcripts::FORMATS;
 use ndarray::{Array1, Array2, Array3, arr1};
 use ndarray_npy::{NpzWriter, write_npy};
 use orator_base::types::skeleton::N_BONES;
@@ -122,6 +123,9 @@ fn texts() {
         ),
     ] {
         write_text("texts", &format!("words.{ending}"), text);
+    }
+    for format in FORMATS {
+        write_text("texts", &format!("words-{}.{}", format.name, format.ending), format.text);
     }
     let speaker = "\n[[speaker]]\nname = \"host\"\nvideos = [\"*.mp4\", \"**/a.mov\"]\ntrain = [\"a.mp4\"]\n";
     write_text("texts", "pipeline.toml", &format!("{}{speaker}", orator_dataset::config::DEFAULT_FILE));

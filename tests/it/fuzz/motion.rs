@@ -57,7 +57,8 @@ fn take() {
         for (kind, name) in kinds {
             let motion = dir.path().join(name);
             std::fs::write(&motion, bytes).unwrap();
-            let _ = ImportedTake::read(&TakeFiles { kind, motion, sound: None, transcript: None }, &limits);
+            let files = TakeFiles { kind, motion, sound: None, transcripts: Vec::new() };
+            let _ = ImportedTake::read(&files, &limits, "host");
         }
     });
 }
