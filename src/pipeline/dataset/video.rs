@@ -20,6 +20,7 @@ use orator_dataset::bones::VideoBones;
 use orator_dataset::config::videos::slug;
 use orator_dataset::sample::Sample;
 use orator_dataset::words::VideoWords;
+use orator_formats::media_json::MediaInfo;
 use orator_formats::{joints_npz, keypoints_npz, sound_offset_json};
 use std::fs::File;
 use std::io::BufReader;
@@ -42,6 +43,8 @@ pub struct LiftedVideo {
     pub unit: Unit,
     /// Number of samples by which the audio is read later than the frames.
     shift: i64,
+    /// Time of the first frame in the file, on whose clock transcripts are, seconds.
+    first_image_secs: f64,
     sound: PathBuf,
     keypoints: PathBuf,
     joints: PathBuf,
@@ -124,6 +127,7 @@ impl LiftedVideo {
             unit: unit.clone(),
             bones: VideoBones::read(&path_of(Artifact::Bones))?,
             shift,
+            first_image_secs: MediaInfo::read(&path_of(Artifact::MediaInfo)).map_or(0.0, |media| media.first_image_secs),
             sound: path_of(Artifact::Sound),
             keypoints: path_of(Artifact::Keypoints),
             joints: path_of(Artifact::Joints),
@@ -140,9 +144,11 @@ impl LiftedVideo {
         let rate = f64::from(SAMPLE_RATE);
         let hash = transcript.and_then(|path| hash_file(path).ok()).unwrap_or_default();
         let name = transcript.and_then(Path::file_name).unwrap_or_default().to_string_lossy().into_owned();
+        let first = self.first_image_secs;
+        let moved = if first > 0.0 { format!(" from {first} s") } else { String::new() };
         self.files_hash =
-            blake3::hash(format!("{} words {name} {hash}\n", self.files_hash).as_bytes()).to_hex().to_string();
-        self.words = Some(VideoWords::read(transcript, n_samples / rate, self.shift as f64 / rate));
+            blake3::hash(format!("{} words {name} {hash}{moved}\n", self.files_hash).as_bytes()).to_hex().to_string();
+        self.words = Some(VideoWords::read(transcript, first + n_samples / rate, first + self.shift as f64 / rate));
         self
     }
 
