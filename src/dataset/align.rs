@@ -5,8 +5,8 @@ use orator_base::text::length;
 use orator_base::types::sound::SAMPLE_RATE;
 use orator_formats::transcript::{Transcript, Word, WordSource};
 use orator_media::aligner::{AlignedWord, Aligner, SpokenWord};
-use orator_media::ffmpeg::{UnreadableMedia, origin};
 use orator_media::ffmpeg::sound_stream::SoundStream;
+use orator_media::ffmpeg::{UnreadableMedia, origin};
 use std::path::Path;
 
 /// Minimum share of words that must be aligned; with fewer, the transcript probably belongs to another sound.
@@ -40,8 +40,9 @@ pub fn align(
     // The sound starts with the first picture; transcripts use the clock of the file.
     let zero_secs = origin::start_secs(sound)?;
     let on_sound_clock = |secs: f64| (secs - zero_secs).max(0.0);
-    let within =
-        |nth: usize| transcript.words.get(nth).map(|word| (on_sound_clock(word.start_secs), on_sound_clock(word.end_secs)));
+    let within = |nth: usize| {
+        transcript.words.get(nth).map(|word| (on_sound_clock(word.start_secs), on_sound_clock(word.end_secs)))
+    };
     // If the transcript has word times, the tokens of its text are exactly those words.
     let is_timed = transcript.words.len() == texts.len();
     let spoken = texts

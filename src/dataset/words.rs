@@ -179,7 +179,9 @@ mod tests {
     fn words_before_the_first_frame_are_removed_and_the_others_moved() {
         let mut words = transcript("0.1 0.3 a\n0.9 1.8 b\n2.5 3.0 c\n").words;
         from_secs(&mut words, 1.5);
-        let times = |words: &[Word]| words.iter().map(|w| format!("{} {:.1} {:.1}", w.word, w.start_secs, w.end_secs)).collect::<Vec<_>>();
+        let times = |words: &[Word]| {
+            words.iter().map(|w| format!("{} {:.1} {:.1}", w.word, w.start_secs, w.end_secs)).collect::<Vec<_>>()
+        };
         assert_eq!(times(&words), ["b 0.0 0.3", "c 1.0 1.5"]);
         from_secs(&mut words, 0.0);
         assert_eq!(words.len(), 2);

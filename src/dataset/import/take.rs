@@ -101,9 +101,7 @@ impl ImportedTake {
                 let n_samples = sample_at(limits.fps, SAMPLE_RATE, n_frames);
                 Some((Sound { rate: SAMPLE_RATE, samples: vec![0.0; n_samples] }, None))
             }
-            Some(path) => {
-                audio::read_mono_with_note(path, SAMPLE_RATE)?.filter(|(sound, _)| !sound.samples.is_empty())
-            }
+            Some(path) => audio::read_mono_with_note(path, SAMPLE_RATE)?.filter(|(sound, _)| !sound.samples.is_empty()),
             None => None,
         };
         let (sound, sound_note) = sound.map_or((None, None), |(sound, note)| (Some(sound), note));

@@ -2,6 +2,7 @@
 
 use super::sounds::BatchSound;
 use anyhow::{Result, ensure};
+use orator_formats::search::NamedFiles;
 use orator_formats::transcript::ENDINGS;
 use std::path::{Path, PathBuf};
 
@@ -18,13 +19,14 @@ pub fn find(sounds: &mut [BatchSound], folder: Option<&Path>) -> Result<()> {
             folder.display()
         );
     }
+    let mut named = NamedFiles::default();
     for sound in sounds.iter_mut().filter(|sound| sound.transcript.is_none()) {
         sound.transcript = match folder {
-            None => with_transcript_extension(&sound.audio.with_extension("")),
+            None => with_transcript_extension(&sound.audio.with_extension(""), &mut named),
             Some(folder) => {
                 let stem = sound.audio.file_stem().unwrap_or_default();
-                with_transcript_extension(&folder.join(&sound.name))
-                    .or_else(|| with_transcript_extension(&folder.join(stem)))
+                with_transcript_extension(&folder.join(&sound.name), &mut named)
+                    .or_else(|| with_transcript_extension(&folder.join(stem), &mut named))
             }
         };
     }
@@ -40,9 +42,9 @@ pub fn find(sounds: &mut [BatchSound], folder: Option<&Path>) -> Result<()> {
 }
 
 /// First existing file whose name is `path` followed by a transcript extension.
-fn with_transcript_extension(path: &Path) -> Option<PathBuf> {
-    let named = |ending: &&str| PathBuf::from(format!("{}.{ending}", path.display()));
-    ENDINGS.iter().map(named).find(|path| path.is_file())
+fn with_transcript_extension(path: &Path, named: &mut NamedFiles) -> Option<PathBuf> {
+    let stem = path.file_name()?.to_str()?;
+    named.find(path.parent()?, &[stem], &ENDINGS).into_iter().next()
 }
 
 #[cfg(test)]
@@ -54,7 +56,7 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         let at = |name: &str| dir.path().join(name);
         std::fs::create_dir_all(at("said/sub")).unwrap();
-        for file in ["a.1.srt", "a.srt", "b.json", "b.tsv", "said/b.vtt", "said/sub/c.txt", "own.ctm"] {
+        for file in ["a.1.SRT", "a.srt", "b.json", "b.tsv", "said/b.vtt", "said/sub/c.txt", "own.ctm"] {
             std::fs::write(at(file), "").unwrap();
         }
         let sound = |audio: &str, name: &str, own: Option<&str>| BatchSound {
@@ -69,7 +71,7 @@ mod tests {
             find(&mut rows, folder.map(at).as_deref())?;
             anyhow::Ok(rows.into_iter().map(|row| row.transcript).collect::<Vec<_>>())
         };
-        assert_eq!(found(None, None).unwrap(), [Some(at("a.1.srt")), Some(at("b.tsv")), None]);
+        assert_eq!(found(None, None).unwrap(), [Some(at("a.1.SRT")), Some(at("b.tsv")), None]);
         let own = found(Some("said"), Some(sound("b.mp3", "d", Some("own.ctm")))).unwrap();
         assert_eq!(own, [None, Some(at("said/b.vtt")), Some(at("said/sub/c.txt")), Some(at("own.ctm"))]);
         assert!(found(Some("b.tsv"), None).unwrap_err().to_string().contains("not a folder"));

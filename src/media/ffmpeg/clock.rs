@@ -235,12 +235,10 @@ mod tests {
         let ms: Vec<i64> = shifts(&joined).iter().map(|shift| shift / 90).collect();
         assert_eq!(ms, [0, 3000, 9_400 - 40_000_000, 11_400 - 7000]);
         let corrected = run_shifts(&joined, &shifts(&joined));
-        assert_eq!(corrected.iter().map(|run| (run.first, run.is_join)).collect::<Vec<_>>(), [
-            (0, false),
-            (75, true),
-            (200, true),
-            (250, true)
-        ]);
+        assert_eq!(
+            corrected.iter().map(|run| (run.first, run.is_join)).collect::<Vec<_>>(),
+            [(0, false), (75, true), (200, true), (250, true)]
+        );
         // A gap of up to 10 s remains a gap.
         assert_eq!(runs(&[(0.0, 1.0), (10.0, 1.0)]).len(), 1);
         assert_eq!(runs(&[(0.0, 1.0), (12.0, 1.0)]).len(), 2);

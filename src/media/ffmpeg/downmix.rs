@@ -79,7 +79,7 @@ impl Downmix {
 fn one_channel(frame: &frame::Audio, channel: usize) -> Result<frame::Audio> {
     let (n_samples, n_bytes) = (frame.samples(), frame.format().bytes());
     let mut mono = frame::Audio::new(frame.format(), n_samples, ChannelLayout::MONO);
-    ensure!(mono.planes() == 1, "out of memory");
+    ensure!(mono.planes() == 1, "out of memory for an audio frame");
     mono.set_rate(frame.rate());
     let (plane, step, first) =
         if frame.is_planar() { (channel, n_bytes, 0) } else { (0, 2 * n_bytes, channel * n_bytes) };
@@ -132,7 +132,13 @@ impl ChannelChoice {
         let before = self.used.unwrap_or(0);
         let used = match before {
             _ if both < MIN_POWER => before,
-            0 if mix < MIN_MIX * both => if right > left { 2 } else { 1 },
+            0 if mix < MIN_MIX * both => {
+                if right > left {
+                    2
+                } else {
+                    1
+                }
+            }
             channel if mix < MIN_MIX_AGAIN * both => channel,
             _ => 0,
         };

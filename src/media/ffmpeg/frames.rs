@@ -266,7 +266,8 @@ impl FrameReader {
         self.next_idx += 1;
         let shown = self.shown.ticks;
         let last = self.last_shown.replace(shown);
-        let is_new = |join: &i64| last.is_some_and(|last| (last + 1..=shown).contains(&join.saturating_sub(self.origin)));
+        let is_new =
+            |join: &i64| last.is_some_and(|last| (last + 1..=shown).contains(&join.saturating_sub(self.origin)));
         let is_join = self.decode.joins().iter().any(is_new);
         let (repeated, resize) = (last == Some(shown), self.resize());
         Ok(Some(FrameTime { frame_idx, source_secs: self.secs(shown), repeated, resize, is_join }))

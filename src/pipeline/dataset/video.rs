@@ -127,7 +127,8 @@ impl LiftedVideo {
             unit: unit.clone(),
             bones: VideoBones::read(&path_of(Artifact::Bones))?,
             shift,
-            first_image_secs: MediaInfo::read(&path_of(Artifact::MediaInfo)).map_or(0.0, |media| media.first_image_secs),
+            first_image_secs: MediaInfo::read(&path_of(Artifact::MediaInfo))
+                .map_or(0.0, |media| media.first_image_secs),
             sound: path_of(Artifact::Sound),
             keypoints: path_of(Artifact::Keypoints),
             joints: path_of(Artifact::Joints),

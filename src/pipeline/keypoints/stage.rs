@@ -118,7 +118,8 @@ impl Stage for KeypointExtractStage {
         };
         media.write(&Artifact::MediaInfo.within(out))?;
         let sound = audio_secs.map_or("no audio".to_owned(), |secs| format!("{} of audio", length(secs)));
-        let remarks = media.not_judged().into_iter().chain(media.notes()).chain(media.damage.clone()).chain(notes.clone());
+        let remarks =
+            media.not_judged().into_iter().chain(media.notes()).chain(media.damage.clone()).chain(notes.clone());
         let remarks = remarks.collect::<Vec<_>>().join("; ");
         let mut facts = serde_json::to_value(&media)?.as_object().cloned().unwrap_or_default();
         facts.insert("notes".into(), notes.into());
