@@ -76,7 +76,8 @@ pub fn expand(
 }
 
 /// Files and folders that an entry names: a plain path, or the matches of a pattern in any case, without files that the
-/// program itself wrote. Accented letters may be composed or not. Messages about unreadable folders and file names that are not UTF-8 are added to `missing`.
+/// program itself wrote. Accented letters may be composed or not. Messages about unreadable folders and file names that
+/// are not UTF-8 are added to `missing`.
 ///
 /// # Errors
 /// An invalid pattern, or one without matches.
