@@ -22,9 +22,9 @@ pub struct VideoWords {
 }
 
 impl VideoWords {
-    /// Words of the chosen one of the files `paths`, of a sound of `sound_secs`; `shift_secs` is subtracted from all times
-    /// to convert from the clock of the sound to that of the frames. No file, or none that can be read, yields no words
-    /// and a note.
+    /// Words of the chosen one of the files `paths`, of a sound that ends at `sound_secs` on the clock of the transcript;
+    /// `shift_secs` is subtracted from all times to convert from that clock to that of the frames. No file, or none that
+    /// can be read, yields no words and a note.
     pub fn of(choice: TranscriptChoice, paths: &[PathBuf], sound_secs: f64, shift_secs: f64) -> Self {
         let TranscriptChoice { found, mut notes, .. } = choice;
         let Some((path, transcript)) = found else {
@@ -91,7 +91,7 @@ impl VideoWords {
     }
 }
 
-/// Transcript of `speaker` in the first usable one of the files `paths`, for a sound of `sound_secs`.
+/// Transcript of `speaker` in the first usable one of the files `paths`, for a sound that ends at `sound_secs`.
 pub fn choose(paths: &[PathBuf], speaker: &str, sound_secs: f64) -> TranscriptChoice {
     TranscriptChoice::first(paths, speaker, |path, transcript| check_end(&transcript.words, path, sound_secs))
 }
@@ -111,6 +111,16 @@ fn check_end(words: &[Word], path: &Path, sound_secs: f64) -> Result<()> {
         file_name(path)
     );
     Ok(())
+}
+
+/// Moves the words of a file to the clock of its sound and frames, which starts at `start_secs` of the file; words
+/// before it are removed.
+pub fn from_secs(words: &mut Vec<Word>, start_secs: f64) {
+    words.retain(|word| start_secs == 0.0 || word.end_secs > start_secs);
+    for word in words {
+        word.start_secs = (word.start_secs - start_secs).max(0.0);
+        word.end_secs -= start_secs;
+    }
 }
 
 /// Checks the words of a sample of `secs` seconds.
@@ -175,6 +185,18 @@ mod tests {
         assert!(
             check(&video_words.within(1.0, 2.0), 1.0).is_ok() && check(&video_words.within(1.0, 2.0), 0.5).is_err()
         );
+    }
+
+    #[test]
+    fn words_before_the_first_frame_are_removed_and_the_others_moved() {
+        let mut words = transcript("0.1 0.3 a\n0.9 1.8 b\n2.5 3.0 c\n").words;
+        from_secs(&mut words, 1.5);
+        let times = |words: &[Word]| {
+            words.iter().map(|w| format!("{} {:.1} {:.1}", w.word, w.start_secs, w.end_secs)).collect::<Vec<_>>()
+        };
+        assert_eq!(times(&words), ["b 0.0 0.3", "c 1.0 1.5"]);
+        from_secs(&mut words, 0.0);
+        assert_eq!(words.len(), 2);
     }
 
     #[test]

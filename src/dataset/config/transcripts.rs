@@ -4,7 +4,9 @@
 use super::SpeakerConfig;
 use super::patterns::{self, SearchRoot, TRANSCRIPT_EXTENSIONS};
 use orator_base::stage::Unit;
+use orator_base::text::composed;
 use std::collections::{BTreeMap, BTreeSet};
+use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 
 /// Files that may be the transcript of the speaker's videos, sorted, by the work name of the video. Messages about
@@ -41,15 +43,12 @@ pub fn of_speaker(
     found
 }
 
-/// Whether the name of a transcript matches that of a video or its keypoints, ignoring case.
+/// Whether the name of a transcript matches that of a video or its keypoints, ignoring case and the form of accents.
 fn is_transcript_of(transcript: &Path, video: &Path) -> bool {
-    let stem = |path: &Path| path.file_stem().unwrap_or_default().to_string_lossy().to_lowercase();
-    let (name, video) = (stem(transcript), if video.is_dir() { folder_name(video) } else { stem(video) });
+    let folded = |name: Option<&OsStr>| composed(&name.unwrap_or_default().to_string_lossy()).to_lowercase();
+    let video = folded(if video.is_dir() { video.file_name() } else { video.file_stem() });
+    let name = folded(transcript.file_stem());
     name == video || name.strip_prefix(&video).is_some_and(|more| more.starts_with('.'))
-}
-
-fn folder_name(path: &Path) -> String {
-    path.file_name().unwrap_or_default().to_string_lossy().to_lowercase()
 }
 
 #[cfg(test)]
@@ -81,6 +80,13 @@ mod tests {
         let (found, missing) = find(&["t"], &units);
         assert_eq!(found, ["a.b.mp4 a.b.json", "a.mp4 A.en.srt", "c.mp4 c.txt c.vtt"]);
         assert!(missing[0].contains("d.srt") && missing.len() == 1, "{missing:?}");
+        // Accents may be composed or not, and endings have any case.
+        for (file, video) in [("u/Vortra\u{308}ge.de.SRT", "Vortr\u{e4}ge.MP4"), ("u/x.VTT", "x.mov")] {
+            std::fs::create_dir_all(dir.path().join("u")).unwrap();
+            std::fs::write(dir.path().join(file), "").unwrap();
+            let name = file.strip_prefix("u/").unwrap();
+            assert!(find(&["u"], &[unit(video), unit("z.mp4")]).0.contains(&format!("{video} {name}")), "{file}");
+        }
         // A single transcript and a single video are matched regardless of their names.
         assert_eq!(find(&["t/d.srt"], &units[..1]).0, ["a.mp4 d.srt"]);
         let (found, missing) = find(&["gone.srt", "t/*.ctm"], &units);

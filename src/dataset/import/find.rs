@@ -6,9 +6,12 @@ use crate::config::patterns::SOUND_EXTENSIONS;
 use crate::write::entry;
 use anyhow::{Context, Result, ensure};
 use orator_base::input;
+use orator_formats::joints_description::path_of;
 use orator_formats::mocap::captured::MotionKind;
 use orator_formats::npz::Npz;
+use orator_formats::search::NamedFiles;
 use orator_formats::{search, transcript};
+use std::collections::BTreeSet;
 use std::io::{BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
 
@@ -33,6 +36,8 @@ pub struct ImportSources {
     pub tars: Vec<PathBuf>,
     /// Files that look like motion but cannot be imported, with the reason.
     pub unknown: Vec<(PathBuf, String)>,
+    /// Files that are neither motion nor belong to motion.
+    pub passed_over: Vec<PathBuf>,
 }
 
 /// Names of sibling folders that hold sounds or transcripts, in lower case.
@@ -56,16 +61,24 @@ pub fn find(sources: &[PathBuf], only: Option<MotionKind>) -> Result<ImportSourc
     if only.is_some_and(|only| only != MotionKind::Shards) {
         found.datasets.clear();
     }
+    let mut named = NamedFiles::default();
     for path in files {
         match kind(&path) {
-            Ok(None) => {}
+            Ok(None) => found.passed_over.push(path),
             Ok(Some(kind)) if only.is_some_and(|only| only != kind) => {}
             Ok(Some(MotionKind::Shards)) => found.tars.push(path),
-            Ok(Some(kind)) => found.takes.push(with_companions(kind, path)),
+            Ok(Some(kind)) => found.takes.push(with_companions(kind, path, &mut named)),
             Err(_) if only.is_some_and(|only| only != MotionKind::Ted) => {}
             Err(why) => found.unknown.push((path, why)),
         }
     }
+    let files_of = |take: &TakeFiles| {
+        let files = take.sound.iter().chain(&take.transcripts).cloned();
+        files.chain([path_of(&take.motion)]).collect::<Vec<_>>()
+    };
+    let used: BTreeSet<PathBuf> = found.takes.iter().flat_map(files_of).collect();
+    // Files that belong to motion of another kind are left out on request.
+    found.passed_over.retain(|path| only.is_none() && !used.contains(path));
     let is_empty =
         found.takes.is_empty() && found.datasets.is_empty() && found.tars.is_empty() && found.unknown.is_empty();
     ensure!(
@@ -116,19 +129,19 @@ fn has_147_numbers(path: &Path) -> bool {
     read.is_ok() && line.split_whitespace().count() == 147 && line.split_whitespace().all(|w| w.parse::<f64>().is_ok())
 }
 
-fn with_companions(kind: MotionKind, motion: PathBuf) -> TakeFiles {
+fn with_companions(kind: MotionKind, motion: PathBuf, named: &mut NamedFiles) -> TakeFiles {
     let stem = motion.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     let mut stems = vec![stem.as_str()];
     // The sound of gt_interval_3821.txt is 3821.wav.
     stems.extend(["gt_interval_", "prediction_interval_"].iter().filter_map(|prefix| stem.strip_prefix(prefix)));
-    let sound = companions(&motion, &stems, &SOUND_EXTENSIONS, SOUND_FOLDERS).into_iter().next();
-    let transcripts = companions(&motion, &stems, &transcript::ENDINGS, TRANSCRIPT_FOLDERS);
+    let sound = companions(&motion, &stems, &SOUND_EXTENSIONS, SOUND_FOLDERS, named).into_iter().next();
+    let transcripts = companions(&motion, &stems, &transcript::ENDINGS, TRANSCRIPT_FOLDERS, named);
     TakeFiles { kind, motion, sound, transcripts }
 }
 
 /// Existing files `<stem>.<ending>` in the folder of `motion`, then in its sibling folders named in `folders` (separated
 /// by spaces).
-fn companions(motion: &Path, stems: &[&str], endings: &[&str], folders: &str) -> Vec<PathBuf> {
+fn companions(motion: &Path, stems: &[&str], endings: &[&str], folders: &str, named: &mut NamedFiles) -> Vec<PathBuf> {
     let Some(own_folder) = motion.parent() else { return Vec::new() };
     let mut folders_to_search = vec![own_folder.to_owned()];
     let parent =
@@ -142,10 +155,8 @@ fn companions(motion: &Path, stems: &[&str], endings: &[&str], folders: &str) ->
         folders.split(' ').any(|folder| folder == name)
     };
     folders_to_search.extend(siblings.into_iter().filter(is_named));
-    let candidates = folders_to_search.iter().flat_map(|place| {
-        stems.iter().flat_map(move |stem| endings.iter().map(move |ending| place.join(format!("{stem}.{ending}"))))
-    });
-    candidates.filter(|path| path != motion && path.is_file()).collect()
+    let candidates = folders_to_search.iter().flat_map(|folder| named.find(folder, stems, endings));
+    candidates.filter(|path| path != motion).collect()
 }
 
 fn ending(path: &Path) -> String {
@@ -155,6 +166,30 @@ fn ending(path: &Path) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn endings_of_recorders_and_decomposed_names_are_matched() {
+        let dir = tempfile::tempdir().unwrap();
+        let file = |name: &str| {
+            let path = dir.path().join(name);
+            std::fs::create_dir_all(path.parent().unwrap()).unwrap();
+            std::fs::write(&path, "").unwrap();
+            path
+        };
+        let take = |motion: &str, sound: &str, transcript: &str| TakeFiles {
+            kind: MotionKind::Bvh,
+            motion: file(motion),
+            sound: Some(file(sound)),
+            transcripts: vec![file(transcript)],
+        };
+        let expected = [
+            take("BVH/n\u{e3}o.Bvh", "Wav/na\u{303}o.WAV", "TSV/na\u{303}o.TSV"),
+            take("REC0007.BVH", "REC0007.Mp3", "REC0007.SRT"),
+        ];
+        let other = file("REC0008.WAV");
+        let found = find(&[dir.path().to_owned()], None).unwrap();
+        assert_eq!((found.takes, found.passed_over), (expected.to_vec(), vec![other]));
+    }
 
     #[test]
     fn files_of_one_take_are_matched() {
@@ -174,7 +209,7 @@ mod tests {
         let apart = file("trn/bvh/b.BVH", "");
         let (apart_sound, apart_words) = (file("trn/wav/b.flac", ""), file("trn/tsv/b.tsv", ""));
         let alone = file("trn/bvh/c.bvh", "");
-        file("trn/bvh/notes.txt", "words");
+        let notes = file("trn/bvh/notes.txt", "words");
         let broken = file("d.npz", "no zip");
         let tar = file("train-000.tar", "");
         let found = find(&[dir.path().to_owned()], None).unwrap();
@@ -191,7 +226,7 @@ mod tests {
             take(MotionKind::Bvh, &alone, None, &[]),
         ];
         assert_eq!(found.takes, expected);
-        assert_eq!((found.tars, found.unknown[0].0.clone()), (vec![tar], broken));
+        assert_eq!((found.tars, found.unknown[0].0.clone(), found.passed_over), (vec![tar], broken, vec![notes]));
         assert_eq!(find(&[dir.path().to_owned()], Some(MotionKind::Authors)).unwrap().takes.len(), 1);
         let text = format!("{:#}", find(&[dir.path().join("flat/a.wav")], None).unwrap_err());
         assert!(text.contains("147 values"), "{text}");

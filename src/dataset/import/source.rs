@@ -214,7 +214,8 @@ fn inspect_take(found: &TakeFiles, plan: &ImportPlan) -> Result<InspectedItem> {
             };
             source.ledger.words = accepted.words;
             let unit = accepted.sample.meta["imported"].as_object().and_then(bvh::unit_note);
-            let note = unit.into_iter().chain(bones).chain(accepted.notes).collect::<Vec<_>>().join("; ");
+            let notes = accepted.sound_note.into_iter().chain(accepted.notes);
+            let note = unit.into_iter().chain(bones).chain(notes).collect::<Vec<_>>().join("; ");
             let mut fingerprinter = Fingerprinter::default();
             fingerprinter.push(&accepted.sample.sound.samples);
             let codes = (!plan.limits.no_sound).then(|| fingerprinter.finish());

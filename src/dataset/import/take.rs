@@ -68,6 +68,8 @@ pub struct AcceptedTake {
     pub n_transcripts: usize,
     /// Bone lengths, metres; 0: not measured.
     pub lengths: [f32; N_BONES],
+    /// Note on the mix of the sound, if any.
+    pub sound_note: Option<String>,
 }
 
 /// Reason for rejecting a take.
@@ -101,14 +103,16 @@ impl ImportedTake {
         let sound = match &found.sound {
             _ if limits.no_sound => {
                 let n_samples = sample_at(limits.fps, SAMPLE_RATE, n_frames);
-                Some(Sound { rate: SAMPLE_RATE, samples: vec![0.0; n_samples] })
+                Some((Sound { rate: SAMPLE_RATE, samples: vec![0.0; n_samples] }, None))
             }
-            Some(path) => audio::read_mono(path, SAMPLE_RATE)?.filter(|sound| !sound.samples.is_empty()),
+            Some(path) => audio::read_mono_with_note(path, SAMPLE_RATE)?.filter(|(sound, _)| !sound.samples.is_empty()),
             None => None,
         };
+        let (sound, sound_note) = sound.map_or((None, None), |(sound, note)| (Some(sound), note));
         let outcome = match (rejection(n_frames, sound.as_ref(), found, limits), sound) {
             (None, Some(sound)) => {
-                TakeOutcome::Accepted(Box::new(to_accepted((&name, speaker), found, &captured, motion, sound)?))
+                let accepted = to_accepted((&name, speaker), found, &captured, motion, sound)?;
+                TakeOutcome::Accepted(Box::new(AcceptedTake { sound_note, ..accepted }))
             }
             (rejection, _) => TakeOutcome::Rejected(rejection.unwrap_or_else(|| no_sound(found))),
         };
@@ -218,7 +222,7 @@ fn to_accepted(
     let sample = Sample { key, motion, pose2d, sound, words: in_sample, posture: None, meta };
     sample.members().with_context(|| format!("cannot create a sample from {}", found.motion.display()))?;
     let words = report.filter(|_| !is_untimed);
-    Ok(AcceptedTake { moved_mm: moved[0], sample, words, notes, n_transcripts, lengths })
+    Ok(AcceptedTake { moved_mm: moved[0], sample, words, notes, n_transcripts, lengths, sound_note: None })
 }
 
 /// Shift of the joints between `before` and `after`: median and maximum, mm, rounded to 0.01.

@@ -254,7 +254,11 @@ impl Stage for DatasetStage {
             }
             let offset = self.fixes_offset.then_some((Artifact::SoundOffset, true));
             let portrait = Some((Artifact::Portrait, true));
-            for (file, optional) in FILES.into_iter().chain(offset).chain(portrait) {
+            let media = MediaInfo::read(&Artifact::MediaInfo.path(&self.work, video));
+            let moves_words =
+                !self.transcripts(video).is_empty() && media.is_ok_and(|media| media.first_image_secs > 0.0);
+            let media = moves_words.then_some((Artifact::MediaInfo, true));
+            for (file, optional) in FILES.into_iter().chain(offset).chain(portrait).chain(media) {
                 let path = file.path(&self.work, video);
                 if !optional || path.exists() {
                     inputs.push(Input { role: format!("{} {}", video.video, file.file()), path });

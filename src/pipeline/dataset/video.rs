@@ -20,6 +20,7 @@ use orator_dataset::bones::VideoBones;
 use orator_dataset::config::videos::slug;
 use orator_dataset::sample::Sample;
 use orator_dataset::words::{self, VideoWords};
+use orator_formats::media_json::MediaInfo;
 use orator_formats::{joints_npz, keypoints_npz, sound_offset_json};
 use std::fs::File;
 use std::io::BufReader;
@@ -42,6 +43,8 @@ pub struct LiftedVideo {
     pub unit: Unit,
     /// Number of samples by which the audio is read later than the frames.
     shift: i64,
+    /// Time of the first frame in the file, on whose clock transcripts are, seconds.
+    first_image_secs: f64,
     sound: PathBuf,
     keypoints: PathBuf,
     joints: PathBuf,
@@ -124,6 +127,8 @@ impl LiftedVideo {
             unit: unit.clone(),
             bones: VideoBones::read(&path_of(Artifact::Bones))?,
             shift,
+            first_image_secs: MediaInfo::read(&path_of(Artifact::MediaInfo))
+                .map_or(0.0, |media| media.first_image_secs),
             sound: path_of(Artifact::Sound),
             keypoints: path_of(Artifact::Keypoints),
             joints: path_of(Artifact::Joints),
@@ -144,9 +149,13 @@ impl LiftedVideo {
         };
         let files: Vec<String> = transcripts.iter().map(described).collect();
         let files = if files.is_empty() { " ".to_owned() } else { files.join("\n") };
-        self.files_hash = blake3::hash(format!("{} words {files}\n", self.files_hash).as_bytes()).to_hex().to_string();
-        let choice = words::choose(transcripts, &self.unit.speaker, n_samples / rate);
-        self.words = Some(VideoWords::of(choice, transcripts, n_samples / rate, self.shift as f64 / rate));
+        let first = self.first_image_secs;
+        let moved = if first > 0.0 { format!(" from {first} s") } else { String::new() };
+        self.files_hash =
+            blake3::hash(format!("{} words {files}{moved}\n", self.files_hash).as_bytes()).to_hex().to_string();
+        let end_secs = first + n_samples / rate;
+        let choice = words::choose(transcripts, &self.unit.speaker, end_secs);
+        self.words = Some(VideoWords::of(choice, transcripts, end_secs, first + self.shift as f64 / rate));
         self
     }
 

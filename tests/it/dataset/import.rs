@@ -157,6 +157,39 @@ fn bvh_files_with_audio_become_a_dataset() {
 }
 
 #[test]
+fn names_of_recorders_and_stereo_of_opposite_phase_are_imported() {
+    let dir = tempfile::tempdir().unwrap();
+    let at = |name: &str| dir.path().join("in").join(name);
+    write(at("TAKE_4.BVH"), &bvh(200));
+    write(at("TAKE_4.TXT"), "so it goes");
+    // One name is composed, the other decomposed.
+    write(at("gru\u{308}n.bvh"), &bvh(220));
+    wav(&at("gr\u{fc}n.Wav"), 7.333, 4);
+    write(at("cover.jpg"), "no motion");
+    let spec = hound::WavSpec {
+        channels: 2,
+        sample_rate: 48_000,
+        bits_per_sample: 16,
+        sample_format: hound::SampleFormat::Int,
+    };
+    let mut stereo = hound::WavWriter::create(at("TAKE_4.WAV"), spec).unwrap();
+    for n in 0..320_000 {
+        let left = (12_000.0 * (f64::from(n) * 0.02).sin()) as i16;
+        [left, -left].into_iter().for_each(|value| stereo.write_sample(value).unwrap());
+    }
+    stereo.finalize().unwrap();
+    let out = dir.path().join("out");
+    let answer = imported(&[&at("")], &out);
+    assert!(answer.lines.iter().all(|line| line.outcome == "kept") && answer.lines.len() == 2, "{:?}", answer.lines);
+    let message = &answer.lines.iter().find(|line| line.file.contains("TAKE_4")).unwrap().message;
+    assert!(message.contains("stereo channels of opposite phase"), "{message}");
+    assert!(answer.notes.iter().any(|note| note.ends_with("of the same name: cover.jpg")), "{:?}", answer.notes);
+    let samples = samples(&out);
+    let (sample, _) = samples.values().find(|(sample, _)| sample.meta["text"] == "so it goes").unwrap();
+    assert!(sample.sound.samples.iter().any(|sample| *sample > 0.3));
+}
+
+#[test]
 fn datasets_are_merged_exactly_and_repacked_shards_are_imported() {
     let dir = tempfile::tempdir().unwrap();
     let path = |name: &str| dir.path().join(name);

@@ -9,6 +9,7 @@ use orator_base::stage::fingerprint::hash_file;
 use orator_base::types::sound::Sound;
 use orator_formats::bvh::exponential_maps::{ExponentialMaps, FPS, JointMapping};
 use orator_formats::bvh::read::Bvh;
+use orator_formats::search::NamedFiles;
 use orator_formats::transcript::{ENDINGS, TranscriptChoice, after_end};
 use orator_media::ffmpeg::{audio, probe};
 use rayon::prelude::*;
@@ -42,14 +43,16 @@ impl CaptureFolder {
         let entries = std::fs::read_dir(dir).with_context(|| format!("cannot list {}", dir.display()))?;
         let paths = entries.map(|entry| Ok(entry?.path())).collect::<Result<Vec<PathBuf>>>()?;
         let of_kind = |kind: &'static str| paths.iter().filter(move |path| has_ending(path, kind));
-        if let Some(wav) = of_kind("wav").find(|wav| !paths.contains(&wav.with_extension("bvh"))) {
+        let mut named = NamedFiles::default();
+        let mut beside = |path: &Path, endings: &[&str]| named.find(dir, &[&stem(path)], endings);
+        if let Some(wav) = of_kind("wav").find(|wav| beside(wav, &["bvh"]).is_empty()) {
             bail!("{} has no motion: {} does not exist", wav.display(), wav.with_extension("bvh").display());
         }
         let capture = |bvh: &PathBuf| -> Result<Capture> {
-            let wav = bvh.with_extension("wav");
-            ensure!(paths.contains(&wav), "{} has no audio: {} does not exist", bvh.display(), wav.display());
-            let named = ENDINGS.iter().map(|ending| bvh.with_extension(ending)).filter(|path| paths.contains(path));
-            let transcript = TranscriptChoice::first(&named.collect::<Vec<_>>(), "", |_, _| Ok(()));
+            let wav = beside(bvh, &["wav"]).into_iter().next().with_context(|| {
+                format!("{} has no audio: {} does not exist", bvh.display(), bvh.with_extension("wav").display())
+            })?;
+            let transcript = TranscriptChoice::first(&beside(bvh, &ENDINGS), "", |_, _| Ok(()));
             let is_held_out = hold_out.contains(&stem(bvh));
             Ok(Capture { bvh: bvh.clone(), wav, transcript, is_held_out })
         };
@@ -147,7 +150,7 @@ fn read_sound(path: &Path, rate: u32) -> Result<Sound> {
 }
 
 fn has_ending(path: &Path, kind: &str) -> bool {
-    path.extension().is_some_and(|ending| ending == kind)
+    path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case(kind))
 }
 
 fn stem(path: &Path) -> String {
