@@ -210,8 +210,8 @@ fn inspect_take(found: &TakeFiles, plan: &ImportPlan) -> Result<InspectedItem> {
             };
             source.ledger.words = accepted.words;
             let notes = source.ledger.words.iter().flat_map(|words| words.notes.iter().cloned());
-            let unit = accepted.sample.meta["imported"].as_object().and_then(bvh::unit_note);
-            let note = unit.into_iter().chain(bones).chain(notes).collect::<Vec<_>>().join("; ");
+            let of_file = accepted.sample.meta["imported"].as_object().map(bvh::notes).unwrap_or_default();
+            let note = of_file.into_iter().chain(bones).chain(notes).collect::<Vec<_>>().join("; ");
             let mut fingerprinter = Fingerprinter::default();
             fingerprinter.push(&accepted.sample.sound.samples);
             let codes = (!plan.limits.no_sound).then(|| fingerprinter.finish());
@@ -225,13 +225,16 @@ fn inputs_hash(found: &TakeFiles, plan: &ImportPlan) -> Result<String> {
     let described = Some(path_of(&found.motion)).filter(|path| path.is_file());
     let files = [Some(&found.motion), found.sound.as_ref(), found.transcript.as_ref(), described.as_ref()];
     let hashes = files.into_iter().flatten().map(|path| hash_file(path)).collect::<Result<Vec<_>>>()?;
-    let all = serde_json::json!([
+    let mut all = serde_json::json!([
         env!("CARGO_PKG_VERSION"),
         hashes,
         plan.limits.fps,
         plan.dataset.max_mb,
         plan.limits.no_sound
     ]);
+    if let (Some(unit), Some(all)) = (plan.limits.units, all.as_array_mut()) {
+        all.push(unit.name.into());
+    }
     Ok(blake3::hash(all.to_string().as_bytes()).to_hex().to_string())
 }
 
