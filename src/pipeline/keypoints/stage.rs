@@ -23,7 +23,7 @@ use std::fs::File;
 use std::path::{Path, PathBuf};
 
 /// Version of the readers; increased when the same file yields different keypoints.
-const READERS: u32 = 2;
+const READERS: u32 = 3;
 
 /// `extract` for keypoints: audio, timeline and keypoints at the dataset rate.
 pub struct KeypointExtractStage {
