@@ -311,7 +311,7 @@ mod tests {
         // Shift-JIS: a katakana name with the byte of a brace, and one that differs in a control character of Latin-1.
         let named = |name: &[u8]| {
             let (before, after) = text.split_once("Elbow").unwrap();
-            let bytes = [b"// so\xf6\r\n", before.as_bytes(), name, after.as_bytes()].concat();
+            let bytes = [b"// so\xf6\r\n".as_slice(), before.as_bytes(), name, after.as_bytes()].concat();
             Bvh::from_bytes(&bytes).unwrap()
         };
         let (first, second) = (named(b"\x83{\x85\xa0"), named(b"\x83{\x84\xa0"));

@@ -13,9 +13,8 @@ type Body = [Keypoint; N_BODY];
 const MIN_PERSONS: usize = 5;
 const MAX_PERSONS: usize = 20_000;
 /// Quantile of the projected lengths of a limb that is taken for its length.
-const LONG: f64 = 0.9;
-/// Maximum ratio of the lengths of two limbs of an arm, and of the face to the longest limb.
-const MAX_LIMB_RATIO: f64 = 5.0;
+const LONG: f64 = 0.98;
+/// Maximum ratio of the size of the face to the longest limb.
 const MAX_FACE_RATIO: f64 = 0.9;
 /// Factor of the limits for fractions of the image, in which lengths depend on the direction.
 const FRACTION_SLACK: f64 = 1.8;
@@ -32,8 +31,8 @@ const HIPS: [usize; 2] = [11, 12];
 /// Limbs of the arms.
 const LIMBS: [(&str, [usize; 2]); 4] =
     [("left upper arm", [5, 7]), ("right upper arm", [6, 8]), ("left forearm", [7, 9]), ("right forearm", [8, 10])];
-/// Pairs of limbs of similar length.
-const SIMILAR: [[usize; 2]; 4] = [[0, 1], [2, 3], [0, 2], [1, 3]];
+/// Pairs of limbs of similar length, with the maximum ratio of their lengths. Forearms often point at the camera.
+const SIMILAR: [(usize, usize, f64); 4] = [(0, 1, 5.0), (2, 3, 10.0), (0, 2, 10.0), (1, 3, 10.0)];
 const FACE: [[usize; 2]; 6] = [[0, 1], [0, 2], [0, 3], [0, 4], [1, 2], [3, 4]];
 
 /// Checks the bodies of a file.
@@ -56,11 +55,11 @@ pub fn check(found: &FoundKeypoints) -> Result<()> {
 
 fn contradiction(bodies: &[&Body], slack: f64) -> Option<String> {
     let limbs = LIMBS.map(|(_, limb)| length(bodies, limb));
-    for [a, b] in SIMILAR {
+    for (a, b, max_ratio) in SIMILAR {
         let (Some(first), Some(second)) = (limbs[a], limbs[b]) else { continue };
         let ((longer, shorter), ratio) =
             if first > second { ((a, b), first / second) } else { ((b, a), second / first) };
-        if ratio > MAX_LIMB_RATIO * slack {
+        if ratio > max_ratio * slack {
             return Some(format!("the {} is {ratio:.0} times as long as the {}", LIMBS[longer].0, LIMBS[shorter].0));
         }
     }
@@ -93,7 +92,7 @@ fn visible(body: &Body, at: usize) -> Option<&Keypoint> {
     body.get(at).filter(|point| point.score > 0.0)
 }
 
-/// Length between two points that is exceeded in one of ten persons; `None` if it is unknown or 0.
+/// Length between two points that few persons exceed; `None` if it is unknown or 0.
 fn length(bodies: &[&Body], [a, b]: [usize; 2]) -> Option<f64> {
     let distance = |body: &&Body| {
         let (a, b) = (visible(body, a)?, visible(body, b)?);
