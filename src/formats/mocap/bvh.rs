@@ -15,6 +15,7 @@ use std::path::Path;
 
 /// Index into `joint_names::ROLES` of each of joints 0..7 of `types::skeleton`.
 const BODY: [usize; 7] = [0, 2, 3, 4, 5, 6, 7];
+
 /// Reads a take, rotated to face the camera. Without `units`, the unit of length is detected from the arms.
 ///
 /// # Errors
