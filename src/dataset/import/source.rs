@@ -213,9 +213,9 @@ fn inspect_take(found: &TakeFiles, plan: &ImportPlan) -> Result<InspectedItem> {
                 _ => None,
             };
             source.ledger.words = accepted.words;
-            let unit = accepted.sample.meta["imported"].as_object().and_then(bvh::unit_note);
+            let of_file = accepted.sample.meta["imported"].as_object().map(bvh::notes).unwrap_or_default();
             let notes = accepted.sound_note.into_iter().chain(accepted.notes);
-            let note = unit.into_iter().chain(bones).chain(notes).collect::<Vec<_>>().join("; ");
+            let note = of_file.into_iter().chain(bones).chain(notes).collect::<Vec<_>>().join("; ");
             let mut fingerprinter = Fingerprinter::default();
             fingerprinter.push(&accepted.sample.sound.samples);
             let codes = (!plan.limits.no_sound).then(|| fingerprinter.finish());
@@ -232,13 +232,16 @@ fn inputs_hash(found: &TakeFiles, n_transcripts: usize, plan: &ImportPlan) -> Re
     // An unreadable transcript costs no take.
     hashes.extend(found.transcripts.iter().take(n_transcripts).map(|path| hash_file(path).unwrap_or_default()));
     hashes.extend(described.as_deref().map(hash_file).transpose()?);
-    let all = serde_json::json!([
+    let mut all = serde_json::json!([
         env!("CARGO_PKG_VERSION"),
         hashes,
         plan.limits.fps,
         plan.dataset.max_mb,
         plan.limits.no_sound
     ]);
+    if let (Some(unit), Some(all)) = (plan.limits.units, all.as_array_mut()) {
+        all.push(unit.name.into());
+    }
     Ok(blake3::hash(all.to_string().as_bytes()).to_hex().to_string())
 }
 

@@ -18,11 +18,12 @@ use orator_base::types::skeleton::{L_HAND, N_BONES, N_HAND_JOINTS, N_JOINTS, R_H
 use orator_base::types::sound::{SAMPLE_RATE, Sound, sample_at};
 use orator_base::types::time::FrameRate;
 use orator_formats::mocap::captured::{self, CapturedMotion, MotionKind};
+use orator_formats::mocap::facing::LengthUnit;
 use orator_formats::transcript::{Transcript, Word};
 use orator_media::ffmpeg::audio;
 use serde_json::{Value, json};
 
-/// Requirements on a take.
+/// Requirements on a take, and settings for reading it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TakeLimits {
     /// Frame rate of the dataset.
@@ -33,6 +34,8 @@ pub struct TakeLimits {
     pub max_difference_secs: f64,
     /// Whether sound files are ignored and every take gets silence.
     pub no_sound: bool,
+    /// Unit of length of BVH files; `None`: detected.
+    pub units: Option<LengthUnit>,
 }
 
 /// Take with its outcome.
@@ -97,7 +100,7 @@ impl ImportedTake {
         let content = hash_file(&found.motion)?;
         let stem = found.motion.file_stem().unwrap_or_default().to_string_lossy();
         let name = format!("{}-{}", slug(&stem), content.get(..8).unwrap_or(&content));
-        let captured = captured::read(found.kind, &found.motion)?;
+        let captured = captured::read_in(found.kind, &found.motion, limits.units)?;
         let motion = resample::at_rate(&captured.motion, limits.fps);
         let n_frames = motion.n_frames();
         let sound = match &found.sound {

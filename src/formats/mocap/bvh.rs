@@ -1,40 +1,34 @@
 //! A take from a BVH file: those of the 49 joints that its skeleton has, found by name, at the file's own frame rate.
 
 use super::captured::CapturedMotion;
-use super::facing::{AxisAlignment, TorsoLandmarks};
+use super::facing::{AxisAlignment, LengthUnit, TorsoLandmarks};
 use super::fingers;
-use crate::bvh::joint_names;
 use crate::bvh::read::{Bvh, Positions};
+use crate::bvh::{frame_time, joint_names};
 use anyhow::{Context, Result, ensure};
 use ndarray::Array3;
 use orator_base::math::vec3::{self, Vec3};
 use orator_base::types::pose3d::Motion;
 use orator_base::types::skeleton::{self, L_HAND, L_WRIST, N_JOINTS, R_HAND, R_WRIST, Side};
-use orator_base::types::time::FrameRate;
 use serde_json::{Map, Value, json};
 use std::path::Path;
 
 /// Index into `joint_names::ROLES` of each of joints 0..7 of `types::skeleton`.
 const BODY: [usize; 7] = [0, 2, 3, 4, 5, 6, 7];
-/// Common integer frame rates of cameras and studios; `BROADCAST_RATES` are multiplied by 1000/1001. Files round the
-/// frame time, so a relative difference below `RATE_ROUNDING` is taken for the common rate.
-const RATES: [u32; 9] = [15, 20, 24, 25, 30, 50, 60, 100, 120];
-const BROADCAST_RATES: [u32; 3] = [24, 30, 60];
-const RATE_ROUNDING: f64 = 1.1e-3;
 
-/// Reads a take, rotated to face the camera.
+/// Reads a take, rotated to face the camera. Without `units`, the unit of length is detected from the arms.
 ///
 /// # Errors
 ///
 /// The file is not BVH, its skeleton lacks neck or shoulders, or the person neither stands nor sits upright.
-pub fn read(path: &Path) -> Result<CapturedMotion> {
-    read_take(path, |alignment| alignment)
+pub fn read(path: &Path, units: Option<LengthUnit>) -> Result<CapturedMotion> {
+    read_take(path, units, |alignment| alignment)
 }
 
 /// Reads a take without rotation if it is y up and faces +z, as `orator animate` writes it, so that it stays aligned
 /// with the motion it came from. A file with other axes is rotated as by [`read`], which its facts record.
-pub fn read_unrotated(path: &Path) -> Result<CapturedMotion> {
-    read_take(path, |alignment| alignment.unrotated().unwrap_or(alignment))
+pub fn read_unrotated(path: &Path, units: Option<LengthUnit>) -> Result<CapturedMotion> {
+    read_take(path, units, |alignment| alignment.unrotated().unwrap_or(alignment))
 }
 
 /// Alignment by which [`read_unrotated`] converts a take; `frames` are the positions of its joints.
@@ -42,31 +36,44 @@ pub fn read_unrotated(path: &Path) -> Result<CapturedMotion> {
 /// # Errors
 ///
 /// Those of [`read`].
-pub fn unrotated_alignment(bvh: &Bvh, frames: &[Vec<Vec3>]) -> Result<AxisAlignment> {
-    let alignment = AxisAlignment::fit(&torso(bvh, frames)?.1)?;
+pub fn unrotated_alignment(bvh: &Bvh, frames: &[Vec<Vec3>], units: Option<LengthUnit>) -> Result<AxisAlignment> {
+    let alignment = AxisAlignment::fit(&torso(bvh, frames)?.1, units)?;
     Ok(alignment.unrotated().unwrap_or(alignment))
 }
 
 /// Parses a take from the text of a BVH file, rotated as by [`read`].
 pub fn from_text(text: &str) -> Result<CapturedMotion> {
-    from_bvh(&Bvh::parse(text)?, |alignment| alignment)
+    from_bvh(&Bvh::parse(text)?, None, |alignment| alignment)
 }
 
-/// Note on the unit of a take according to its facts; `None` for centimetres, the usual unit of BVH.
-pub fn unit_note(facts: &Map<String, Value>) -> Option<String> {
-    let unit = facts.get("source_unit").and_then(Value::as_str).filter(|unit| *unit != "centimetre")?;
-    Some(format!("judging by the arm length, the unit is the {unit}: converted to metres"))
+/// Notes on a take according to its facts: what was assumed when reading the file, and a detected unit other than the
+/// centimetre, the usual unit of BVH.
+pub fn notes(facts: &Map<String, Value>) -> Vec<String> {
+    let of_file = facts.get("source_notes").and_then(Value::as_array).into_iter().flatten();
+    let mut notes: Vec<String> = of_file.filter_map(|note| note.as_str().map(str::to_owned)).collect();
+    let is_given = facts.contains_key("source_unit_given");
+    let unit = facts.get("source_unit").and_then(Value::as_str).filter(|unit| !is_given && *unit != "centimetre");
+    notes.extend(unit.map(|unit| format!("judging by the arm length, the unit is the {unit}: converted to metres")));
+    notes
 }
 
-fn read_take(path: &Path, align: impl Fn(AxisAlignment) -> AxisAlignment) -> Result<CapturedMotion> {
+fn read_take(
+    path: &Path,
+    units: Option<LengthUnit>,
+    align: impl Fn(AxisAlignment) -> AxisAlignment,
+) -> Result<CapturedMotion> {
     let bvh = Bvh::read(path)?;
-    from_bvh(&bvh, align).with_context(|| format!("{} has no usable upper-body motion", path.display()))
+    from_bvh(&bvh, units, align).with_context(|| format!("{} has no usable upper-body motion", path.display()))
 }
 
-fn from_bvh(bvh: &Bvh, align: impl Fn(AxisAlignment) -> AxisAlignment) -> Result<CapturedMotion> {
+fn from_bvh(
+    bvh: &Bvh,
+    units: Option<LengthUnit>,
+    align: impl Fn(AxisAlignment) -> AxisAlignment,
+) -> Result<CapturedMotion> {
     let frames = bvh.positions(Positions::Auto);
     let (map, landmarks) = torso(bvh, &frames)?;
-    let alignment = align(AxisAlignment::fit(&landmarks)?);
+    let alignment = align(AxisAlignment::fit(&landmarks, units)?);
     let mut joints = Array3::from_elem((frames.len(), N_JOINTS, 3), f32::NAN);
     for (t, (frame, landmarks)) in frames.iter().zip(&landmarks).enumerate() {
         for (joint, at) in map.iter().enumerate() {
@@ -83,8 +90,15 @@ fn from_bvh(bvh: &Bvh, align: impl Fn(AxisAlignment) -> AxisAlignment) -> Result
         "turned_degrees": (alignment.turned_degrees * 100.0).round() / 100.0,
         "joints_missing": missing,
     });
-    let motion = Motion::from_joints(rate(bvh.frame_secs), joints);
-    Ok(CapturedMotion { motion, text: None, facts: facts.as_object().cloned().unwrap_or_else(Map::new) })
+    let mut facts = facts.as_object().cloned().unwrap_or_else(Map::new);
+    if units.is_some() {
+        facts.insert("source_unit_given".to_owned(), true.into());
+    }
+    if !bvh.notes.is_empty() {
+        facts.insert("source_notes".to_owned(), bvh.notes.clone().into());
+    }
+    let motion = Motion::from_joints(frame_time::rate(bvh.frame_secs), joints);
+    Ok(CapturedMotion { motion, text: None, facts })
 }
 
 /// Index of the file's joint for each joint of `types::skeleton`, and the landmarks of each frame.
@@ -138,16 +152,5 @@ fn landmarks(frame: &[Vec3], map: &[Option<usize>; N_JOINTS], roles: [Option<usi
         left_shoulder: at(map[skeleton::L_SHOULDER]).unwrap_or(missing),
         hips: hips.unwrap_or(missing),
         arm,
-    }
-}
-
-/// Frame rate for a rounded frame time.
-fn rate(frame_secs: f64) -> FrameRate {
-    let off = |(num, den): (u32, u32)| (f64::from(num) / f64::from(den) * frame_secs - 1.0).abs();
-    let rates = RATES.map(|rate| (rate, 1)).into_iter().chain(BROADCAST_RATES.map(|rate| (1000 * rate, 1001)));
-    let nearest = rates.min_by(|&a, &b| off(a).total_cmp(&off(b)));
-    match nearest.filter(|&rate| off(rate) < RATE_ROUNDING) {
-        Some((num, den)) => FrameRate::new(num, den),
-        None => FrameRate::nearest(1.0 / frame_secs).unwrap_or(FrameRate::new(1, 1)),
     }
 }

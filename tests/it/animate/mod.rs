@@ -6,6 +6,7 @@ pub(crate) mod bvh;
 pub(crate) mod captured;
 pub(crate) mod captured_body;
 pub(crate) mod film;
+pub(crate) mod foreign_bvh;
 pub(crate) mod gltf;
 pub(crate) mod motion_files;
 pub(crate) mod posture;

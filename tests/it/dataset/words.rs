@@ -97,7 +97,7 @@ fn every_word_is_in_one_sample_or_counted() {
         sources: tars,
         kind: None,
         about: About::new("host", fps),
-        limits: TakeLimits { fps, min_frames: 64, max_difference_secs: 0.5, no_sound: false },
+        limits: TakeLimits { fps, min_frames: 64, max_difference_secs: 0.5, no_sound: false, units: None },
         dataset: DatasetConfig { validation: 0.0, test: 0.0, ..DatasetConfig::default() },
     };
     let imported = talks.dir.path().join("imported");

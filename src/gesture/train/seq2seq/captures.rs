@@ -122,14 +122,15 @@ impl CaptureFolder {
         Ok(SequenceSplits { train, held_out, notes })
     }
 
-    /// Sequence of a capture, and warnings about its transcript.
+    /// Sequence of a capture, and notes on its motion and its transcript.
     fn sequence(
         &self,
         capture: &Capture,
         maps: &ExponentialMaps,
         context: usize,
     ) -> Result<(PoseSequence, Vec<String>)> {
-        let poses = maps.features(&Bvh::read(&capture.bvh)?).with_context(|| capture.bvh.display().to_string())?;
+        let bvh = Bvh::read(&capture.bvh)?;
+        let poses = maps.features(&bvh).with_context(|| capture.bvh.display().to_string())?;
         let sound = read_sound(&capture.wav, self.rate)?;
         let n = poses.nrows().min(mfcc::n_poses(sound.samples.len(), sound.rate, FPS.per_sec()));
         let audio = architecture::audio_features(&sound, FPS, n, n, context);
@@ -140,6 +141,8 @@ impl CaptureFolder {
             notes.extend(transcript.notes.into_iter().chain(after_end).map(named));
             transcript.words
         });
+        let of_bvh = bvh.notes.iter().map(|note| format!("{}: {note}", capture.bvh.display()));
+        let notes = of_bvh.chain(notes).collect();
         let poses = poses.slice(s![..n, ..]).to_owned();
         Ok((PoseSequence::new(poses, Array2::from_elem((n, maps.n_columns()), true), audio, words), notes))
     }
