@@ -210,8 +210,8 @@ fn inspect_take(found: &TakeFiles, plan: &ImportPlan) -> Result<InspectedItem> {
             };
             source.ledger.words = accepted.words;
             let notes = source.ledger.words.iter().flat_map(|words| words.notes.iter().cloned());
-            let unit = accepted.sample.meta["imported"].as_object().and_then(bvh::unit_note);
-            let note = unit.into_iter().chain(bones).chain(notes).collect::<Vec<_>>().join("; ");
+            let facts = accepted.sample.meta["imported"].as_object().map(bvh::notes).unwrap_or_default();
+            let note = facts.into_iter().chain(bones).chain(notes).collect::<Vec<_>>().join("; ");
             let mut fingerprinter = Fingerprinter::default();
             fingerprinter.push(&accepted.sample.sound.samples);
             let codes = (!plan.limits.no_sound).then(|| fingerprinter.finish());

@@ -62,7 +62,7 @@ pub fn read(path: &Path, fps: Option<FrameRate>) -> Result<MotionFile> {
         }
         "bvh" => {
             let captured = bvh::read_unrotated(path)?;
-            notes.extend(bvh::unit_note(&captured.facts).map(|note| format!("{name}: {note}")));
+            notes.extend(bvh::notes(&captured.facts).into_iter().map(|note| format!("{name}: {note}")));
             let rotated_degrees =
                 captured.facts.get("turned_degrees").and_then(serde_json::Value::as_f64).unwrap_or(0.0);
             if rotated_degrees.abs() > 0.0 {

@@ -231,7 +231,7 @@ fn errors_name_the_cause_and_leave_no_output() {
         ("good.npy --out x.bvh --audio good.npy", "--audio applies to .mp4"),
         ("good.npy --out x.npy --names vrm", "--names applies to .bvh"),
         ("good.npy --out x.vrm --names mixamo", "--names applies to .bvh"),
-        ("good.npy --out x.bvh --retarget good.npy", "expected .bvh or .glb"),
+        ("good.npy --out x.bvh --retarget good.npy", "expected .bvh, .glb or .vrm"),
         ("good.npy --out x.bvh --bone-map bones.toml", "--retarget"),
         ("good.npy --out x.bvh --keypoints good.npy", "good.npy"),
     ] {
