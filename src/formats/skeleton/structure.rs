@@ -11,6 +11,8 @@ const MAX_CHAIN: usize = 16;
 const MAX_PAIRS: usize = 8;
 /// Maximum relative difference between the lengths of a left and a right limb.
 const MAX_DIFFERENCE: f64 = 0.1;
+/// Minimum length of arms and legs relative to the longest limb, which excludes fingers.
+const MIN_LENGTH: f64 = 0.3;
 /// Minimum share of the feet's length that points forward.
 const MIN_FORWARD: f64 = 0.3;
 /// Minimum share of the x axis in the line between both arms if nothing else distinguishes left and right.
@@ -130,14 +132,16 @@ impl<'a> JointTree<'a> {
 
     /// Pairs of equally long limbs with a common parent, longest first.
     fn pairs(&self) -> Vec<LimbPair> {
-        let mut pairs = Vec::new();
+        let (mut pairs, mut longest) = (Vec::new(), 0.0f64);
         for (parent, children) in self.children.iter().enumerate() {
             let mut limbs: Vec<Limb> = children.iter().filter_map(|&child| self.limb(child)).collect();
             limbs.sort_by(|a, b| b.length().total_cmp(&a.length()));
+            longest = limbs.iter().map(Limb::length).fold(longest, f64::max);
             for two in limbs.windows(2).filter(|two| two[0].is_like(&two[1])) {
                 pairs.push(LimbPair { parent, limbs: [two[0].clone(), two[1].clone()] });
             }
         }
+        pairs.retain(|pair: &LimbPair| pair.limbs[1].length() >= MIN_LENGTH * longest);
         pairs.sort_by(|a, b| b.limbs[0].length().total_cmp(&a.limbs[0].length()));
         pairs.truncate(MAX_PAIRS);
         pairs

@@ -18,7 +18,7 @@ use std::path::Path;
 use std::process::Command;
 
 /// Exit code, JSON and standard error of `orator --json animate ...`.
-fn animate(dir: &Path, args: &str) -> (i32, Value, String) {
+pub(super) fn animate(dir: &Path, args: &str) -> (i32, Value, String) {
     let mut command = Command::new(env!("CARGO_BIN_EXE_orator"));
     let output = command.args(["--json", "animate"]).args(args.split_whitespace()).current_dir(dir).output().unwrap();
     let json = serde_json::from_slice(&output.stdout).unwrap_or_default();
