@@ -67,15 +67,15 @@ impl Limb {
 
 impl<'a> JointTree<'a> {
     fn new(joints: &'a [MatchJoint<'a>]) -> Self {
-        let mut children = vec![Vec::new(); joints.len()];
-        let mut depths = vec![1; joints.len()];
+        let mut children: Vec<Vec<usize>> = vec![Vec::new(); joints.len()];
+        let mut depths = vec![1_usize; joints.len()];
         for (n, joint) in joints.iter().enumerate().rev() {
             if let Some(parent) = joint.parent {
                 children[parent].push(n);
                 depths[parent] = depths[parent].max(depths[n] + 1);
             }
         }
-        children.iter_mut().for_each(|joints: &mut Vec<usize>| joints.reverse());
+        children.iter_mut().for_each(|joints| joints.reverse());
         Self { joints, children, depths }
     }
 

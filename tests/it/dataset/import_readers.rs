@@ -86,7 +86,8 @@ fn a_file_without_a_speaker_is_an_error_with_the_reason() {
         format!("{:#}", captured::read(MotionKind::Bvh, &path).unwrap_err())
     };
     // One arm of an unknown name, as long as no other limb, is not found by structure.
-    let named = error_of(&text.replace("JOINT LeftArm", "JOINT Crank").replace("OFFSET 28.5 0 0", "OFFSET 9 0 0"));
+    let unknown = text.replace("LeftShoulder", "Crane").replace("LeftArm", "Crank");
+    let named = error_of(&unknown.replace("OFFSET 28.5 0 0", "OFFSET 9 0 0"));
     assert!(named.contains("b.bvh") && named.contains("left shoulder") && named.contains("LeftForeArm"), "{named}");
     let huge = error_of(&text.replace("28.5", "9000"));
     assert!(huge.contains("centimetre"), "{huge}");

@@ -1,5 +1,5 @@
-//! Mapping between our bones and the joints of a user's skeleton, found by name or structure, assigned by the file (VRM),
-//! or read from an editable text with one line `LeftArm = "upperarm_l"` per bone.
+//! Mapping between our bones and the joints of a user's skeleton, found by name or structure, assigned by the file
+//! (VRM), or read from an editable text with one line `LeftArm = "upperarm_l"` per bone.
 
 use super::user_rig::{JointTransform, UserRig};
 use anyhow::{Context as _, Result, bail, ensure};
