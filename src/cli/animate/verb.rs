@@ -288,7 +288,7 @@ fn animate(
         posture: None,
     };
     if let Some(rig) = rig {
-        rig.write(&performance, outputs, ui)?;
+        notes.extend(rig.write(&performance, outputs, ui)?);
     }
     for (path, format) in outputs.iter().filter(|_| rig.is_none()) {
         format.write(path, &performance, &sources, ui).with_context(|| format!("cannot write {}", path.display()))?;

@@ -11,3 +11,4 @@ pub(crate) mod gltf;
 pub(crate) mod motion_files;
 pub(crate) mod posture;
 pub(crate) mod rates;
+pub(crate) mod skeleton;

@@ -203,17 +203,21 @@ impl CapturedBody {
 /// Bones of ours that the mapped joints move; `None` without a trunk.
 fn captured_bones(map: &BoneMap) -> Option<Vec<CapturedBone>> {
     let bone = |part, ours, joint, to| CapturedBone { part, ours, joint, to };
-    let (hips, neck) = (map.joint("Hips")?, map.joint("Neck")?);
+    let (hips, neck) = (map.joint("Hips")?, map.joint("Neck"));
     let spine = map.joint("Spine").or(map.joint("Chest"))?;
     let chest = map.joint("Chest").unwrap_or(spine);
-    let above = if spine == chest { neck } else { chest };
+    let above = if spine == chest { neck } else { Some(chest) };
+    // Without a neck, the bone below it takes the rotation of its joint alone.
+    let up_to = |joint: Option<usize>| joint.map(|joint| (joint, UP));
     let mut bones = vec![
         bone(CapturedPart::Spine, "Hips", hips, None),
-        bone(CapturedPart::Spine, "Spine", spine, Some((above, UP))),
-        bone(CapturedPart::Spine, "Chest", chest, Some((neck, UP))),
+        bone(CapturedPart::Spine, "Spine", spine, up_to(above)),
+        bone(CapturedPart::Spine, "Chest", chest, up_to(neck)),
     ];
     if let Some(head) = map.joint("Head") {
-        bones.push(bone(CapturedPart::Head, "Neck", neck, Some((head, UP))));
+        if let Some(neck) = neck {
+            bones.push(bone(CapturedPart::Head, "Neck", neck, up_to(Some(head))));
+        }
         bones.push(bone(CapturedPart::Head, "Head", head, None));
     }
     let leg = |names: [&'static str; 3]| {
