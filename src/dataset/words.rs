@@ -22,9 +22,9 @@ pub struct VideoWords {
 }
 
 impl VideoWords {
-    /// Words of the chosen one of the files `paths`, of a sound that ends at `sound_secs` on the clock of the transcript;
-    /// `shift_secs` is subtracted from all times to convert from that clock to that of the frames. No file, or none that
-    /// can be read, yields no words and a note.
+    /// Words of the chosen one of the files `paths`; their sound ends at `sound_secs` on the clock of the transcript,
+    /// and `shift_secs` is subtracted from all times to convert from that clock to that of the frames. No file, or none
+    /// that can be read, yields no words and a note.
     pub fn of(choice: TranscriptChoice, paths: &[PathBuf], sound_secs: f64, shift_secs: f64) -> Self {
         let TranscriptChoice { found, mut notes, .. } = choice;
         let Some((path, transcript)) = found else {
