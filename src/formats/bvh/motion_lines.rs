@@ -20,7 +20,8 @@ pub(super) fn read(
 ) -> Result<Vec<f64>> {
     let mut values: Vec<f64> = Vec::new();
     // Number and number of values of the last line, and of the first line before it that is not one frame.
-    let (mut last, mut uneven): (Option<(usize, usize)>, Option<(usize, usize)>) = (None, None);
+    let mut last: Option<(usize, usize)> = None;
+    let mut uneven: Option<(usize, usize)> = None;
     // A word that is not a number is an error unless it is the last one of the file, which may be cut off.
     let mut cut_off = None;
     while let Some(line_words) = words.next_line() {

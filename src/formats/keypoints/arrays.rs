@@ -40,9 +40,11 @@ pub fn read_npz(path: &Path) -> Result<FoundKeypoints> {
     Ok(found)
 }
 
+type ArraysReader = fn(&NamedArrays) -> Result<Option<FoundKeypoints>>;
+
 fn from_arrays(path: &Path, arrays: NamedArrays) -> Result<FoundKeypoints> {
     let shapes: Vec<String> = arrays.iter().map(|(name, array)| format!("{name} {:?}", array.shape())).collect();
-    let readers: [fn(&NamedArrays) -> Result<Option<FoundKeypoints>>; 3] = [mediapipe::read, pats::read, counted::read];
+    let readers: [ArraysReader; 3] = [mediapipe::read, pats::read, counted::read];
     let read = readers.into_iter().find_map(|read| read(&arrays).transpose()).transpose();
     match read.with_context(|| path.display().to_string())? {
         Some(found) => Ok(found),

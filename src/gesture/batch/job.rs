@@ -101,7 +101,7 @@ impl SpeechBatch {
         let ended = runner::run(&stage, &units, &records, &hashes, (1, self.again), progress);
         hashes.save()?;
         let (out_folder, passed_over) = (self.folder.clone(), self.passed_over.clone());
-        let mut report = BatchReport { out_folder, passed_over, ..BatchReport::default() };
+        let mut report = BatchReport { passed_over, out_folder, ..BatchReport::default() };
         for (sound, ended) in self.sounds.iter().zip(ended) {
             let (count, ended, error, facts) = match ended {
                 StageOutcome::Done(done) => (&mut report.created, BatchState::Created, None, done.facts),

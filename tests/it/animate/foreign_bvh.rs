@@ -34,7 +34,7 @@ fn deviations_of_other_programs_are_read_and_noted() {
     for (name, bytes, n_frames, (num, den), expected) in [
         ("more", text.replace("Frames: 9", "Frames: 8").into_bytes(), 9, thirty, "states 8 frames, the file has 9"),
         ("fewer", text.replace("Frames: 9", "Frames: 10").into_bytes(), 9, thirty, "states 10 frames, the file has 9"),
-        ("cut", text[..text.len() - 30].as_bytes().to_vec(), 8, thirty, "is incomplete"),
+        ("cut", text.as_bytes()[..text.len() - 30].to_vec(), 8, thirty, "is incomplete"),
         ("rounded", text.replace("0.0333333", "0.017").into_bytes(), 9, (60, 1), "0.017 is rounded: read as 60 fps"),
         ("exact", text.replace("0.0333333", "0.00834167").into_bytes(), 9, (120_000, 1001), ""),
         ("marked", format!("\u{feff}{}", text.replace('\n', "\r\n")).into_bytes(), 9, thirty, ""),

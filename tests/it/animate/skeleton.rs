@@ -67,7 +67,8 @@ fn a_bvh_of_any_convention_gives_the_joints_of_the_original() {
     let vroid = [("Arm", "UpperArm"), ("ForeArm", "LowerArm"), ("UpLeg", "UpperLeg"), ("Leg", "LowerLeg")];
     let smpl =
         [("Arm", "shoulder"), ("ForeArm", "elbow"), ("Hand", "wrist"), ("Shoulder", "collar"), ("Hips", "Pelvis")];
-    let conventions: [(&str, [&str; 2], &[(&str, &str)], &str); 6] = [
+    type Parts<'a> = &'a [(&'a str, &'a str)];
+    let conventions: [(&str, [&str; 2], Parts, &str); 6] = [
         ("Character1_", words, &[], ""),
         ("mixamorig", words, &[], ""),
         ("Take_7.", words, &[], ""),
