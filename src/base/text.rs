@@ -1,4 +1,6 @@
-//! Formatting of counts, numbers and durations for readers.
+//! Formatting of counts, lists, numbers and durations for readers, and the two forms of accented letters.
+
+use unicode_normalization_alignments::UnicodeNormalization as _;
 
 /// Count with its regular noun: `1 video`, `2 videos`, `2 entries`, `2 processes`.
 pub fn counted(n: usize, noun: &str) -> String {
@@ -10,6 +12,24 @@ pub fn counted(n: usize, noun: &str) -> String {
         None if ["s", "x", "ch", "sh"].iter().any(|end| noun.ends_with(end)) => format!("{n} {noun}es"),
         None => format!("{n} {noun}s"),
     }
+}
+
+/// The first three of `names`, and the number of the others: `a, b, c and 2 others`.
+pub fn first_three(names: &[String]) -> String {
+    let first = names[..names.len().min(3)].join(", ");
+    let n_others = names.len().saturating_sub(3);
+    if n_others == 0 { first } else { format!("{first} and {}", counted(n_others, "other")) }
+}
+
+/// Text in Unicode normalisation form C, in which accented letters are single characters. File names are compared in
+/// this form, since some systems write form D.
+pub fn composed(text: &str) -> String {
+    text.chars().nfc().map(|(letter, _)| letter).collect()
+}
+
+/// Text in Unicode normalisation form D, in which accents are characters of their own.
+pub fn decomposed(text: &str) -> String {
+    text.chars().nfd().map(|(letter, _)| letter).collect()
 }
 
 /// Duration in whole seconds, with two units from a minute on: `59 s`, `1 min 01 s`, `2 h 03 min`.
@@ -69,6 +89,24 @@ pub fn percent(part: f64, total: f64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn names_are_listed_and_normalised() {
+        let names = ["a", "b", "c", "d", "e"].map(str::to_owned);
+        assert_eq!(
+            [3, 4, 5].map(|n| first_three(&names[..n])),
+            ["a, b, c", "a, b, c and 1 other", "a, b, c and 2 others"]
+        );
+        for (one, other) in [
+            ("Vortr\u{e4}ge", "Vortra\u{308}ge"),
+            ("\u{d55c}", "\u{1112}\u{1161}\u{11ab}"),
+            ("\u{304c}", "\u{304b}\u{3099}"),
+        ] {
+            assert_eq!((composed(other), decomposed(one)), (one.to_owned(), other.to_owned()));
+            assert_eq!((composed(one), decomposed(other)), (one.to_owned(), other.to_owned()));
+        }
+        assert_eq!(composed("talk 1.mp4"), "talk 1.mp4");
+    }
 
     #[test]
     fn numbers_are_formatted_with_units_and_separators() {

@@ -5,8 +5,8 @@ use orator_base::text::length;
 use orator_base::types::sound::SAMPLE_RATE;
 use orator_formats::transcript::{Transcript, Word, WordSource};
 use orator_media::aligner::{AlignedWord, Aligner, SpokenWord};
-use orator_media::ffmpeg::UnreadableMedia;
 use orator_media::ffmpeg::sound_stream::SoundStream;
+use orator_media::ffmpeg::{UnreadableMedia, origin};
 use std::path::Path;
 
 /// Minimum share of words that must be aligned; with fewer, the transcript probably belongs to another sound.
@@ -37,7 +37,12 @@ pub fn align(
     let texts: Vec<&str> = transcript.text.split_whitespace().collect();
     let n_words = texts.iter().filter(|text| has_letters(text)).count();
     ensure!(n_words > 0, "the transcript contains no words");
-    let within = |nth: usize| transcript.words.get(nth).map(|word| (word.start_secs, word.end_secs));
+    // The sound starts with the first picture; transcripts use the clock of the file.
+    let zero_secs = origin::start_secs(sound)?;
+    let on_sound_clock = |secs: f64| (secs - zero_secs).max(0.0);
+    let within = |nth: usize| {
+        transcript.words.get(nth).map(|word| (on_sound_clock(word.start_secs), on_sound_clock(word.end_secs)))
+    };
     // If the transcript has word times, the tokens of its text are exactly those words.
     let is_timed = transcript.words.len() == texts.len();
     let spoken = texts
@@ -66,7 +71,12 @@ pub fn align(
         "only {n_aligned} of {n_words} words match the {} of audio: expected the English transcript of audible speech",
         length(sound_secs)
     );
-    Ok(Alignment { words: with_times(&texts, &found, sound_secs), unaligned, sound_secs })
+    let mut words = with_times(&texts, &found, sound_secs);
+    for word in &mut words {
+        word.start_secs += zero_secs;
+        word.end_secs += zero_secs;
+    }
+    Ok(Alignment { words, unaligned, sound_secs })
 }
 
 fn has_letters(text: &str) -> bool {

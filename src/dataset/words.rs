@@ -4,8 +4,8 @@
 use super::file_name;
 use anyhow::{Result, ensure};
 use orator_base::stage::ledger::{TranscriptReport, WordCount};
-use orator_formats::transcript::{Transcript, Word};
-use std::path::Path;
+use orator_formats::transcript::{Transcript, TranscriptChoice, Word};
+use std::path::{Path, PathBuf};
 
 /// Number and share of words that may be after the end of the sound; if both are exceeded, the transcript belongs to
 /// another sound.
@@ -22,43 +22,33 @@ pub struct VideoWords {
 }
 
 impl VideoWords {
-    /// Reads the transcript in `path` of a sound of `sound_secs`; `shift_secs` is subtracted from all times to convert
-    /// from the clock of the sound to that of the frames. A missing or unreadable transcript yields no words and a
-    /// note.
-    pub fn read(path: Option<&Path>, sound_secs: f64, shift_secs: f64) -> Self {
-        let none = |note: String| {
-            let file = path.map(file_name);
-            Self {
-                words: Vec::new(),
-                account: TranscriptReport { file, notes: vec![note], ..TranscriptReport::default() },
+    /// Words of the chosen one of the files `paths`; their sound ends at `sound_secs` on the clock of the transcript,
+    /// and `shift_secs` is subtracted from all times to convert from that clock to that of the frames. No file, or none
+    /// that can be read, yields no words and a note.
+    pub fn of(choice: TranscriptChoice, paths: &[PathBuf], sound_secs: f64, shift_secs: f64) -> Self {
+        let TranscriptChoice { found, mut notes, .. } = choice;
+        let Some((path, transcript)) = found else {
+            if paths.is_empty() {
+                notes.push("no transcript has the name of the video".to_owned());
             }
+            let file = paths.first().map(|path| file_name(path));
+            return Self {
+                words: Vec::new(),
+                account: TranscriptReport { file, notes, ..TranscriptReport::default() },
+            };
         };
-        let Some(path) = path else { return none("no transcript has the name of the video".to_owned()) };
-        let words = Transcript::read(path).and_then(|transcript| Self::new(transcript, path, sound_secs, shift_secs));
-        // Local folder names must not end up in the dataset.
-        let folder = path.parent().map(|folder| format!("{}/", folder.display())).filter(|folder| folder != "/");
-        let without_folder =
-            |error: anyhow::Error| folder.iter().fold(format!("{error:#}"), |text, folder| text.replace(folder, ""));
-        words.unwrap_or_else(|error| none(without_folder(error)))
+        let mut words = Self::new(transcript, &path, sound_secs, shift_secs);
+        words.account.notes.splice(0..0, notes);
+        words
     }
 
-    /// Words of a transcript that has been read from `path`; the other arguments are those of `read`.
-    ///
-    /// # Errors
-    /// Too many words after the end of the sound.
-    pub fn new(transcript: Transcript, path: &Path, sound_secs: f64, shift_secs: f64) -> Result<Self> {
+    /// Words of a transcript that has been read from `path`; the other arguments are those of `of`.
+    fn new(transcript: Transcript, path: &Path, sound_secs: f64, shift_secs: f64) -> Self {
         let Transcript { mut words, mut notes, .. } = transcript;
         let n_words = words.len();
-        let last_secs = words.iter().map(|word| word.end_secs).fold(0.0, f64::max);
         let outside = words.iter().find(|word| midpoint_secs(word) >= sound_secs).cloned();
         words.retain(|word| midpoint_secs(word) < sound_secs);
         let n_outside = n_words - words.len();
-        ensure!(
-            n_outside <= MAX_OUTSIDE.0 || n_outside as f64 <= MAX_OUTSIDE.1 * n_words as f64,
-            "{n_outside} of {n_words} words lie after the end of the sound ({sound_secs:.2} s; the last ends at \
-             {last_secs:.2} s): is {} the transcript of another sound?",
-            file_name(path)
-        );
         if let Some(first) = outside {
             let (word, secs) = (first.word, first.start_secs);
             notes.push(format!(
@@ -72,7 +62,7 @@ impl VideoWords {
         }
         words.sort_by(|a, b| midpoint_secs(a).total_cmp(&midpoint_secs(b)));
         let count = WordCount { n_words, n_outside, ..WordCount::default() };
-        Ok(Self { words, account: TranscriptReport { file: Some(file_name(path)), count, notes } })
+        Self { words, account: TranscriptReport { file: Some(file_name(path)), count, notes } }
     }
 
     /// Words of the sample from `start_secs` to `end_secs`, sorted by start; times count from the start of the sample
@@ -98,6 +88,38 @@ impl VideoWords {
         account.count.n_accepted = n_accepted;
         account.count.n_rejected = self.words.len() - n_accepted.min(self.words.len());
         account
+    }
+}
+
+/// Transcript of `speaker` in the first usable one of the files `paths`, for a sound that ends at `sound_secs`.
+pub fn choose(paths: &[PathBuf], speaker: &str, sound_secs: f64) -> TranscriptChoice {
+    TranscriptChoice::first(paths, speaker, |path, transcript| check_end(&transcript.words, path, sound_secs))
+}
+
+/// Checks that a transcript does not belong to another sound.
+///
+/// # Errors
+/// Too many words after the end of the sound.
+fn check_end(words: &[Word], path: &Path, sound_secs: f64) -> Result<()> {
+    let n_words = words.len();
+    let n_outside = words.iter().filter(|word| midpoint_secs(word) >= sound_secs).count();
+    let last_secs = words.iter().map(|word| word.end_secs).fold(0.0, f64::max);
+    ensure!(
+        n_outside <= MAX_OUTSIDE.0 || n_outside as f64 <= MAX_OUTSIDE.1 * n_words as f64,
+        "{n_outside} of {n_words} words lie after the end of the sound ({sound_secs:.2} s; the last ends at \
+         {last_secs:.2} s): is {} the transcript of another sound?",
+        file_name(path)
+    );
+    Ok(())
+}
+
+/// Moves the words of a file to the clock of its sound and frames, which starts at `start_secs` of the file; words
+/// before it are removed.
+pub fn from_secs(words: &mut Vec<Word>, start_secs: f64) {
+    words.retain(|word| start_secs == 0.0 || word.end_secs > start_secs);
+    for word in words {
+        word.start_secs = (word.start_secs - start_secs).max(0.0);
+        word.end_secs -= start_secs;
     }
 }
 
@@ -141,15 +163,15 @@ mod tests {
     use super::*;
 
     fn transcript(rows: &str) -> Transcript {
-        Transcript::parse(&rows.replace(' ', "\t"), "tsv", "").unwrap()
+        Transcript::parse(&rows.replace(' ', "\t"), "tsv", ("", "")).unwrap()
     }
 
     #[test]
     fn every_word_is_in_one_sample_or_counted() {
         let words = transcript("0.1 0.3 a\n0.9 1.3 b\n1.5 1.6 c\n2.9 3.0 d\n9 10 e\n");
         let path = Path::new("talk.tsv");
-        assert!(VideoWords::new(words.clone(), path, 0.5, 0.0).unwrap_err().to_string().contains("4 of 5 words"));
-        let video_words = VideoWords::new(words.clone(), path, 10.0, 0.0).unwrap();
+        assert!(check_end(&words.words, path, 0.5).unwrap_err().to_string().contains("4 of 5 words"));
+        let video_words = VideoWords::new(words.clone(), path, 10.0, 0.0);
         let samples = [(0.0, 1.0), (1.0, 2.0)];
         let at = |n: usize| {
             let words = video_words.within(samples[n].0, samples[n].1);
@@ -158,7 +180,7 @@ mod tests {
         assert_eq!((at(0), at(1)), (vec!["a 0.1 0.3".to_owned()], vec!["b 0 0.3".to_owned(), "c 0.5 0.6".to_owned()]));
         let WordCount { n_words, n_accepted, n_rejected, n_outside } = video_words.report(samples).count;
         assert_eq!((n_words, n_accepted, n_rejected, n_outside), (5, 3, 2, 0));
-        let shifted = VideoWords::new(words, path, 10.0, 0.5).unwrap();
+        let shifted = VideoWords::new(words, path, 10.0, 0.5);
         assert_eq!(shifted.within(1.0, 2.0).len(), 1);
         assert!(
             check(&video_words.within(1.0, 2.0), 1.0).is_ok() && check(&video_words.within(1.0, 2.0), 0.5).is_err()
@@ -166,13 +188,36 @@ mod tests {
     }
 
     #[test]
+    fn words_before_the_first_frame_are_removed_and_the_others_moved() {
+        let mut words = transcript("0.1 0.3 a\n0.9 1.8 b\n2.5 3.0 c\n").words;
+        from_secs(&mut words, 1.5);
+        let times = |words: &[Word]| {
+            words.iter().map(|w| format!("{} {:.1} {:.1}", w.word, w.start_secs, w.end_secs)).collect::<Vec<_>>()
+        };
+        assert_eq!(times(&words), ["b 0.0 0.3", "c 1.0 1.5"]);
+        from_secs(&mut words, 0.0);
+        assert_eq!(words.len(), 2);
+    }
+
+    #[test]
     fn a_few_words_after_the_end_are_dropped_with_a_note() {
         let rows: String = (0..20).map(|n| format!("{n} {} w\n", n + 1)).collect();
-        let account = VideoWords::new(transcript(&rows), Path::new("a.tsv"), 19.0, 0.0).unwrap().report([(0.0, 19.0)]);
+        let account = VideoWords::new(transcript(&rows), Path::new("a.tsv"), 19.0, 0.0).report([(0.0, 19.0)]);
         assert_eq!((account.count.n_accepted, account.count.n_outside), (19, 1));
         assert!(account.notes[0].contains("`w` at 19.00 s"));
-        let missing = VideoWords::read(Some(Path::new("/none/a.tsv")), 1.0, 0.0).report([]);
+        let read = |paths: &[PathBuf]| VideoWords::of(choose(paths, "host", 19.0), paths, 19.0, 0.0).report([]);
+        let missing = read(&[PathBuf::from("/none/a.tsv")]);
         assert!(missing.notes[0].starts_with("cannot read a.tsv"), "{:?}", missing.notes);
-        assert!(VideoWords::read(None, 1.0, 0.0).report([]).notes[0].contains("no transcript"));
+        assert!(read(&[]).notes[0].contains("no transcript"));
+        // The words of another sound are passed over.
+        let dir = tempfile::tempdir().unwrap();
+        let [other, own] = ["a.json", "a.srt"].map(|name| dir.path().join(name));
+        std::fs::write(&own, "1\n00:00:01,000 --> 00:00:02,000\nso\n").unwrap();
+        let late: String = (90..99).map(|n| format!("{{\"word\": \"a\", \"start\": {n}, \"end\": {n}}},")).collect();
+        std::fs::write(&other, format!("[{}]", late.trim_end_matches(','))).unwrap();
+        let report = read(&[other, own]);
+        assert_eq!((report.file.as_deref(), report.count.n_words), (Some("a.srt"), 1));
+        assert!(report.notes[0].contains("9 of 9 words lie after the end of the sound"), "{:?}", report.notes);
+        assert_eq!(report.notes[1], "a.srt was read instead");
     }
 }

@@ -12,6 +12,7 @@ pub mod mocap;
 pub mod npy;
 pub mod npz;
 pub mod search;
+pub mod skeleton;
 pub mod sound_offset_json;
 pub mod tfevents;
 pub mod timeline_npz;

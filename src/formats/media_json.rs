@@ -2,8 +2,9 @@
 
 use anyhow::{Context, Result, ensure};
 use orator_base::input;
+use orator_base::text::{clock, counted};
 use orator_base::types::image::{PictureOptions, PixelArea};
-use orator_base::types::sound::AudioTracks;
+use orator_base::types::sound::{AudioTracks, opposite_phase_note};
 use orator_base::types::time::FrameRate;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -46,6 +47,15 @@ pub struct MediaInfo {
     /// Audio tracks, if there are several.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub audio_tracks: Option<AudioTracks>,
+    /// Time of the first image, at which the sound and all other times begin, in the file as players count it, seconds.
+    #[serde(default, skip_serializing_if = "is_zero_secs")]
+    pub first_image_secs: f64,
+    /// Times at which another recording begins in a file of joined recordings, seconds.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub joins_secs: Vec<f64>,
+    /// Seconds in which the two channels of stereo cancel out, so that the louder one replaces their mix.
+    #[serde(default, skip_serializing_if = "is_zero_secs")]
+    pub opposite_phase_secs: f64,
     /// Format of the keypoints that replace the video, such as `OpenPose, 25 points`; `None` for a video.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub keypoints_from: Option<String>,
@@ -53,6 +63,10 @@ pub struct MediaInfo {
 
 fn is_zero(n: &usize) -> bool {
     *n == 0
+}
+
+fn is_zero_secs(secs: &f64) -> bool {
+    *secs == 0.0
 }
 
 /// Checks that require images, as listed in messages.
@@ -77,6 +91,9 @@ impl MediaInfo {
             hdr: None,
             n_resizes: 0,
             audio_tracks: None,
+            first_image_secs: 0.0,
+            joins_secs: Vec::new(),
+            opposite_phase_secs: 0.0,
             keypoints_from: None,
         }
     }
@@ -97,6 +114,11 @@ impl MediaInfo {
             let times = if self.n_resizes == 1 { "once".to_owned() } else { format!("{} times", self.n_resizes) };
             notes.push(format!("the image size changes {times}: scaled to the first size"));
         }
+        if let Some(first) = self.joins_secs.first() {
+            let (n, first) = (counted(self.joins_secs.len() + 1, "recording"), clock(*first));
+            notes.push(format!("{n} joined in one file, whose time stamps restart, first at {first}: a cut at each"));
+        }
+        notes.extend(opposite_phase_note(self.opposite_phase_secs));
         if let Some(area) = self.active_area {
             notes.push(format!("black bars: only the {}x{} px between them are analysed", area.width, area.height));
         }
@@ -127,7 +149,12 @@ impl MediaInfo {
         let bytes = input::read(path, input::MAX_TEXT).with_context(|| format!("cannot read {}", path.display()))?;
         let info: Self =
             serde_json::from_slice(&bytes).with_context(|| format!("{} is damaged or incomplete", path.display()))?;
-        for (field, secs) in [("duration_secs", info.duration_secs), ("audio_secs", info.audio_secs.unwrap_or(0.0))] {
+        for (field, secs) in [
+            ("duration_secs", info.duration_secs),
+            ("audio_secs", info.audio_secs.unwrap_or(0.0)),
+            ("first_image_secs", info.first_image_secs),
+            ("opposite_phase_secs", info.opposite_phase_secs),
+        ] {
             ensure!(
                 secs.is_finite() && secs >= 0.0,
                 "{}: invalid `{field}` {secs}: expected 0 or more",

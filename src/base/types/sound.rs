@@ -2,6 +2,7 @@
 //! Frame `n` begins at `n / fps` seconds; only this file converts frame counts to sample counts.
 
 use super::time::FrameRate;
+use crate::text::length;
 use serde::{Deserialize, Serialize};
 use std::fmt;
 use std::ops::Range;
@@ -40,6 +41,12 @@ pub struct AudioTracks {
     pub selected: usize,
     /// Language of each track as named in the file; empty if not named.
     pub languages: Vec<String>,
+}
+
+/// Note on stereo whose channels cancel out for `secs` seconds; `None` if they do not.
+pub fn opposite_phase_note(secs: f64) -> Option<String> {
+    let length = length(secs);
+    (secs > 0.0).then(|| format!("stereo channels of opposite phase for {length}: only the louder one is used there"))
 }
 
 /// Delay of the sound of a video relative to the picture, measured from the speaker's lips.

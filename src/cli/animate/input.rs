@@ -13,6 +13,7 @@ use orator_base::types::sound::Sound;
 use orator_base::types::time::FrameRate;
 use orator_dataset::index::SampleRef;
 use orator_dataset::{Dataset, Split};
+use orator_formats::mocap::facing::LengthUnit;
 use orator_formats::mocap::motion_file::{self, MotionFile};
 use orator_formats::{joints_npz, keypoints_npz};
 use std::path::{Path, PathBuf};
@@ -131,11 +132,16 @@ impl MotionInput {
         }
     }
 
-    /// Reads the motion; `fps` is the frame rate given by the user. `keypoints` is the file of face keypoints; without
-    /// it those of the run or the dataset are used.
-    pub fn read(&self, fps: Option<FrameRate>, keypoints: Option<&Path>) -> Result<InputMotion> {
+    /// Reads the motion with the frame rate and unit of length given by the user. `keypoints` is the file of face
+    /// keypoints; without it those of the run or the dataset are used.
+    pub fn read(
+        &self,
+        (fps, units): (Option<FrameRate>, Option<LengthUnit>),
+        keypoints: Option<&Path>,
+    ) -> Result<InputMotion> {
         let loaded = match &self.location {
             InputLocation::Sample(dataset, sample) => {
+                ensure!(units.is_none(), "{} is in metres: --units applies to .bvh files", self.name);
                 let sample = dataset.read(sample)?;
                 let body = sample.pose2d.slice(ndarray::s![.., ..N_BODY, ..]).to_owned();
                 let with_posture = InputMotion::with_keypoints(sample.motion, body.view(), None);
@@ -147,9 +153,9 @@ impl MotionInput {
                 }
             }
             InputLocation::File(path) => {
-                let MotionFile { motion, has_rate, notes } = motion_file::read_at(path, fps)?;
+                let MotionFile { motion, has_rate, notes } = motion_file::read_at(path, fps, units)?;
                 let has_rate = has_rate || fps.is_some();
-                let body = CapturedBody::read(path)?;
+                let body = CapturedBody::read(path, units)?;
                 InputMotion { motion, posture: None, body, is_seated: None, sound: None, has_rate, notes }
             }
         };

@@ -2,7 +2,7 @@
 
 use crate::cli::outputs::OutputFiles;
 use crate::cli::ui::Ui;
-use anyhow::{Context as _, Result, ensure};
+use anyhow::{Context as _, Result};
 use orator_avatar::animate::Performance;
 use orator_avatar::animate::retarget::bone_map::BoneMap;
 use orator_avatar::animate::retarget::retargeted::RetargetRig;
@@ -13,14 +13,14 @@ use std::path::{Path, PathBuf};
 
 #[derive(clap::Args)]
 pub(super) struct RetargetArgs {
-    /// Retarget the motion to the skeleton of this file: from a .bvh, a .bvh is written; from a .glb, that file with
-    /// an added animation. Bones are matched by name, and the matches are printed.
-    #[arg(long, value_name = "RIG.glb|RIG.bvh", conflicts_with = "names")]
+    /// Retarget the motion to the skeleton of this file: from a .bvh, a .bvh is written; from a .glb or .vrm, that file
+    /// with an added animation. Bones are matched by name or structure, and the matches are printed.
+    #[arg(long, value_name = "RIG.glb|RIG.vrm|RIG.bvh", conflicts_with = "names")]
     retarget: Option<PathBuf>,
     /// Bone map to use instead of matching by name, with lines such as LeftArm = "upperarm_l".
     #[arg(long, value_name = "FILE", requires = "retarget")]
     bone_map: Option<PathBuf>,
-    /// Write the bone map that was found to this file, to edit and pass to --bone-map.
+    /// Write the bone map that was found to this file, to edit and pass to --bone-map; a draft if bones are missing.
     #[arg(long, value_name = "FILE", requires = "retarget", conflicts_with = "bone_map")]
     write_bone_map: Option<PathBuf>,
 }
@@ -59,14 +59,14 @@ impl RetargetArgs {
 }
 
 impl OpenedRig {
-    /// Writes the performance on the skeleton and prints which bones were found.
-    pub(super) fn write(&self, performance: &Performance, outputs: &OutputFiles, ui: &Ui) -> Result<()> {
+    /// Writes the performance on the skeleton, prints which bones were found, and returns notes on them.
+    pub(super) fn write(&self, performance: &Performance, outputs: &OutputFiles, ui: &Ui) -> Result<Vec<String>> {
         outputs.iter().try_for_each(|(path, _)| self.rig.check_output(path))?;
         let ours = &performance.rig.skeleton;
         let map = match &self.map {
             Some((text, path)) => BoneMap::parse(text, self.rig.rig(), ours)
                 .with_context(|| format!("invalid bone map {}", path.display()))?,
-            None => BoneMap::detect(self.rig.rig())?,
+            None => BoneMap::draft(self.rig.rig()),
         };
         let text = map.text(self.rig.rig(), ours);
         if let Some(path) = &self.write_map {
@@ -74,10 +74,10 @@ impl OpenedRig {
             ui.say(&format!("wrote {}", path.display()));
         }
         ui.say(text.trim_end());
-        ensure!(map.n_bones() > 0, "no bones are mapped; map them with --bone-map FILE");
+        map.check(self.rig.rig())?;
         for (path, _) in outputs {
             self.rig.write(path, performance, &map).with_context(|| format!("cannot write {}", path.display()))?;
         }
-        Ok(())
+        Ok(map.notes())
     }
 }

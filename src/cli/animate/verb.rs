@@ -26,6 +26,7 @@ use orator_base::types::pose3d::Motion;
 use orator_base::types::sound::{SAMPLE_RATE, Sound};
 use orator_base::types::time::FrameRate;
 use orator_dataset::Split;
+use orator_formats::mocap::facing::LengthUnit;
 use orator_formats::mocap::motion_file::{self, DEFAULT_FPS};
 use orator_media::ffmpeg::audio;
 use serde_json::{Value, json};
@@ -94,6 +95,9 @@ pub struct Args {
     labels: Option<Vec<String>>,
     #[command(flatten)]
     film: FilmArgs,
+    /// Unit of length of a .bvh input; detected from the length of the arms by default.
+    #[arg(long, value_name = "m|cm|mm|inch")]
+    units: Option<LengthUnit>,
     /// Frame rate of a .npy or .txt input that does not state one; defaults to 15. It is an error if the file states
     /// another rate.
     #[arg(long, value_name = "RATE", alias = "in-fps")]
@@ -223,7 +227,7 @@ fn animate(
     options: &AnimationOptions,
     ui: &Ui,
 ) -> Result<AnimationSummary> {
-    let loaded = input.read(args.input_fps, args.keypoints.as_deref())?;
+    let loaded = input.read((args.input_fps, args.units), args.keypoints.as_deref())?;
     let options = &args.body.of(&loaded, options);
     let InputMotion { motion, posture, body, sound: own, has_rate, mut notes, .. } = loaded;
     let (sound, posture) = (sound.or(own), args.body.posture(posture));
@@ -241,7 +245,7 @@ fn animate(
                 notes.push(format!("{} does not state its frame rate: {DEFAULT_FPS} is assumed", path.display()));
             }
             let options = AnimationOptions { fps: Some(film_fps), ..*options };
-            Some(args.body.perform(&other.motion, None, CapturedBody::read(path)?, &options))
+            Some(args.body.perform(&other.motion, None, CapturedBody::read(path, None)?, &options))
         }
         _ => None,
     };
@@ -284,7 +288,7 @@ fn animate(
         posture: None,
     };
     if let Some(rig) = rig {
-        rig.write(&performance, outputs, ui)?;
+        notes.extend(rig.write(&performance, outputs, ui)?);
     }
     for (path, format) in outputs.iter().filter(|_| rig.is_none()) {
         format.write(path, &performance, &sources, ui).with_context(|| format!("cannot write {}", path.display()))?;

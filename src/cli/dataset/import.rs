@@ -14,6 +14,7 @@ use orator_dataset::import::{Imported, import};
 use orator_dataset::info::About;
 use orator_dataset::{INFO, Split, config};
 use orator_formats::mocap::captured::MotionKind as Found;
+use orator_formats::mocap::facing::LengthUnit;
 use serde_json::json;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -53,6 +54,9 @@ pub struct Args {
     /// Maximum difference in duration between audio and motion, seconds.
     #[arg(long, alias = "max-apart", default_value_t = 0.5, value_name = "SECS")]
     max_length_difference: f64,
+    /// Unit of length of BVH files; detected from the length of the arms by default.
+    #[arg(long, value_name = "m|cm|mm|inch")]
+    units: Option<LengthUnit>,
     /// Import captures without audio: audio files are ignored and silence is stored instead. Such a dataset is for
     /// lifters and evaluation.
     #[arg(long, alias = "no-sound", conflicts_with = "max_length_difference")]
@@ -136,6 +140,7 @@ fn plan(args: &Args) -> Result<ImportPlan> {
             min_frames: args.min_frames.max(1),
             max_difference_secs: args.max_length_difference,
             no_sound: args.no_audio,
+            units: args.units,
         },
         dataset: config::DatasetConfig {
             validation: args.validation,

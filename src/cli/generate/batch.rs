@@ -5,7 +5,7 @@ use crate::cli::sandbox::enter_sandbox;
 use crate::cli::signals;
 use crate::cli::ui::Ui;
 use anyhow::Result;
-use orator_base::text::counted;
+use orator_base::text::{counted, first_three};
 use orator_gesture::batch::{BatchReport, BatchState, SpeechBatch};
 use serde_json::json;
 
@@ -49,7 +49,11 @@ fn text(report: &BatchReport) -> String {
     if n_listed > MAX_LISTED {
         text += &format!("and {} more\n", n_listed - MAX_LISTED);
     }
-    let BatchReport { created, up_to_date, failed, out_folder, sounds } = report;
+    let BatchReport { created, up_to_date, failed, out_folder, sounds, passed_over } = report;
+    if !passed_over.is_empty() {
+        let (n, names) = (counted(passed_over.len(), "file"), first_three(passed_over));
+        text += &format!("passed over {n} without audio: {names}\n");
+    }
     let sounds = counted(sounds.len(), "audio file");
     text + &format!(
         "{sounds}: {created} generated, {up_to_date} up to date, {failed} failed; in {}",

@@ -206,8 +206,8 @@ fn segments(facts: &SegmentFacts) -> String {
 /// The batch that the arguments describe.
 fn batch(args: Args) -> Result<SpeechBatch> {
     let folder = args.out_folder.context("give --out-folder, the folder for the motions")?;
-    let mut sounds = match (&args.batch, &args.audio_folder) {
-        (Some(table), _) => sounds::of_table(table)?,
+    let (mut sounds, passed_over) = match (&args.batch, &args.audio_folder) {
+        (Some(table), _) => (sounds::of_table(table)?, Vec::new()),
         (None, Some(sounds)) => sounds::of_folder(sounds, &folder)?,
         (None, None) => bail!("give --audio, --audio-folder or --batch"),
     };
@@ -218,5 +218,5 @@ fn batch(args: Args) -> Result<SpeechBatch> {
     transcripts::find(&mut sounds, args.transcript.as_deref())?;
     let figure = args.figure.options();
     let Args { format: formats, checkpoint, words, carry_state, force: again, .. } = args;
-    Ok(SpeechBatch { sounds, folder, formats, checkpoint, words, carry_state, figure, again })
+    Ok(SpeechBatch { sounds, passed_over, folder, formats, checkpoint, words, carry_state, figure, again })
 }

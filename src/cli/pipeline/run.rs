@@ -10,7 +10,7 @@ use anyhow::Result;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use orator_base::stage::artifacts::StageName;
 use orator_base::stage::progress::{Event, Progress};
-use orator_base::text::counted;
+use orator_base::text::{counted, first_three};
 use orator_cluster::plan::ClusterPlan;
 use orator_dataset::config::Settings;
 use orator_onnx::{ModelError, ModelStore};
@@ -101,6 +101,11 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
         format!("{stage:8} {} done, {} up to date, {} failed", n.done, n.up_to_date, n.failed)
     };
     let mut lines: Vec<String> = report.stages.iter().map(counts).collect();
+    let chosen = pipeline.videos(&selection.speakers)?;
+    for videos in chosen.iter().filter(|videos| !videos.passed_over.is_empty()) {
+        let (speaker, n) = (&videos.speaker, counted(videos.passed_over.len(), "file"));
+        lines.push(format!("{speaker}: passed over {n} without video: {}", first_three(&videos.passed_over)));
+    }
     lines.extend(report.datasets.iter().map(|dir| format!("dataset  {}", dir.display())));
     let n_failed = report.failures.len();
     if n_failed > 0 {
@@ -115,6 +120,7 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     };
     let mut facts = json!(report);
     facts["next"] = json!(next);
+    facts["passed_over"] = chosen.iter().map(|videos| (videos.speaker.clone(), json!(videos.passed_over))).collect();
     facts["work_secs"] = json!(report.times.iter().map(|time| time.secs).sum::<f64>());
     ui.summary(&lines.join("\n"), Some(&next), facts);
     Ok(if n_failed == 0 { Outcome::Done } else { Outcome::SomeFailed })

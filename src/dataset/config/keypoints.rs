@@ -4,6 +4,7 @@
 use super::SpeakerConfig;
 use super::patterns::{self, SOUND_EXTENSIONS, SearchRoot, VIDEO_EXTENSIONS};
 use orator_base::input;
+use orator_base::text::composed;
 use orator_base::types::time::FrameRate;
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
@@ -125,7 +126,7 @@ fn is_frame(path: &Path) -> bool {
 /// and `SUFFIXES`.
 fn video_name(path: &Path) -> String {
     let name = if path.is_dir() { path.file_name() } else { path.file_stem() };
-    let name = name.unwrap_or_default().to_string_lossy().to_lowercase();
+    let name = composed(&name.unwrap_or_default().to_string_lossy()).to_lowercase();
     let name = PREFIXES.iter().fold(&*name, |name, prefix| name.strip_prefix(prefix).unwrap_or(name));
     SUFFIXES.iter().fold(name, |name, suffix| name.strip_suffix(suffix).unwrap_or(name)).to_owned()
 }

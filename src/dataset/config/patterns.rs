@@ -1,5 +1,7 @@
 //! Expansion of configuration entries that name files: a path, a folder, or a glob pattern.
 
+use orator_base::text::{composed, decomposed};
+use orator_formats::search;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
@@ -30,13 +32,20 @@ impl SearchRoot {
 }
 
 /// Extensions of video files that are used from a folder.
-pub const VIDEO_EXTENSIONS: [&str; 10] = ["mp4", "mkv", "mov", "webm", "avi", "m4v", "mpg", "mpeg", "ts", "wmv"];
+pub const VIDEO_EXTENSIONS: [&str; 19] = [
+    "mp4", "mkv", "mov", "webm", "avi", "m4v", "mpg", "mpeg", "ts", "wmv", "mts", "m2ts", "m2t", "vob", "mxf", "flv",
+    "3gp", "asf", "ogv",
+];
 /// Extensions of sound files; the sound of video files can be used too.
 pub const SOUND_EXTENSIONS: [&str; 12] =
     ["wav", "flac", "mp3", "m4a", "ogg", "opus", "aac", "oga", "aif", "aiff", "wma", "caf"];
 
 /// Extensions of transcript files.
 pub const TRANSCRIPT_EXTENSIONS: [&str; 7] = ["json", "srt", "vtt", "textgrid", "ctm", "tsv", "txt"];
+
+/// Patterns match in any case, since cameras write endings such as `.MP4`.
+pub const ANY_CASE: glob::MatchOptions =
+    glob::MatchOptions { case_sensitive: false, require_literal_separator: false, require_literal_leading_dot: false };
 
 /// Maximum nesting depth of folders that `**` enters.
 const MAX_DEPTH: usize = 64;
@@ -53,7 +62,7 @@ pub fn expand(
     (what, extensions): (&str, &[&str]),
     missing: &mut Vec<String>,
 ) -> Result<Vec<PathBuf>, String> {
-    let path = root.folder.join(entry);
+    let path = search::existing(&root.folder.join(entry));
     if !path.is_dir() {
         return matches(entry, root, missing);
     }
@@ -66,24 +75,26 @@ pub fn expand(
     if paths.is_empty() { Err(nothing()) } else { Ok(paths) }
 }
 
-/// Files and folders that an entry names: a plain path, or the matches of a pattern, without files that the program
-/// itself wrote. Messages about unreadable folders and file names that are not UTF-8 are added to `missing`.
+/// Files and folders that an entry names: a plain path, or the matches of a pattern in any case, without files that the
+/// program itself wrote. Accented letters may be composed or not. Messages about unreadable folders and file names that
+/// are not UTF-8 are added to `missing`.
 ///
 /// # Errors
 /// An invalid pattern, or one without matches.
 pub fn matches(entry: &str, root: &SearchRoot, missing: &mut Vec<String>) -> Result<Vec<PathBuf>, String> {
     let folder = &root.folder;
-    let path = folder.join(entry);
+    let path = search::existing(&folder.join(entry));
     if path.exists() || !entry.contains(['*', '?', '[']) {
         return Ok(vec![path]);
     }
     let n_missing = missing.len();
     let mut found = |folders: &[PathBuf], pattern: &str| -> Result<Vec<PathBuf>, String> {
         let mut paths = Vec::new();
-        for folder in folders {
+        let forms = BTreeSet::from([pattern.to_owned(), composed(pattern), decomposed(pattern)]);
+        for (folder, pattern) in folders.iter().flat_map(|folder| forms.iter().map(move |form| (folder, form))) {
             let pattern = Path::new(&glob::Pattern::escape(&folder.to_string_lossy())).join(pattern);
-            let matches =
-                glob::glob(&pattern.to_string_lossy()).map_err(|error| format!("{entry}: no pattern: {error}"))?;
+            let matches = glob::glob_with(&pattern.to_string_lossy(), ANY_CASE)
+                .map_err(|error| format!("{entry}: no pattern: {error}"))?;
             let mut report_unreadable =
                 |error: glob::GlobError| missing.push(format!("{entry}: cannot read the folder: {error}"));
             paths.extend(matches.filter_map(|found| found.map_err(&mut report_unreadable).ok()));
@@ -161,6 +172,20 @@ pub fn has_extension(path: &Path, extensions: &[&str]) -> bool {
 mod tests {
     use super::*;
     use std::os::unix::fs::symlink;
+
+    #[test]
+    fn names_match_in_any_case_and_any_form_of_accents() {
+        let dir = tempfile::tempdir().unwrap();
+        let at = |name: &str| dir.path().join(name);
+        ["A1.MP4", "e\u{301}te\u{301}.mp4", "C0001.MTS"].iter().for_each(|name| std::fs::write(at(name), "").unwrap());
+        let root = SearchRoot::new(dir.path(), &[]);
+        let found = |entry: &str| expand(entry, &root, ("video", &VIDEO_EXTENSIONS), &mut Vec::new()).unwrap();
+        assert_eq!(found("*.mp4"), [at("A1.MP4"), at("e\u{301}te\u{301}.mp4")]);
+        for entry in ["\u{e9}t\u{e9}.mp4", "\u{e9}*.mp4", "e\u{301}te\u{301}.mp4"] {
+            assert_eq!(found(entry), [at("e\u{301}te\u{301}.mp4")], "{entry}");
+        }
+        assert_eq!(found(".").len(), 3);
+    }
 
     #[test]
     fn folders_with_circular_links_are_searched_once() {

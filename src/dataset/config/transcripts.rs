@@ -4,17 +4,19 @@
 use super::SpeakerConfig;
 use super::patterns::{self, SearchRoot, TRANSCRIPT_EXTENSIONS};
 use orator_base::stage::Unit;
+use orator_base::text::composed;
 use std::collections::{BTreeMap, BTreeSet};
+use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 
-/// Transcripts of the speaker's videos, by the work name of the video. Messages about entries without files,
-/// transcripts without a video and further transcripts of a video are added to `missing`.
+/// Files that may be the transcript of the speaker's videos, sorted, by the work name of the video. Messages about
+/// entries without files and transcripts without a video are added to `missing`.
 pub fn of_speaker(
     speaker: &SpeakerConfig,
     units: &[Unit],
     root: &SearchRoot,
     missing: &mut Vec<String>,
-) -> BTreeMap<String, PathBuf> {
+) -> BTreeMap<String, Vec<PathBuf>> {
     let mut paths = BTreeSet::new();
     for entry in &speaker.transcripts {
         match patterns::expand(entry, root, ("transcript", &TRANSCRIPT_EXTENSIONS), missing) {
@@ -22,7 +24,7 @@ pub fn of_speaker(
             Err(message) => missing.push(format!("transcripts: {message}")),
         }
     }
-    let mut found: BTreeMap<String, PathBuf> = BTreeMap::new();
+    let mut found: BTreeMap<String, Vec<PathBuf>> = BTreeMap::new();
     for path in &paths {
         let named = || {
             units
@@ -35,27 +37,18 @@ pub fn of_speaker(
         match unit {
             _ if !path.is_file() => missing.push(format!("transcripts: {file} is not a file")),
             None => missing.push(format!("transcripts: {file} matches no video: name it after its video")),
-            Some(unit) => {
-                let first = found.entry(unit.video.clone()).or_insert_with(|| path.clone());
-                if first != path {
-                    let (first, video) = (first.display(), unit.source.display());
-                    missing.push(format!("transcripts: {first} and {file} both belong to {video}: remove one"));
-                }
-            }
+            Some(unit) => found.entry(unit.video.clone()).or_default().push(path.clone()),
         }
     }
     found
 }
 
-/// Whether the name of a transcript matches that of a video or its keypoints, ignoring case.
+/// Whether the name of a transcript matches that of a video or its keypoints, ignoring case and the form of accents.
 fn is_transcript_of(transcript: &Path, video: &Path) -> bool {
-    let stem = |path: &Path| path.file_stem().unwrap_or_default().to_string_lossy().to_lowercase();
-    let (name, video) = (stem(transcript), if video.is_dir() { folder_name(video) } else { stem(video) });
+    let folded = |name: Option<&OsStr>| composed(&name.unwrap_or_default().to_string_lossy()).to_lowercase();
+    let video = folded(if video.is_dir() { video.file_name() } else { video.file_stem() });
+    let name = folded(transcript.file_stem());
     name == video || name.strip_prefix(&video).is_some_and(|more| more.starts_with('.'))
-}
-
-fn folder_name(path: &Path) -> String {
-    path.file_name().unwrap_or_default().to_string_lossy().to_lowercase()
 }
 
 #[cfg(test)]
@@ -79,12 +72,21 @@ mod tests {
             let speaker = SpeakerConfig { transcripts, ..SpeakerConfig::default() };
             let mut missing = Vec::new();
             let found = of_speaker(&speaker, units, &SearchRoot::new(dir.path(), &[]), &mut missing);
-            let name = |path: PathBuf| path.file_name().unwrap().to_string_lossy().into_owned();
-            (found.into_iter().map(|(video, path)| format!("{video} {}", name(path))).collect::<Vec<_>>(), missing)
+            let names = |paths: Vec<PathBuf>| {
+                paths.iter().map(|path| path.file_name().unwrap().to_string_lossy()).collect::<Vec<_>>().join(" ")
+            };
+            (found.into_iter().map(|(video, paths)| format!("{video} {}", names(paths))).collect::<Vec<_>>(), missing)
         };
         let (found, missing) = find(&["t"], &units);
-        assert_eq!(found, ["a.b.mp4 a.b.json", "a.mp4 A.en.srt", "c.mp4 c.txt"]);
-        assert!(missing[0].contains("c.txt and ") && missing[1].contains("d.srt"), "{missing:?}");
+        assert_eq!(found, ["a.b.mp4 a.b.json", "a.mp4 A.en.srt", "c.mp4 c.txt c.vtt"]);
+        assert!(missing[0].contains("d.srt") && missing.len() == 1, "{missing:?}");
+        // Accents may be composed or not, and endings have any case.
+        for (file, video) in [("u/Vortra\u{308}ge.de.SRT", "Vortr\u{e4}ge.MP4"), ("u/x.VTT", "x.mov")] {
+            std::fs::create_dir_all(dir.path().join("u")).unwrap();
+            std::fs::write(dir.path().join(file), "").unwrap();
+            let name = file.strip_prefix("u/").unwrap();
+            assert!(find(&["u"], &[unit(video), unit("z.mp4")]).0.contains(&format!("{video} {name}")), "{file}");
+        }
         // A single transcript and a single video are matched regardless of their names.
         assert_eq!(find(&["t/d.srt"], &units[..1]).0, ["a.mp4 d.srt"]);
         let (found, missing) = find(&["gone.srt", "t/*.ctm"], &units);

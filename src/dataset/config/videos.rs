@@ -3,10 +3,13 @@
 //! processed.
 
 use super::keypoints::{self, KeypointSource};
-use super::patterns::{self, SearchRoot};
+use super::patterns::{self, ANY_CASE, SearchRoot};
 use super::{Config, SpeakerConfig, transcripts};
+use crate::file_name;
 use orator_base::stage::Unit;
+use orator_base::text::composed;
 use orator_base::types::split::Split;
+use orator_formats::search;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
@@ -18,12 +21,14 @@ pub struct Videos {
     pub units: Vec<Unit>,
     /// Videos given as keypoints of other programs, by work name.
     pub keypoints: BTreeMap<String, KeypointSource>,
-    /// Paths of transcripts, by the work name of the video.
-    pub transcripts: BTreeMap<String, PathBuf>,
+    /// Files that may be the transcript, by the work name of the video.
+    pub transcripts: BTreeMap<String, Vec<PathBuf>>,
     /// Splits named in the configuration, by the work name of the video.
     pub splits: BTreeMap<String, Split>,
     /// Messages about entries of the configuration that have no effect, each with advice.
     pub missing: Vec<String>,
+    /// Names of the files in folders of `videos` that are not videos, without transcripts if those are configured.
+    pub passed_over: Vec<String>,
 }
 
 impl Videos {
@@ -44,7 +49,7 @@ pub fn all(config: &Config) -> Vec<Videos> {
 fn of_speaker(speaker: &SpeakerConfig, root: &SearchRoot) -> Videos {
     let folder = root.folder.as_path();
     let mut found = BTreeMap::new();
-    let mut missing = Vec::new();
+    let (mut missing, mut passed_over) = (Vec::new(), Vec::new());
     for entry in &speaker.videos {
         let videos = ("video", &patterns::VIDEO_EXTENSIONS[..]);
         let paths = patterns::expand(entry, root, videos, &mut missing).unwrap_or_else(|message| {
@@ -54,6 +59,7 @@ fn of_speaker(speaker: &SpeakerConfig, root: &SearchRoot) -> Videos {
         for path in paths {
             missing.extend(add(&mut found, &speaker.name, path, folder).err());
         }
+        passed_over.extend(other_files(&search::existing(&folder.join(entry)), !speaker.transcripts.is_empty()));
     }
     let mut given = BTreeMap::new();
     for (path, source) in keypoints::of_speaker(speaker, root, &mut missing) {
@@ -87,7 +93,18 @@ fn of_speaker(speaker: &SpeakerConfig, root: &SearchRoot) -> Videos {
     given.retain(|video, _| found.contains_key(video));
     let units: Vec<Unit> = found.into_values().collect();
     let transcripts = transcripts::of_speaker(speaker, &units, root, &mut missing);
-    Videos { speaker: speaker.name.clone(), units, keypoints: given, transcripts, splits, missing }
+    Videos { speaker: speaker.name.clone(), units, keypoints: given, transcripts, splits, missing, passed_over }
+}
+
+/// Names of the files of a folder that are not videos, without hidden files; empty for a file or a pattern.
+fn other_files(folder: &Path, has_transcripts: bool) -> Vec<String> {
+    let is_other = |path: &PathBuf| {
+        let is_hidden = path.file_name().unwrap_or_default().to_string_lossy().starts_with('.');
+        let is_transcript = has_transcripts && patterns::has_extension(path, &patterns::TRANSCRIPT_EXTENSIONS);
+        path.is_file() && !is_hidden && !is_transcript && !patterns::has_extension(path, &patterns::VIDEO_EXTENSIONS)
+    };
+    let files = if folder.is_dir() { patterns::list(folder).unwrap_or_default() } else { Vec::new() };
+    files.iter().filter(|path| is_other(path)).map(|path| file_name(path)).collect()
 }
 
 /// Adds a video under its work name and returns the name.
@@ -110,12 +127,15 @@ fn add(found: &mut BTreeMap<String, Unit>, speaker: &str, path: PathBuf, folder:
 
 /// Whether an entry refers to the video: by its path, its file name, or a pattern for one of them.
 pub fn names(entry: &str, video: &Path, folder: &Path) -> bool {
-    let file_name = video.file_name().unwrap_or_default().to_string_lossy();
-    if folder.join(entry) == video || *entry == *file_name {
+    let text = |path: &Path| composed(&path.to_string_lossy());
+    let (entry, file_name) = (composed(entry), text(Path::new(video.file_name().unwrap_or_default())));
+    if Path::new(&text(&folder.join(&entry))) == Path::new(&text(video)) || entry == file_name {
         return true;
     }
-    let relative = video.strip_prefix(folder).unwrap_or(video).to_string_lossy();
-    glob::Pattern::new(entry).is_ok_and(|pattern| pattern.matches(&relative) || pattern.matches(&file_name))
+    let relative = text(video.strip_prefix(folder).unwrap_or(video));
+    let matches =
+        |pattern: glob::Pattern| [&relative, &file_name].iter().any(|name| pattern.matches_with(name, ANY_CASE));
+    glob::Pattern::new(&entry).is_ok_and(matches)
 }
 
 /// Work name `<slug of the stem>-<8 hex of BLAKE3 of the path relative to the configuration>`: it does not change when
@@ -175,7 +195,7 @@ mod tests {
             of_speaker(&SpeakerConfig { name: "host".into(), videos, ..SpeakerConfig::default() }, &root(dir.path()));
         let names: Vec<&str> = videos.units.iter().map(|unit| unit.video.split('-').next().unwrap()).collect();
         assert_eq!(names, ["a", "b", "gone"]);
-        assert_eq!(videos.missing.len(), 2);
+        assert_eq!((videos.missing.len(), videos.passed_over), (2, vec!["notes.txt".to_owned()]));
     }
 
     #[test]
@@ -203,6 +223,7 @@ mod tests {
             std::fs::write(dir.path().join(name), "").unwrap();
         }
         let list = |entries: &[&str]| entries.iter().map(|e| (*e).to_owned()).collect::<Vec<_>>();
+        assert!(super::names("e\u{301}*.MP4", &dir.path().join("\u{e9}t\u{e9}.mp4"), dir.path()));
         let mut speaker = SpeakerConfig { exclude: list(&["c.*", "gone.mp4"]), ..host(&["*.mp4"]) };
         (speaker.test, speaker.train) = (list(&["b [1].mp4"]), list(&[&dir.path().join("a.mp4").to_string_lossy()]));
         let videos = of_speaker(&speaker, &root(dir.path()));

@@ -6,19 +6,23 @@ use crate::config::patterns::SOUND_EXTENSIONS;
 use crate::write::entry;
 use anyhow::{Context, Result, ensure};
 use orator_base::input;
+use orator_formats::joints_description::path_of;
 use orator_formats::mocap::captured::MotionKind;
 use orator_formats::npz::Npz;
+use orator_formats::search::NamedFiles;
 use orator_formats::{search, transcript};
+use std::collections::BTreeSet;
 use std::io::{BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
 
-/// Motion file with its sound and transcript.
+/// Motion file with its sound, and the files that may be its transcript.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct TakeFiles {
     pub kind: MotionKind,
     pub motion: PathBuf,
     pub sound: Option<PathBuf>,
-    pub transcript: Option<PathBuf>,
+    /// In order of preference.
+    pub transcripts: Vec<PathBuf>,
 }
 
 /// Files found in the sources.
@@ -32,6 +36,8 @@ pub struct ImportSources {
     pub tars: Vec<PathBuf>,
     /// Files that look like motion but cannot be imported, with the reason.
     pub unknown: Vec<(PathBuf, String)>,
+    /// Files that are neither motion nor belong to motion.
+    pub passed_over: Vec<PathBuf>,
 }
 
 /// Names of sibling folders that hold sounds or transcripts, in lower case.
@@ -55,16 +61,24 @@ pub fn find(sources: &[PathBuf], only: Option<MotionKind>) -> Result<ImportSourc
     if only.is_some_and(|only| only != MotionKind::Shards) {
         found.datasets.clear();
     }
+    let mut named = NamedFiles::default();
     for path in files {
         match kind(&path) {
-            Ok(None) => {}
+            Ok(None) => found.passed_over.push(path),
             Ok(Some(kind)) if only.is_some_and(|only| only != kind) => {}
             Ok(Some(MotionKind::Shards)) => found.tars.push(path),
-            Ok(Some(kind)) => found.takes.push(with_companions(kind, path)),
+            Ok(Some(kind)) => found.takes.push(with_companions(kind, path, &mut named)),
             Err(_) if only.is_some_and(|only| only != MotionKind::Ted) => {}
             Err(why) => found.unknown.push((path, why)),
         }
     }
+    let files_of = |take: &TakeFiles| {
+        let files = take.sound.iter().chain(&take.transcripts).cloned();
+        files.chain([path_of(&take.motion)]).collect::<Vec<_>>()
+    };
+    let used: BTreeSet<PathBuf> = found.takes.iter().flat_map(files_of).collect();
+    // Files that belong to motion of another kind are left out on request.
+    found.passed_over.retain(|path| only.is_none() && !used.contains(path));
     let is_empty =
         found.takes.is_empty() && found.datasets.is_empty() && found.tars.is_empty() && found.unknown.is_empty();
     ensure!(
@@ -115,22 +129,23 @@ fn has_147_numbers(path: &Path) -> bool {
     read.is_ok() && line.split_whitespace().count() == 147 && line.split_whitespace().all(|w| w.parse::<f64>().is_ok())
 }
 
-fn with_companions(kind: MotionKind, motion: PathBuf) -> TakeFiles {
+fn with_companions(kind: MotionKind, motion: PathBuf, named: &mut NamedFiles) -> TakeFiles {
     let stem = motion.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     let mut stems = vec![stem.as_str()];
     // The sound of gt_interval_3821.txt is 3821.wav.
     stems.extend(["gt_interval_", "prediction_interval_"].iter().filter_map(|prefix| stem.strip_prefix(prefix)));
-    let sound = find_companion(&motion, &stems, &SOUND_EXTENSIONS, SOUND_FOLDERS);
-    let transcript = find_companion(&motion, &stems, &transcript::ENDINGS, TRANSCRIPT_FOLDERS);
-    TakeFiles { kind, motion, sound, transcript }
+    let sound = companions(&motion, &stems, &SOUND_EXTENSIONS, SOUND_FOLDERS, named).into_iter().next();
+    let transcripts = companions(&motion, &stems, &transcript::ENDINGS, TRANSCRIPT_FOLDERS, named);
+    TakeFiles { kind, motion, sound, transcripts }
 }
 
-/// First existing file `<stem>.<ending>` in the folder of `motion`, then in its sibling folders named in `folders`
+/// Existing files `<stem>.<ending>` in the folder of `motion`, then in its sibling folders named in `folders`
 /// (separated by spaces).
-fn find_companion(motion: &Path, stems: &[&str], endings: &[&str], folders: &str) -> Option<PathBuf> {
-    let own_folder = motion.parent()?;
+fn companions(motion: &Path, stems: &[&str], endings: &[&str], folders: &str, named: &mut NamedFiles) -> Vec<PathBuf> {
+    let Some(own_folder) = motion.parent() else { return Vec::new() };
     let mut folders_to_search = vec![own_folder.to_owned()];
-    let parent = if own_folder.as_os_str().is_empty() { Path::new("..") } else { own_folder.parent()? };
+    let parent =
+        if own_folder.as_os_str().is_empty() { Path::new("..") } else { own_folder.parent().unwrap_or(own_folder) };
     let parent = if parent.as_os_str().is_empty() { Path::new(".") } else { parent };
     let mut siblings: Vec<PathBuf> =
         std::fs::read_dir(parent).into_iter().flatten().flatten().map(|e| e.path()).collect();
@@ -140,10 +155,8 @@ fn find_companion(motion: &Path, stems: &[&str], endings: &[&str], folders: &str
         folders.split(' ').any(|folder| folder == name)
     };
     folders_to_search.extend(siblings.into_iter().filter(is_named));
-    let candidates = folders_to_search.iter().flat_map(|place| {
-        stems.iter().flat_map(move |stem| endings.iter().map(move |ending| place.join(format!("{stem}.{ending}"))))
-    });
-    candidates.filter(|path| path != motion).find(|path| path.is_file())
+    let candidates = folders_to_search.iter().flat_map(|folder| named.find(folder, stems, endings));
+    candidates.filter(|path| path != motion).collect()
 }
 
 fn ending(path: &Path) -> String {
@@ -153,6 +166,30 @@ fn ending(path: &Path) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn endings_of_recorders_and_decomposed_names_are_matched() {
+        let dir = tempfile::tempdir().unwrap();
+        let file = |name: &str| {
+            let path = dir.path().join(name);
+            std::fs::create_dir_all(path.parent().unwrap()).unwrap();
+            std::fs::write(&path, "").unwrap();
+            path
+        };
+        let take = |motion: &str, sound: &str, transcript: &str| TakeFiles {
+            kind: MotionKind::Bvh,
+            motion: file(motion),
+            sound: Some(file(sound)),
+            transcripts: vec![file(transcript)],
+        };
+        let expected = [
+            take("BVH/n\u{e3}o.Bvh", "Wav/na\u{303}o.WAV", "TSV/na\u{303}o.TSV"),
+            take("REC0007.BVH", "REC0007.Mp3", "REC0007.SRT"),
+        ];
+        let other = file("REC0008.WAV");
+        let found = find(&[dir.path().to_owned()], None).unwrap();
+        assert_eq!((found.takes, found.passed_over), (expected.to_vec(), vec![other]));
+    }
 
     #[test]
     fn files_of_one_take_are_matched() {
@@ -167,28 +204,29 @@ mod tests {
         let clip = file("clips/gt_interval_38.txt", &numbers);
         let clip_sound = file("clips/38.wav", "");
         let flat = file("flat/a.bvh", "");
-        let (flat_sound, flat_words) = (file("flat/a.wav", ""), file("flat/a.json", ""));
+        let flat_sound = file("flat/a.wav", "");
+        let flat_words = ["flat/a.json", "flat/a.TextGrid"].map(|name| file(name, ""));
         let apart = file("trn/bvh/b.BVH", "");
         let (apart_sound, apart_words) = (file("trn/wav/b.flac", ""), file("trn/tsv/b.tsv", ""));
         let alone = file("trn/bvh/c.bvh", "");
-        file("trn/bvh/notes.txt", "words");
+        let notes = file("trn/bvh/notes.txt", "words");
         let broken = file("d.npz", "no zip");
         let tar = file("train-000.tar", "");
         let found = find(&[dir.path().to_owned()], None).unwrap();
-        let take = |kind, motion: &PathBuf, sound: Option<PathBuf>, transcript: Option<PathBuf>| TakeFiles {
+        let take = |kind, motion: &PathBuf, sound: Option<PathBuf>, transcripts: &[PathBuf]| TakeFiles {
             kind,
             motion: motion.clone(),
             sound,
-            transcript,
+            transcripts: transcripts.to_vec(),
         };
         let expected = [
-            take(MotionKind::Authors, &clip, Some(clip_sound), None),
-            take(MotionKind::Bvh, &flat, Some(flat_sound), Some(flat_words)),
-            take(MotionKind::Bvh, &apart, Some(apart_sound), Some(apart_words)),
-            take(MotionKind::Bvh, &alone, None, None),
+            take(MotionKind::Authors, &clip, Some(clip_sound), &[]),
+            take(MotionKind::Bvh, &flat, Some(flat_sound), &flat_words),
+            take(MotionKind::Bvh, &apart, Some(apart_sound), &[apart_words]),
+            take(MotionKind::Bvh, &alone, None, &[]),
         ];
         assert_eq!(found.takes, expected);
-        assert_eq!((found.tars, found.unknown[0].0.clone()), (vec![tar], broken));
+        assert_eq!((found.tars, found.unknown[0].0.clone(), found.passed_over), (vec![tar], broken, vec![notes]));
         assert_eq!(find(&[dir.path().to_owned()], Some(MotionKind::Authors)).unwrap().takes.len(), 1);
         let text = format!("{:#}", find(&[dir.path().join("flat/a.wav")], None).unwrap_err());
         assert!(text.contains("147 values"), "{text}");

@@ -81,9 +81,7 @@ impl ImportItem {
     /// Folders that hold the item's files, sorted, each once.
     fn folders(&self) -> Vec<String> {
         let files: Vec<&PathBuf> = match self {
-            Self::Take(found) => {
-                [Some(&found.motion), found.sound.as_ref(), found.transcript.as_ref()].into_iter().flatten().collect()
-            }
+            Self::Take(found) => std::iter::once(&found.motion).chain(&found.sound).chain(&found.transcripts).collect(),
             Self::Part(path, _) | Self::Unknown(path, _) => vec![path],
             Self::ShardVideo(video) => video.tars(),
         };
@@ -152,7 +150,9 @@ impl ImportItem {
         };
         match self {
             Self::Take(found) => {
-                let TakeOutcome::Accepted(accepted) = ImportedTake::read(found, &plan.limits)?.outcome else {
+                let TakeOutcome::Accepted(accepted) =
+                    ImportedTake::read(found, &plan.limits, &plan.about.speaker)?.outcome
+                else {
                     anyhow::bail!("{} changed while it was imported", found.motion.display());
                 };
                 entry.push(&accepted.sample, 0.0)?;
@@ -172,13 +172,17 @@ impl ImportItem {
 }
 
 fn inspect_take(found: &TakeFiles, plan: &ImportPlan) -> Result<InspectedItem> {
-    let take = ImportedTake::read(found, &plan.limits)?;
+    let take = ImportedTake::read(found, &plan.limits, &plan.about.speaker)?;
+    let n_transcripts = match &take.outcome {
+        TakeOutcome::Accepted(accepted) => accepted.n_transcripts,
+        TakeOutcome::Rejected(_) => 1,
+    };
     let duration_secs = plan.limits.fps.secs(take.n_frames);
     let mut source = VideoSource {
         name: take.name,
         file: file_name(&found.motion),
         content: take.content,
-        inputs_hash: inputs_hash(found, plan)?,
+        inputs_hash: inputs_hash(found, n_transcripts, plan)?,
         ledger: Ledger { duration_secs, ..Ledger::default() },
         ..VideoSource::default()
     };
@@ -209,9 +213,9 @@ fn inspect_take(found: &TakeFiles, plan: &ImportPlan) -> Result<InspectedItem> {
                 _ => None,
             };
             source.ledger.words = accepted.words;
-            let notes = source.ledger.words.iter().flat_map(|words| words.notes.iter().cloned());
-            let unit = accepted.sample.meta["imported"].as_object().and_then(bvh::unit_note);
-            let note = unit.into_iter().chain(bones).chain(notes).collect::<Vec<_>>().join("; ");
+            let of_file = accepted.sample.meta["imported"].as_object().map(bvh::notes).unwrap_or_default();
+            let notes = accepted.sound_note.into_iter().chain(accepted.notes);
+            let note = of_file.into_iter().chain(bones).chain(notes).collect::<Vec<_>>().join("; ");
             let mut fingerprinter = Fingerprinter::default();
             fingerprinter.push(&accepted.sample.sound.samples);
             let codes = (!plan.limits.no_sound).then(|| fingerprinter.finish());
@@ -220,18 +224,24 @@ fn inspect_take(found: &TakeFiles, plan: &ImportPlan) -> Result<InspectedItem> {
     }
 }
 
-/// Hash of the files and settings that determine the sample.
-fn inputs_hash(found: &TakeFiles, plan: &ImportPlan) -> Result<String> {
+/// Hash of the settings and files that determine the sample, with the first `n_transcripts` transcripts.
+fn inputs_hash(found: &TakeFiles, n_transcripts: usize, plan: &ImportPlan) -> Result<String> {
     let described = Some(path_of(&found.motion)).filter(|path| path.is_file());
-    let files = [Some(&found.motion), found.sound.as_ref(), found.transcript.as_ref(), described.as_ref()];
-    let hashes = files.into_iter().flatten().map(|path| hash_file(path)).collect::<Result<Vec<_>>>()?;
-    let all = serde_json::json!([
+    let mut hashes = vec![hash_file(&found.motion)?];
+    hashes.extend(found.sound.as_deref().map(hash_file).transpose()?);
+    // An unreadable transcript costs no take.
+    hashes.extend(found.transcripts.iter().take(n_transcripts).map(|path| hash_file(path).unwrap_or_default()));
+    hashes.extend(described.as_deref().map(hash_file).transpose()?);
+    let mut all = serde_json::json!([
         env!("CARGO_PKG_VERSION"),
         hashes,
         plan.limits.fps,
         plan.dataset.max_mb,
         plan.limits.no_sound
     ]);
+    if let (Some(unit), Some(all)) = (plan.limits.units, all.as_array_mut()) {
+        all.push(unit.name.into());
+    }
     Ok(blake3::hash(all.to_string().as_bytes()).to_hex().to_string())
 }
 

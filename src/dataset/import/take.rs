@@ -5,7 +5,7 @@ use super::find::TakeFiles;
 use crate::config::videos::slug;
 use crate::file_name;
 use crate::sample::{N_KEYPOINTS, Sample};
-use crate::words::VideoWords;
+use crate::words::{self, VideoWords};
 use anyhow::{Context, Result};
 use ndarray::{Array3, s};
 use orator_base::math::order::Ordered;
@@ -18,11 +18,12 @@ use orator_base::types::skeleton::{L_HAND, N_BONES, N_HAND_JOINTS, N_JOINTS, R_H
 use orator_base::types::sound::{SAMPLE_RATE, Sound, sample_at};
 use orator_base::types::time::FrameRate;
 use orator_formats::mocap::captured::{self, CapturedMotion, MotionKind};
+use orator_formats::mocap::facing::LengthUnit;
 use orator_formats::transcript::{Transcript, Word};
 use orator_media::ffmpeg::audio;
 use serde_json::{Value, json};
 
-/// Requirements on a take.
+/// Requirements on a take, and settings for reading it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TakeLimits {
     /// Frame rate of the dataset.
@@ -33,6 +34,8 @@ pub struct TakeLimits {
     pub max_difference_secs: f64,
     /// Whether sound files are ignored and every take gets silence.
     pub no_sound: bool,
+    /// Unit of length of BVH files; `None`: detected.
+    pub units: Option<LengthUnit>,
 }
 
 /// Take with its outcome.
@@ -60,10 +63,16 @@ pub struct AcceptedTake {
     /// Median shift of the joints by fixing the bone lengths, mm.
     pub moved_mm: f64,
     pub sample: Sample,
-    /// Word counts of the transcript, if there is one with word times.
+    /// Word counts of the transcript; `None` if there is none, or only text without times.
     pub words: Option<TranscriptReport>,
+    /// Problems of the transcript, one sentence each.
+    pub notes: Vec<String>,
+    /// Number of transcript files that were read.
+    pub n_transcripts: usize,
     /// Bone lengths, metres; 0: not measured.
     pub lengths: [f32; N_BONES],
+    /// Note on the mix of the sound, if any.
+    pub sound_note: Option<String>,
 }
 
 /// Reason for rejecting a take.
@@ -83,28 +92,30 @@ impl TakeRejection {
 }
 
 impl ImportedTake {
-    /// Reads the files of a take and converts or rejects it.
+    /// Reads the files of a take of `speaker` and converts or rejects it.
     ///
     /// # Errors
-    /// An unreadable file; the message names it.
-    pub fn read(found: &TakeFiles, limits: &TakeLimits) -> Result<Self> {
+    /// Unreadable motion or sound; the message names the file. A transcript that cannot be read is a note.
+    pub fn read(found: &TakeFiles, limits: &TakeLimits, speaker: &str) -> Result<Self> {
         let content = hash_file(&found.motion)?;
         let stem = found.motion.file_stem().unwrap_or_default().to_string_lossy();
         let name = format!("{}-{}", slug(&stem), content.get(..8).unwrap_or(&content));
-        let captured = captured::read(found.kind, &found.motion)?;
+        let captured = captured::read_in(found.kind, &found.motion, limits.units)?;
         let motion = resample::at_rate(&captured.motion, limits.fps);
         let n_frames = motion.n_frames();
         let sound = match &found.sound {
             _ if limits.no_sound => {
                 let n_samples = sample_at(limits.fps, SAMPLE_RATE, n_frames);
-                Some(Sound { rate: SAMPLE_RATE, samples: vec![0.0; n_samples] })
+                Some((Sound { rate: SAMPLE_RATE, samples: vec![0.0; n_samples] }, None))
             }
-            Some(path) => audio::read_mono(path, SAMPLE_RATE)?.filter(|sound| !sound.samples.is_empty()),
+            Some(path) => audio::read_mono_with_note(path, SAMPLE_RATE)?.filter(|(sound, _)| !sound.samples.is_empty()),
             None => None,
         };
+        let (sound, sound_note) = sound.map_or((None, None), |(sound, note)| (Some(sound), note));
         let outcome = match (rejection(n_frames, sound.as_ref(), found, limits), sound) {
             (None, Some(sound)) => {
-                TakeOutcome::Accepted(Box::new(to_accepted(&name, found, &captured, motion, sound)?))
+                let accepted = to_accepted((&name, speaker), found, &captured, motion, sound)?;
+                TakeOutcome::Accepted(Box::new(AcceptedTake { sound_note, ..accepted }))
             }
             (rejection, _) => TakeOutcome::Rejected(rejection.unwrap_or_else(|| no_sound(found))),
         };
@@ -149,7 +160,7 @@ fn n_common(n_frames: usize, sound: &Sound, fps: FrameRate) -> usize {
 }
 
 fn to_accepted(
-    name: &str,
+    (name, speaker): (&str, &str),
     found: &TakeFiles,
     captured: &CapturedMotion,
     mut motion: Motion,
@@ -165,14 +176,16 @@ fn to_accepted(
     let moved = moved_mm(&before, &motion.joints);
     let sound_secs = sound.secs();
     sound.samples.resize(sample_at(fps, SAMPLE_RATE, n_frames), 0.0);
-    let transcript = match &found.transcript {
-        Some(path) => Transcript::read(path)?,
-        None => captured.text.as_deref().map(Transcript::of_text).unwrap_or_default(),
-    };
+    let choice = words::choose(&found.transcripts, speaker, sound_secs);
+    let n_transcripts = choice.n_read;
+    let transcript = choice.found.as_ref().map(|(_, transcript)| transcript.clone());
+    let is_untimed = transcript.as_ref().is_some_and(|transcript| transcript.words.is_empty());
+    let transcript = transcript.or_else(|| captured.text.as_deref().map(Transcript::of_text)).unwrap_or_default();
     let end_secs = fps.secs(n_frames);
-    let timed = found.transcript.as_ref().filter(|_| !transcript.words.is_empty());
-    let video_words = timed.map(|path| VideoWords::new(transcript.clone(), path, sound_secs, 0.0)).transpose()?;
-    let words = video_words.as_ref().map(|words| words.report([(0.0, end_secs)]));
+    let video_words =
+        (!found.transcripts.is_empty()).then(|| VideoWords::of(choice, &found.transcripts, sound_secs, 0.0));
+    let report = video_words.as_ref().map(|words| words.report([(0.0, end_secs)]));
+    let notes = report.as_ref().map(|report| report.notes.clone()).unwrap_or_default();
     let transcript = transcript.until(end_secs);
     let word_json =
         |word: &Word| json!({ "start_secs": word.start_secs, "end_secs": word.end_secs, "word": word.word });
@@ -208,10 +221,11 @@ fn to_accepted(
     }
     let pose2d = Array3::zeros((n_frames, N_KEYPOINTS, 3));
     let key = format!("{name}-{:06}", 0);
-    let in_sample = video_words.map(|words| words.within(0.0, end_secs));
+    let in_sample = video_words.filter(|_| !is_untimed).map(|words| words.within(0.0, end_secs));
     let sample = Sample { key, motion, pose2d, sound, words: in_sample, posture: None, meta };
     sample.members().with_context(|| format!("cannot create a sample from {}", found.motion.display()))?;
-    Ok(AcceptedTake { moved_mm: moved[0], sample, words, lengths })
+    let words = report.filter(|_| !is_untimed);
+    Ok(AcceptedTake { moved_mm: moved[0], sample, words, notes, n_transcripts, lengths, sound_note: None })
 }
 
 /// Shift of the joints between `before` and `after`: median and maximum, mm, rounded to 0.01.

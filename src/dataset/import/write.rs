@@ -11,12 +11,12 @@ use crate::split::{self, Assignment, RecordedSplit, SplitBy, SplitPlan, SplitRul
 use crate::stats::DatasetStats;
 use crate::write::assemble::DatasetWriter;
 use crate::write::entry;
-use crate::{INFO, shared_sound};
+use crate::{INFO, file_name, shared_sound};
 use anyhow::{Context, Result, ensure};
 use orator_base::input;
 use orator_base::stage::ledger::Ledger;
 use orator_base::stage::progress::Progress;
-use orator_base::text::counted;
+use orator_base::text::{counted, first_three};
 use orator_formats::mocap::captured::MotionKind;
 use serde::Serialize;
 use std::collections::{BTreeMap, BTreeSet};
@@ -26,7 +26,7 @@ use std::path::{Path, PathBuf};
 #[derive(Clone, Debug)]
 pub struct Imported {
     pub lines: Vec<ImportOutcome>,
-    /// Notes on files skipped in tar files.
+    /// Notes on files skipped in folders and tar files.
     pub notes: Vec<String>,
     pub info: DatasetInfo,
     pub stats: DatasetStats,
@@ -54,7 +54,8 @@ pub fn import(plan: &ImportPlan, out: &Path, progress: &dyn Progress) -> Result<
     if about.no_sound {
         about.notes.push(NO_SOUND.to_owned());
     }
-    let (items, left_out) = ImportItem::all(&sources);
+    let (items, mut left_out) = ImportItem::all(&sources);
+    left_out.extend(passed_over(&sources.passed_over));
     let task = progress.begin("inspect", items.len() as u64);
     let mut names = BTreeSet::new();
     let mut inspected: Vec<InspectedItem> = Vec::new();
@@ -206,6 +207,13 @@ fn notes(takes: &[TakeFiles]) -> Vec<String> {
         );
     }
     notes
+}
+
+/// Note on files that belong to no motion.
+fn passed_over(files: &[PathBuf]) -> Option<String> {
+    let names: Vec<String> = files.iter().map(|path| file_name(path)).collect();
+    let n = counted(names.len(), "file");
+    (!names.is_empty()).then(|| format!("passed over {n} without motion of the same name: {}", first_three(&names)))
 }
 
 /// At most two messages per reason why nothing was accepted, and the number of the others.

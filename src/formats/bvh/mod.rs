@@ -1,7 +1,9 @@
-//! BVH files: reader, writer, joint names, and conversion to exponential maps.
+//! BVH files: reader, frame rate, writer, and conversion to exponential maps.
 
 pub mod exponential_maps;
-pub mod joint_names;
+pub(crate) mod frame_time;
+mod motion_lines;
 pub mod read;
 pub mod skeleton;
+mod words;
 pub mod write;

@@ -2,7 +2,9 @@
 //! `mocap` maps the joints to our skeleton.
 
 use super::skeleton::{JointChannels, joint_positions};
-use anyhow::{Context, Result, anyhow, bail, ensure};
+use super::words::{Words, number};
+use super::{frame_time, motion_lines};
+use anyhow::{Context, Result, bail, ensure};
 use orator_base::input;
 use orator_base::math::vec3::Vec3;
 use orator_base::text::counted;
@@ -17,6 +19,8 @@ pub struct Bvh {
     /// Time between consecutive frames, seconds.
     pub frame_secs: f64,
     pub n_frames: usize,
+    /// What was assumed or left out when reading the file, one sentence each.
+    pub notes: Vec<String>,
     /// Channel values [n_frames * n_channels], in joint order within a frame.
     pub(super) values: Vec<f64>,
     pub(super) n_channels: usize,
@@ -57,22 +61,48 @@ impl Bvh {
     ///
     /// # Errors
     ///
-    /// The file is unreadable or not BVH; the message names what was expected.
+    /// The file is unreadable or not BVH; the message names the line and what was expected.
     pub fn read(path: &Path) -> Result<Self> {
-        let text =
-            input::read_text(path, input::MAX_DATA).with_context(|| format!("cannot read {}", path.display()))?;
-        Self::parse(&text).with_context(|| format!("{} is not a valid BVH file", path.display()))
+        let bytes = input::read(path, input::MAX_DATA).with_context(|| format!("cannot read {}", path.display()))?;
+        Self::from_bytes(&bytes).with_context(|| format!("{} is not a valid BVH file", path.display()))
+    }
+
+    /// Parses the bytes of a file: UTF-8 with or without byte order mark, or another encoding that extends ASCII, of
+    /// which only joint names and comments are affected.
+    pub fn from_bytes(bytes: &[u8]) -> Result<Self> {
+        let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
+        if let Ok(text) = std::str::from_utf8(bytes) {
+            return Self::parse(text);
+        }
+        let mut bvh = Self::parse(&bytes.iter().map(|&byte| distinct_char(byte)).collect::<String>())?;
+        bvh.notes.push("the text is not UTF-8: joint names are read as Latin-1".to_owned());
+        Ok(bvh)
     }
 
     /// Parses the text of a file.
     pub fn parse(text: &str) -> Result<Self> {
-        let mut words = Words(text.split_ascii_whitespace());
+        let mut words = Words::new(text);
+        let parsed = Self::from_words(&mut words);
+        let bvh = parsed.with_context(|| format!("line {}", words.line))?;
+        // The positions of all joints are held in memory, so their number is limited by the size of the file.
+        let n_positions = bvh.n_frames * bvh.joints.len();
+        ensure!(
+            n_positions <= MIN_POSITION_LIMIT.max(MAX_POSITIONS_PER_BYTE * text.len()),
+            "{} frames of {} joints with only {}: too many positions for the size of the file",
+            bvh.n_frames,
+            bvh.joints.len(),
+            counted(bvh.n_channels, "channel")
+        );
+        Ok(bvh)
+    }
+
+    fn from_words(words: &mut Words) -> Result<Self> {
         words.expect("HIERARCHY")?;
         words.expect("ROOT")?;
         let mut joints: Vec<JointChannels> = Vec::new();
         let mut n_channels = 0;
         let mut open: Vec<usize> = Vec::new();
-        push(&mut joints, &mut open, words.next("the root's name")?.to_owned(), &mut words)?;
+        push(&mut joints, &mut open, words.next("the root's name")?.to_owned(), words)?;
         while let Some(&current) = open.last() {
             match words.next("the rest of the hierarchy")? {
                 "OFFSET" => joints[current].offset = [words.number()?, words.number()?, words.number()?],
@@ -93,11 +123,11 @@ impl Bvh {
                         (0..count as usize).map(|_| channel(words.next("a channel")?)).collect::<Result<_>>()?;
                     n_channels += joints[current].channels.len();
                 }
-                "JOINT" => push(&mut joints, &mut open, words.next("a joint's name")?.to_owned(), &mut words)?,
+                "JOINT" => push(&mut joints, &mut open, words.next("a joint's name")?.to_owned(), words)?,
                 "End" => {
                     words.expect("Site")?;
                     let name = format!("{}_end", joints[current].name);
-                    push(&mut joints, &mut open, name, &mut words)?;
+                    push(&mut joints, &mut open, name, words)?;
                 }
                 "}" => drop(open.pop()),
                 other => bail!("unexpected `{other}` in joint {}", joints[current].name),
@@ -105,37 +135,32 @@ impl Bvh {
         }
         words.expect("MOTION")?;
         words.expect("Frames:")?;
-        let n_frames = words.number()?;
+        let (n_declared, frames_line) = (words.number()?, words.line);
         ensure!(
-            n_frames >= 0.0 && n_frames.fract() == 0.0 && n_frames < 1e8,
-            "invalid number of frames {n_frames}: expected 0 to 99999999"
+            n_declared >= 0.0 && n_declared.fract() == 0.0 && n_declared < 1e8,
+            "invalid number of frames {n_declared}: expected 0 to 99999999"
         );
+        ensure!(n_declared == 0.0 || n_channels > 0, "{n_declared} frames without channels");
         words.expect("Frame")?;
         words.expect("Time:")?;
-        let frame_secs = words.number()?;
+        let written = words.next("a number")?;
+        let mut frame_secs = number(written)?;
         // The bounds allow for the rounding of frame times.
         ensure!(
             (0.000_99..=1.01).contains(&frame_secs),
             "invalid frame time {frame_secs:?} s: expected 0.001 to 1 (1000 to 1 fps)"
         );
-        ensure!(n_frames == 0.0 || n_channels > 0, "{n_frames} frames without channels");
-        let values: Vec<f64> =
-            words.0.map(|w| w.parse().map_err(|_| anyhow!("`{w}` is not a number"))).collect::<Result<_>>()?;
-        let expected = n_frames as usize * n_channels;
-        ensure!(
-            values.len() == expected,
-            "{} values after Frame Time, expected {n_frames} frames x {n_channels} channels",
-            values.len()
-        );
-        // The positions of all joints are held in memory, so their number is limited by the size of the file.
-        let n_positions = n_frames as usize * joints.len();
-        ensure!(
-            n_positions <= MIN_POSITION_LIMIT.max(MAX_POSITIONS_PER_BYTE * text.len()),
-            "{n_frames} frames of {} joints with only {}: too many positions for the size of the file",
-            joints.len(),
-            counted(n_channels, "channel")
-        );
-        Ok(Self { joints, frame_secs, n_frames: n_frames as usize, values, n_channels })
+        let mut notes = Vec::new();
+        if let Some(rate) = frame_time::rounded_rate(written, frame_secs) {
+            notes.push(format!(
+                "the frame time {written} is rounded: read as {rate} (as written {:.2} fps)",
+                1.0 / frame_secs
+            ));
+            frame_secs = 1.0 / rate.per_sec();
+        }
+        let values = motion_lines::read(words, (n_declared as usize, frames_line), n_channels, &mut notes)?;
+        let n_frames = values.len().checked_div(n_channels).unwrap_or(0);
+        Ok(Self { joints, frame_secs, n_frames, notes, values, n_channels })
     }
 
     /// Index of the joint with this name.
@@ -202,22 +227,12 @@ fn channel(word: &str) -> Result<Channel> {
     })
 }
 
-struct Words<'a>(std::str::SplitAsciiWhitespace<'a>);
-
-impl<'a> Words<'a> {
-    fn next(&mut self, what: &str) -> Result<&'a str> {
-        self.0.next().with_context(|| format!("unexpected end of file: expected {what}"))
-    }
-
-    fn expect(&mut self, word: &str) -> Result<()> {
-        let found = self.next(&format!("`{word}`"))?;
-        ensure!(found.eq_ignore_ascii_case(word), "found `{found}`, expected `{word}`");
-        Ok(())
-    }
-
-    fn number(&mut self) -> Result<f64> {
-        let word = self.next("a number")?;
-        word.parse().map_err(|_| anyhow!("found `{word}`, expected a number"))
+/// Latin-1 character of a byte; the control characters and spaces 0x80 to 0xa0 become letters instead, so that names
+/// that differ as bytes differ as text and no name contains a space.
+fn distinct_char(byte: u8) -> char {
+    match byte {
+        0x80..=0xa0 => char::from_u32(0x100 + u32::from(byte)).unwrap_or(char::REPLACEMENT_CHARACTER),
+        _ => char::from(byte),
     }
 }
 
@@ -271,20 +286,48 @@ mod tests {
         let good = arm("3 Zrotation Yrotation Xrotation", "0 0 0 0 0 0 0 0 0");
         for (broken, expected) in [
             (String::new(), "unexpected end of file"),
-            (good.replace("ROOT", "LEAF"), "`LEAF`"),
-            (good.replace("Yrotation", "Wrotation"), "Wrotation"),
-            (good.replace("Frames: 1", "Frames: 2"), "9 values"),
-            (good.replace("Frames: 1", "Frames: -1"), "number of frames -1"),
-            (good.replace("0.04", "0"), "invalid frame time 0"),
+            (good.replace("ROOT", "LEAF"), "line 2: found `LEAF`"),
+            (good.replace("Yrotation", "Wrotation"), "line 5: unknown channel `Wrotation`"),
+            (good.replace("Frames: 1", "Frames: 3"), "line 19: the file has 1 frame, line 17 states 3"),
+            (good.replace("Frames: 1", "Frames: -1"), "line 17: invalid number of frames -1"),
+            (good.replace("0.04", "0"), "line 18: invalid frame time 0"),
             (good.replace("0.04", "1e-300"), "invalid frame time 1"),
             (good.replace("0.04", "1.1"), "expected 0.001 to 1"),
             (good.replace("MOTION", "}"), "MOTION"),
-            (good.replace("OFFSET 10 0 0", "OFFSET ten 0 0"), "`ten`"),
-            (good[..20].to_owned(), "unexpected end"),
+            (good.replace("OFFSET 10 0 0", "OFFSET ten 0 0"), "line 8: found `ten`"),
+            (good[..20].to_owned(), "line 2: unexpected end"),
+            (format!("# made by hand\n\n{}", good.replace("MOTION", "ACTION")), "line 18: found `ACTION`"),
         ] {
             let text = format!("{:#}", Bvh::parse(&broken).unwrap_err());
             assert!(text.contains(expected), "{text}");
         }
+    }
+
+    #[test]
+    fn names_and_comments_in_other_encodings_are_read() {
+        let text = arm("3 Zrotation Yrotation Xrotation", "0 0 0 0 0 0 0 0 0");
+        let marked = Bvh::from_bytes(format!("\u{feff}{text}").as_bytes()).unwrap();
+        assert_eq!((marked.joints.len(), marked.notes.len()), (3, 0));
+        // Shift-JIS: a katakana name with the byte of a brace, and one that differs in a control character of Latin-1.
+        let named = |name: &[u8]| {
+            let (before, after) = text.split_once("Elbow").unwrap();
+            let bytes = [b"// so\xf6\r\n".as_slice(), before.as_bytes(), name, after.as_bytes()].concat();
+            Bvh::from_bytes(&bytes).unwrap()
+        };
+        let (first, second) = (named(b"\x83{\x85\xa0"), named(b"\x83{\x84\xa0"));
+        assert!(first.joints[1].name != second.joints[1].name && !first.joints[1].name.contains(char::is_whitespace));
+        assert_eq!(named(b"\xc9paule").joints[2].name, "Épaule_end");
+        assert_eq!(first.notes, ["the text is not UTF-8: joint names are read as Latin-1"]);
+        crate::bvh::skeleton::BvhSkeleton::of(&first).check().unwrap();
+    }
+
+    #[test]
+    fn rounded_frame_times_and_frame_counts_are_noted() {
+        let text = arm("3 Zrotation Yrotation Xrotation", "0 0 0 0 0 0 0 0 0");
+        let bvh = Bvh::parse(&text.replace("0.04", "0.017").replace("Frames: 1", "Frames: 2")).unwrap();
+        assert_eq!((bvh.n_frames, bvh.frame_secs), (1, 1.0 / 60.0));
+        assert_eq!(bvh.notes[0], "the frame time 0.017 is rounded: read as 60 fps (as written 58.82 fps)");
+        assert_eq!(bvh.notes[1], "line 17 states 2 frames, the file has 1: all complete frames are read");
     }
 
     #[test]

@@ -1,9 +1,9 @@
-//! Keypoint arrays in `.npy` and `.npz` files, identified by their shapes: MediaPipe landmarks, PATS, and
+//! Keypoint arrays in `.npy` and `.npz` files, identified by their shapes: MediaPipe landmarks, PATS, COCO, and
 //! `keypoints.npz`.
 
 use super::entry::point;
 use super::found::{FoundKeypoints, FoundPerson, NamedArrays};
-use super::{mediapipe, pats};
+use super::{counted, mediapipe, pats};
 use crate::npz::Npz;
 use crate::{keypoints_npz, npy};
 use anyhow::{Context, Result, bail};
@@ -40,17 +40,18 @@ pub fn read_npz(path: &Path) -> Result<FoundKeypoints> {
     Ok(found)
 }
 
+type ArraysReader = fn(&NamedArrays) -> Result<Option<FoundKeypoints>>;
+
 fn from_arrays(path: &Path, arrays: NamedArrays) -> Result<FoundKeypoints> {
     let shapes: Vec<String> = arrays.iter().map(|(name, array)| format!("{name} {:?}", array.shape())).collect();
-    let read = match mediapipe::read(&arrays) {
-        Ok(None) => pats::read(&arrays),
-        read => read,
-    };
+    let readers: [ArraysReader; 3] = [mediapipe::read, pats::read, counted::read];
+    let read = readers.into_iter().find_map(|read| read(&arrays).transpose()).transpose();
     match read.with_context(|| path.display().to_string())? {
         Some(found) => Ok(found),
         None => bail!(
             "{}: expected an array `body` [T, 17, 3], MediaPipe landmarks ([T, 33, 3..5], or with hands [T, 21, 3]; \
-             [T, 75, 3..4], [T, 543, 3], [T, 1662]) or PATS ([T, 2, 52], [T, 104]); found: {}",
+             [T, 75, 3..4], [T, 543, 3], [T, 1662]), PATS ([T, 2, 52], [T, 104]) or COCO ([T, 17, 2..3], [T, 133, 2..3]); \
+             found: {}",
             path.display(),
             shapes.iter().map(|shape| shape.trim()).collect::<Vec<_>>().join(", ")
         ),

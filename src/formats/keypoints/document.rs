@@ -1,9 +1,10 @@
 //! JSON keypoint files: OpenPose frames, MMPose results and inferencer lists, AlphaPose and COCO results,
 //! COCO-WholeBody annotations. NaN, which Python writes into JSON, is read as a missing number.
 
+use super::counted::{self, CountedPerson};
 use super::entry::{ImageName, JsonEntry};
-use super::found::{FoundKeypoints, FoundPerson};
-use super::frames::{in_order, number_of};
+use super::found::FoundKeypoints;
+use super::frames::number_of;
 use anyhow::{Context, Result, bail, ensure};
 use serde::Deserialize;
 use std::borrow::Cow;
@@ -65,40 +66,24 @@ pub fn parse(bytes: &[u8]) -> Result<FoundKeypoints> {
 
 /// Converts numbered frames of entries to keypoints.
 fn from_frames(program: &str, frames: BTreeMap<u64, Vec<JsonEntry>>) -> Result<FoundKeypoints> {
-    let mut counts = BTreeSet::new();
-    let numbered = frames.into_iter().map(|(number, entries)| Ok((number, persons(number, &entries, &mut counts)?)));
-    let numbered = numbered.collect::<Result<_>>()?;
-    of_persons(program, &counts, numbered)
+    let numbered = frames.into_iter().map(|(number, entries)| Ok((number, persons(number, &entries)?)));
+    counted::of_persons(program, numbered.collect::<Result<_>>()?)
 }
 
-/// Converts the entries of frame `number` to persons, and adds their numbers of points to `counts`.
+/// Converts the entries of frame `number` to persons.
 ///
 /// # Errors
 ///
 /// An entry is not a valid person, or there are more than 1000 persons.
-pub fn persons(number: u64, entries: &[JsonEntry], counts: &mut BTreeSet<usize>) -> Result<Vec<FoundPerson>> {
+pub fn persons(number: u64, entries: &[JsonEntry]) -> Result<Vec<CountedPerson>> {
     let n = entries.len();
     ensure!(n <= MAX_PERSONS, "frame {number} has {n} persons, expected at most {MAX_PERSONS}");
     let mut persons = Vec::with_capacity(n);
     for (at, entry) in entries.iter().enumerate() {
         let person = entry.person().map_err(|message| anyhow::anyhow!("frame {number}, person {at}: {message}"))?;
-        if let Some((person, n_points)) = person {
-            counts.insert(n_points);
-            persons.push(person);
-        }
+        persons.extend(person);
     }
     Ok(persons)
-}
-
-/// Converts numbered frames of persons, with the numbers of points in `counts`, to keypoints.
-pub fn of_persons(
-    program: &str,
-    counts: &BTreeSet<usize>,
-    numbered: BTreeMap<u64, Vec<FoundPerson>>,
-) -> Result<FoundKeypoints> {
-    let (frames, notes) = in_order(numbered)?;
-    let counts = counts.iter().map(|n| n.to_string()).collect::<Vec<_>>().join(" and ");
-    Ok(FoundKeypoints::new(format!("{program}, {counts} points"), frames, notes))
 }
 
 /// Parses the persons in the bytes of a JSON file.
@@ -130,6 +115,9 @@ fn read<'de, T: Deserialize<'de>>(bytes: &'de [u8]) -> Result<T> {
 fn from_object(object: KeypointDocument) -> Result<JsonPersons> {
     let KeypointDocument { people, instance_info, annotations, images } = object;
     if let Some(people) = people {
+        if let Some(at) = people.iter().position(|person| !person.has_body()) {
+            bail!("person {at} of `people` has no `pose_keypoints_2d` (`pose_keypoints` before OpenPose 1.3)");
+        }
         return Ok(JsonPersons::new("OpenPose", FramePersons::Picture(people)));
     }
     if let Some(instances) = instance_info {

@@ -1,8 +1,7 @@
 //! One object of a JSON keypoint file: a person in any format, or a frame of persons. Unknown keys are skipped during
 //! parsing, so that only the points are held in memory.
 
-use super::found::FoundPerson;
-use super::layout::PointLayout;
+use super::counted::CountedPerson;
 use orator_base::text::counted;
 use orator_base::types::pose2d::{Keypoint, N_HAND};
 use orator_base::types::skeleton::Side;
@@ -25,9 +24,12 @@ pub struct JsonEntry {
     /// COCO-WholeBody.
     lefthand_kpts: PointNumbers,
     righthand_kpts: PointNumbers,
-    /// OpenPose.
-    pose_keypoints_2d: PointNumbers,
+    /// OpenPose; the keys had no suffix before version 1.3.
+    #[serde(alias = "pose_keypoints")]
+    pose_keypoints_2d: Option<PointNumbers>,
+    #[serde(alias = "hand_left_keypoints")]
     hand_left_keypoints_2d: PointNumbers,
+    #[serde(alias = "hand_right_keypoints")]
     hand_right_keypoints_2d: PointNumbers,
 }
 
@@ -40,15 +42,20 @@ pub enum ImageName {
 }
 
 impl JsonEntry {
-    /// The person, and the number of points in the body list; `None` if the list is empty.
+    /// Whether the entry has a list of body points, which may be empty.
+    pub fn has_body(&self) -> bool {
+        self.pose_keypoints_2d.is_some() || !self.keypoints.0.is_empty()
+    }
+
+    /// The person; `None` if the list of body points is empty.
     ///
     /// # Errors
     ///
     /// A list whose length matches no known layout.
-    pub fn person(&self) -> Result<Option<(FoundPerson, usize)>, String> {
-        let (key, numbers) = match self.pose_keypoints_2d.0.is_empty() {
-            true => ("keypoints", &self.keypoints.0),
-            false => ("pose_keypoints_2d", &self.pose_keypoints_2d.0),
+    pub fn person(&self) -> Result<Option<CountedPerson>, String> {
+        let (key, numbers) = match self.pose_keypoints_2d.as_ref().filter(|numbers| !numbers.0.is_empty()) {
+            None => ("keypoints", &self.keypoints.0),
+            Some(numbers) => ("pose_keypoints_2d", &numbers.0),
         };
         let points = match &self.keypoint_scores.0[..] {
             scores if key == "pose_keypoints_2d" || scores.is_empty() => triples(key, numbers)?,
@@ -57,7 +64,8 @@ impl JsonEntry {
         if points.is_empty() {
             return Ok(None);
         }
-        let mut person = PointLayout::for_json(points.len())?.person(&points);
+        let mut counted_person = CountedPerson::new(&points)?;
+        let person = counted_person.person_mut();
         let hands = [
             ("hand_left_keypoints_2d", &self.hand_left_keypoints_2d, Side::Left),
             ("hand_right_keypoints_2d", &self.hand_right_keypoints_2d, Side::Right),
@@ -71,7 +79,7 @@ impl JsonEntry {
                 format!("`{key}` has {}, expected {N_HAND}", counted(points.len(), "point"))
             })?;
         }
-        Ok(Some((person, points.len())))
+        Ok(Some(counted_person))
     }
 }
 

@@ -59,6 +59,8 @@ pub struct FoundKeypoints {
     /// Width and height of the image in px, if the file states them.
     pub image_size: Option<[u32; 2]>,
     pub unit: CoordinateUnit,
+    /// Point order that was identified by the number of points alone: `BODY_25`; empty if the file states the order.
+    pub layout: String,
     /// All persons in each frame.
     pub frames: Vec<Vec<FoundPerson>>,
     /// One sentence for each missing item, naming its substitute.
@@ -69,7 +71,7 @@ impl FoundKeypoints {
     /// Keypoints of a file that states neither frame rate nor image size; the unit is derived from the coordinates.
     pub fn new(format: String, frames: Vec<Vec<FoundPerson>>, notes: Vec<String>) -> Self {
         let unit = if are_fractions(coordinates(&frames)) { CoordinateUnit::Fraction } else { CoordinateUnit::Pixels };
-        Self { format, fps: None, image_size: None, unit, frames, notes }
+        Self { format, fps: None, image_size: None, unit, layout: String::new(), frames, notes }
     }
 
     /// Fraction of the examined points that have a negative coordinate, 0..1.

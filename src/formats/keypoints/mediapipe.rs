@@ -50,7 +50,8 @@ pub fn read(arrays: &NamedArrays) -> Result<Option<FoundKeypoints>> {
     let frames = (0..n_frames).map(frame).collect();
     let hands = if landmarks.hands.iter().any(Option::is_some) { " and hands" } else { "" };
     let no_hands = hands.is_empty().then(|| "no hand arrays: hands are marked as not detected".to_owned());
-    Ok(Some(FoundKeypoints::new(format!("MediaPipe, pose{hands}"), frames, no_hands.into_iter().collect())))
+    let found = FoundKeypoints::new(format!("MediaPipe, pose{hands}"), frames, no_hands.into_iter().collect());
+    Ok(Some(FoundKeypoints { layout: MEDIAPIPE.name.to_owned(), ..found }))
 }
 
 /// Accessor for the scores of pose landmarks: the visibility if there are at least four numbers, or a third number

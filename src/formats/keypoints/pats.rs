@@ -45,5 +45,5 @@ pub fn read(arrays: &NamedArrays) -> Result<Option<FoundKeypoints>> {
          hundreds of pixels apart"
     );
     let unit = if from_neck { CoordinateUnit::FromNeck } else { found.unit };
-    Ok(Some(FoundKeypoints { fps: Some(RATE), unit, ..found }))
+    Ok(Some(FoundKeypoints { fps: Some(RATE), unit, layout: PATS.name.to_owned(), ..found }))
 }

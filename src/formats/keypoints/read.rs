@@ -1,15 +1,16 @@
 //! Reads keypoints in the format detected from the content of the file, or from a folder with one JSON file per
 //! frame, as written by OpenPose (`NAME_000000000012_keypoints.json`).
 
+use super::counted::{self, CountedPerson};
 use super::document::FramePersons;
-use super::found::{CoordinateUnit, FoundKeypoints, FoundPerson};
+use super::found::{CoordinateUnit, FoundKeypoints};
 use super::frames::number_of;
 use super::range::check_pixels;
-use super::{arrays, document};
+use super::{arrays, document, plausible};
 use crate::joints_description::is_description;
 use anyhow::{Context, Result, bail, ensure};
 use orator_base::input;
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 /// Fraction of negative coordinates from which on coordinates are not fractions of the image.
@@ -34,6 +35,9 @@ pub fn read(path: &Path) -> Result<FoundKeypoints> {
     );
     if found.unit == CoordinateUnit::Pixels {
         check_pixels(found.coordinates()).with_context(|| shown.to_string())?;
+    }
+    if !found.layout.is_empty() {
+        plausible::check(&found).with_context(|| shown.to_string())?;
     }
     Ok(found)
 }
@@ -62,8 +66,7 @@ fn read_folder(folder: &Path) -> Result<FoundKeypoints> {
     files.sort();
     ensure!(!files.is_empty(), "{} contains no .json files of frames", folder.display());
     let mut program = "";
-    let mut counts = BTreeSet::new();
-    let mut frames: BTreeMap<u64, (&PathBuf, Vec<FoundPerson>)> = BTreeMap::new();
+    let mut frames: BTreeMap<u64, (&PathBuf, Vec<CountedPerson>)> = BTreeMap::new();
     for file in &files {
         let name = file.file_name().unwrap_or_default().to_string_lossy();
         let number = number_of(&name)
@@ -80,7 +83,7 @@ fn read_folder(folder: &Path) -> Result<FoundKeypoints> {
             ),
         };
         // Entries are converted at once: their lists of numbers take more memory than persons.
-        let persons = document::persons(number, &entries, &mut counts).with_context(|| folder.display().to_string())?;
+        let persons = document::persons(number, &entries).with_context(|| folder.display().to_string())?;
         if let Some((other, _)) = frames.insert(number, (file, persons)) {
             bail!(
                 "{} and {} are both frame {number}; use a separate folder for each video",
@@ -90,5 +93,5 @@ fn read_folder(folder: &Path) -> Result<FoundKeypoints> {
         }
     }
     let frames = frames.into_iter().map(|(number, (_, persons))| (number, persons)).collect();
-    document::of_persons(program, &counts, frames).with_context(|| folder.display().to_string())
+    counted::of_persons(program, frames).with_context(|| folder.display().to_string())
 }

@@ -1,40 +1,40 @@
-//! A take from a BVH file: those of the 49 joints that its skeleton has, found by name, at the file's own frame rate.
+//! A take from a BVH file: those of the 49 joints that its skeleton has, found by name or else by structure, at the
+//! file's own frame rate. The neck of a skeleton without one is the middle of the shoulders.
 
 use super::captured::CapturedMotion;
-use super::facing::{AxisAlignment, TorsoLandmarks};
+use super::facing::{AxisAlignment, LengthUnit, TorsoLandmarks};
 use super::fingers;
-use crate::bvh::joint_names;
+use crate::bvh::frame_time;
 use crate::bvh::read::{Bvh, Positions};
+use crate::bvh::skeleton::JointChannels;
+use crate::skeleton::joint_names::{self, ROLE_BONES};
+use crate::skeleton::matched::{MatchJoint, MatchedJoints};
 use anyhow::{Context, Result, ensure};
 use ndarray::Array3;
 use orator_base::math::vec3::{self, Vec3};
 use orator_base::types::pose3d::Motion;
 use orator_base::types::skeleton::{self, L_HAND, L_WRIST, N_JOINTS, R_HAND, R_WRIST, Side};
-use orator_base::types::time::FrameRate;
 use serde_json::{Map, Value, json};
 use std::path::Path;
 
 /// Index into `joint_names::ROLES` of each of joints 0..7 of `types::skeleton`.
 const BODY: [usize; 7] = [0, 2, 3, 4, 5, 6, 7];
-/// Common integer frame rates of cameras and studios; `BROADCAST_RATES` are multiplied by 1000/1001. Files round the
-/// frame time, so a relative difference below `RATE_ROUNDING` is taken for the common rate.
-const RATES: [u32; 9] = [15, 20, 24, 25, 30, 50, 60, 100, 120];
-const BROADCAST_RATES: [u32; 3] = [24, 30, 60];
-const RATE_ROUNDING: f64 = 1.1e-3;
+/// Bones without which there is no upper body.
+const REQUIRED: [&str; 2] = ["LeftArm", "RightArm"];
 
-/// Reads a take, rotated to face the camera.
+/// Reads a take, rotated to face the camera. Without `units`, the unit of length is detected from the arms.
 ///
 /// # Errors
 ///
-/// The file is not BVH, its skeleton lacks neck or shoulders, or the person neither stands nor sits upright.
-pub fn read(path: &Path) -> Result<CapturedMotion> {
-    read_take(path, |alignment| alignment)
+/// The file is not BVH, its skeleton lacks a shoulder, or the person neither stands nor sits upright.
+pub fn read(path: &Path, units: Option<LengthUnit>) -> Result<CapturedMotion> {
+    read_take(path, units, |alignment| alignment)
 }
 
 /// Reads a take without rotation if it is y up and faces +z, as `orator animate` writes it, so that it stays aligned
 /// with the motion it came from. A file with other axes is rotated as by [`read`], which its facts record.
-pub fn read_unrotated(path: &Path) -> Result<CapturedMotion> {
-    read_take(path, |alignment| alignment.unrotated().unwrap_or(alignment))
+pub fn read_unrotated(path: &Path, units: Option<LengthUnit>) -> Result<CapturedMotion> {
+    read_take(path, units, |alignment| alignment.unrotated().unwrap_or(alignment))
 }
 
 /// Alignment by which [`read_unrotated`] converts a take; `frames` are the positions of its joints.
@@ -42,67 +42,126 @@ pub fn read_unrotated(path: &Path) -> Result<CapturedMotion> {
 /// # Errors
 ///
 /// Those of [`read`].
-pub fn unrotated_alignment(bvh: &Bvh, frames: &[Vec<Vec3>]) -> Result<AxisAlignment> {
-    let alignment = AxisAlignment::fit(&torso(bvh, frames)?.1)?;
+pub fn unrotated_alignment(bvh: &Bvh, frames: &[Vec<Vec3>], units: Option<LengthUnit>) -> Result<AxisAlignment> {
+    let alignment = AxisAlignment::fit(&torso(bvh, frames)?.1, units)?;
     Ok(alignment.unrotated().unwrap_or(alignment))
 }
 
 /// Parses a take from the text of a BVH file, rotated as by [`read`].
 pub fn from_text(text: &str) -> Result<CapturedMotion> {
-    from_bvh(&Bvh::parse(text)?, |alignment| alignment)
+    from_bvh(&Bvh::parse(text)?, None, |alignment| alignment)
 }
 
-/// Note on the unit of a take according to its facts; `None` for centimetres, the usual unit of BVH.
-pub fn unit_note(facts: &Map<String, Value>) -> Option<String> {
-    let unit = facts.get("source_unit").and_then(Value::as_str).filter(|unit| *unit != "centimetre")?;
-    Some(format!("judging by the arm length, the unit is the {unit}: converted to metres"))
+/// Notes on a take according to its facts: what was assumed when reading the file, a detected unit other than the
+/// centimetre, the usual unit of BVH, a neck that is the middle of the shoulders, and joints found by structure.
+pub fn notes(facts: &Map<String, Value>) -> Vec<String> {
+    let of_file = facts.get("source_notes").and_then(Value::as_array).into_iter().flatten();
+    let mut notes: Vec<String> = of_file.filter_map(|note| note.as_str().map(str::to_owned)).collect();
+    let text = |key: &str| facts.get(key).and_then(Value::as_str);
+    let is_given = facts.contains_key("source_unit_given");
+    let unit = text("source_unit").filter(|unit| !is_given && *unit != "centimetre");
+    let unit = unit.map(|unit| format!("judging by the arm length, the unit is the {unit}: converted to metres"));
+    let neck = text("neck").map(|neck| format!("the skeleton has no neck: the {neck} takes its position"));
+    let structure = text("joints_by_structure").map(|joints| {
+        format!(
+            "joints with unknown names were found by the structure of the skeleton: {joints}; if one is wrong, rename \
+             the joints in the file, for instance to LeftArm, LeftForeArm and LeftHand"
+        )
+    });
+    notes.extend(unit.into_iter().chain(neck).chain(structure));
+    notes
 }
 
-fn read_take(path: &Path, align: impl Fn(AxisAlignment) -> AxisAlignment) -> Result<CapturedMotion> {
+fn read_take(
+    path: &Path,
+    units: Option<LengthUnit>,
+    align: impl Fn(AxisAlignment) -> AxisAlignment,
+) -> Result<CapturedMotion> {
     let bvh = Bvh::read(path)?;
-    from_bvh(&bvh, align).with_context(|| format!("{} has no usable upper-body motion", path.display()))
+    from_bvh(&bvh, units, align).with_context(|| format!("{} has no usable upper-body motion", path.display()))
 }
 
-fn from_bvh(bvh: &Bvh, align: impl Fn(AxisAlignment) -> AxisAlignment) -> Result<CapturedMotion> {
+fn from_bvh(
+    bvh: &Bvh,
+    units: Option<LengthUnit>,
+    align: impl Fn(AxisAlignment) -> AxisAlignment,
+) -> Result<CapturedMotion> {
     let frames = bvh.positions(Positions::Auto);
-    let (map, landmarks) = torso(bvh, &frames)?;
-    let alignment = align(AxisAlignment::fit(&landmarks)?);
+    let (JointMap { joints: map, matched }, landmarks) = torso(bvh, &frames)?;
+    let alignment = align(AxisAlignment::fit(&landmarks, units)?);
     let mut joints = Array3::from_elem((frames.len(), N_JOINTS, 3), f32::NAN);
     for (t, (frame, landmarks)) in frames.iter().zip(&landmarks).enumerate() {
         for (joint, at) in map.iter().enumerate() {
-            let Some(&position) = at.and_then(|at| frame.get(at)) else { continue };
+            let is_neck = joint == skeleton::NECK;
+            let position = if is_neck { Some(landmarks.neck) } else { at.and_then(|at| frame.get(at).copied()) };
+            let Some(position) = position else { continue };
             for (k, v) in alignment.align_joint(position, landmarks.neck).into_iter().enumerate() {
                 joints[[t, joint, k]] = v as f32;
             }
         }
     }
-    let missing: Vec<String> = (0..N_JOINTS).filter(|&joint| map[joint].is_none()).map(skeleton::name).collect();
-    let facts = json!({
+    let is_missing = |&joint: &usize| map[joint].is_none() && joint != skeleton::NECK;
+    let missing: Vec<String> = (0..N_JOINTS).filter(is_missing).map(skeleton::name).collect();
+    let mut facts = json!({
         "source_unit": alignment.unit,
         "source_up": alignment.up,
         "turned_degrees": (alignment.turned_degrees * 100.0).round() / 100.0,
         "joints_missing": missing,
     });
-    let motion = Motion::from_joints(rate(bvh.frame_secs), joints);
+    if map[skeleton::NECK].is_none() {
+        facts["neck"] = json!("middle of the shoulders");
+    }
+    if !matched.by_structure.is_empty() {
+        let named = |own: &String| format!("{own} = {}", bvh.joints[matched.joints[own]].name);
+        facts["joints_by_structure"] = json!(matched.by_structure.iter().map(named).collect::<Vec<_>>().join(", "));
+    }
+    if units.is_some() {
+        facts["source_unit_given"] = json!(true);
+    }
+    if !bvh.notes.is_empty() {
+        facts["source_notes"] = json!(bvh.notes);
+    }
+    let motion = Motion::from_joints(frame_time::rate(bvh.frame_secs), joints);
     Ok(CapturedMotion { motion, text: None, facts: facts.as_object().cloned().unwrap_or_else(Map::new) })
 }
 
-/// Index of the file's joint for each joint of `types::skeleton`, and the landmarks of each frame.
-fn torso(bvh: &Bvh, frames: &[Vec<Vec3>]) -> Result<([Option<usize>; N_JOINTS], Vec<TorsoLandmarks>)> {
+/// Joints of a file.
+struct JointMap {
+    /// Index of the file's joint for each joint of `types::skeleton`.
+    joints: [Option<usize>; N_JOINTS],
+    matched: MatchedJoints,
+}
+
+/// The joints of the file, and the landmarks of each frame.
+fn torso(bvh: &Bvh, frames: &[Vec<Vec3>]) -> Result<(JointMap, Vec<TorsoLandmarks>)> {
     let names: Vec<&str> = bvh.joints.iter().map(|joint| joint.name.as_str()).collect();
-    let roles = joint_names::find(&names);
-    let map = joint_map(bvh, &names, roles)?;
-    let landmarks = frames.iter().map(|frame| landmarks(frame, &map, roles)).collect();
+    let first = frames.first().map_or(&[][..], Vec::as_slice);
+    let joint = |(n, joint): (usize, &JointChannels)| MatchJoint {
+        name: names[n],
+        parent: joint.parent,
+        position: first.get(n).copied().unwrap_or_default(),
+        moves: !joint.channels.is_empty(),
+    };
+    let joints: Vec<MatchJoint> = bvh.joints.iter().enumerate().map(joint).collect();
+    let matched = MatchedJoints::with_named(joint_names::match_names(&names), &joints, &REQUIRED);
+    let roles = ROLE_BONES.map(|bone| matched.joints.get(bone).copied());
+    let map = JointMap { joints: joint_map(bvh, &names, roles, &matched)?, matched };
+    let landmarks = frames.iter().map(|frame| landmarks(frame, &map.joints, roles)).collect();
     Ok((map, landmarks))
 }
 
-/// Index of the file's joint for each joint of `types::skeleton`. Errors if neck or a shoulder is missing.
-fn joint_map(bvh: &Bvh, names: &[&str], roles: [Option<usize>; 10]) -> Result<[Option<usize>; N_JOINTS]> {
+/// Index of the file's joint for each joint of `types::skeleton`. Errors if a shoulder is missing.
+fn joint_map(
+    bvh: &Bvh,
+    names: &[&str],
+    roles: [Option<usize>; 10],
+    matched: &MatchedJoints,
+) -> Result<[Option<usize>; N_JOINTS]> {
     let needed: Vec<&str> =
-        [0, 2, 5].into_iter().filter(|&role| roles[role].is_none()).map(|role| joint_names::ROLES[role]).collect();
+        [2, 5].into_iter().filter(|&role| roles[role].is_none()).map(|role| joint_names::ROLES[role]).collect();
     ensure!(
         needed.is_empty(),
-        "no joint has a name of a {}; the joints are: {}",
+        "no joint has a name or the position of a {}; the joints are: {}",
         needed.join(", "),
         names.iter().copied().take(40).collect::<Vec<_>>().join(" ")
     );
@@ -111,7 +170,8 @@ fn joint_map(bvh: &Bvh, names: &[&str], roles: [Option<usize>; 10]) -> Result<[O
         map[joint] = roles[role];
     }
     for (side, wrist, root) in [(Side::Left, L_WRIST, L_HAND), (Side::Right, R_WRIST, R_HAND)] {
-        let hand = fingers::hand(bvh, side).unwrap_or_default();
+        let hand = fingers::hand(bvh, side).or_else(|| fingers::matched_hand(bvh, &matched.joints, side));
+        let hand = hand.unwrap_or_default();
         map[wrist] = map[wrist].or(hand[0]);
         map[root + 1..root + hand.len()].copy_from_slice(&hand[1..]);
         map[root] = map[wrist];
@@ -132,22 +192,14 @@ fn landmarks(frame: &[Vec3], map: &[Option<usize>; N_JOINTS], roles: [Option<usi
         _ => frame.first().copied(),
     };
     let missing = [f64::NAN; 3];
+    let [right_shoulder, left_shoulder] =
+        [skeleton::R_SHOULDER, skeleton::L_SHOULDER].map(|shoulder| at(map[shoulder]).unwrap_or(missing));
+    let middle = || vec3::scale(vec3::add(right_shoulder, left_shoulder), 0.5);
     TorsoLandmarks {
-        neck: at(map[skeleton::NECK]).unwrap_or(missing),
-        right_shoulder: at(map[skeleton::R_SHOULDER]).unwrap_or(missing),
-        left_shoulder: at(map[skeleton::L_SHOULDER]).unwrap_or(missing),
+        neck: at(map[skeleton::NECK]).unwrap_or_else(middle),
+        right_shoulder,
+        left_shoulder,
         hips: hips.unwrap_or(missing),
         arm,
-    }
-}
-
-/// Frame rate for a rounded frame time.
-fn rate(frame_secs: f64) -> FrameRate {
-    let off = |(num, den): (u32, u32)| (f64::from(num) / f64::from(den) * frame_secs - 1.0).abs();
-    let rates = RATES.map(|rate| (rate, 1)).into_iter().chain(BROADCAST_RATES.map(|rate| (1000 * rate, 1001)));
-    let nearest = rates.min_by(|&a, &b| off(a).total_cmp(&off(b)));
-    match nearest.filter(|&rate| off(rate) < RATE_ROUNDING) {
-        Some((num, den)) => FrameRate::new(num, den),
-        None => FrameRate::nearest(1.0 / frame_secs).unwrap_or(FrameRate::new(1, 1)),
     }
 }

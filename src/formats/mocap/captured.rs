@@ -1,6 +1,7 @@
 //! Captured motion in the joint order and axes of `types::skeleton`, but at the frame rate and with the bone lengths
 //! of its source; and the reader for each kind of file.
 
+use super::facing::LengthUnit;
 use super::motion_file::DEFAULT_FPS;
 use super::{bvh, ted};
 use crate::{authors_txt, joints_description};
@@ -45,13 +46,22 @@ impl MotionKind {
     }
 }
 
-/// Reads a motion file of the given kind.
+/// Reads a motion file of the given kind; the unit of a BVH is detected.
+///
+/// # Errors
+///
+/// Those of [`read_in`].
+pub fn read(kind: MotionKind, path: &Path) -> Result<CapturedMotion> {
+    read_in(kind, path, None)
+}
+
+/// Reads a motion file of the given kind. `units` is the unit of length of a BVH; without it, the unit is detected.
 ///
 /// # Errors
 ///
 /// The file is unreadable, is not of that kind, or holds samples; its frame rate, unit or coordinates are
 /// implausible.
-pub fn read(kind: MotionKind, path: &Path) -> Result<CapturedMotion> {
+pub fn read_in(kind: MotionKind, path: &Path, units: Option<LengthUnit>) -> Result<CapturedMotion> {
     let captured = match kind {
         MotionKind::Authors => {
             let motion = authors_txt::read(path, DEFAULT_FPS)?;
@@ -60,7 +70,7 @@ pub fn read(kind: MotionKind, path: &Path) -> Result<CapturedMotion> {
             CapturedMotion { motion, text: None, facts: Map::new() }
         }
         MotionKind::Ted => ted::read(path)?,
-        MotionKind::Bvh => bvh::read(path)?,
+        MotionKind::Bvh => bvh::read(path, units)?,
         MotionKind::Shards => bail!("{} contains dataset samples, expected captured motion", path.display()),
     };
     captured.motion.fps.checked().with_context(|| path.display().to_string())?;

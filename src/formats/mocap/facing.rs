@@ -3,20 +3,46 @@
 //! average over the take. Files state neither unit nor axes: the arm length defines the unit, the spine the vertical,
 //! the shoulders the front.
 
-use anyhow::{Context, Result, bail, ensure};
+use anyhow::{Context, Result, ensure};
 use orator_base::math::order::upper_median;
 use orator_base::math::rotation::Rotation;
 use orator_base::math::vec3::{self, Vec3};
+use std::str::FromStr;
 
-/// Known units and their length in metres: metre, centimetre, millimetre, inch, and the 0.45 inch of old CMU files.
-const UNITS: [(&str, f64); 5] =
-    [("metre", 1.0), ("centimetre", 0.01), ("millimetre", 0.001), ("inch", 0.0254), ("0.45 inch", 0.0254 / 0.45)];
+/// Known units: metre, centimetre, millimetre, inch, and the 0.45 inch of old CMU files.
+const UNITS: [LengthUnit; 5] = [
+    LengthUnit { name: "metre", metres: 1.0 },
+    LengthUnit { name: "centimetre", metres: 0.01 },
+    LengthUnit { name: "millimetre", metres: 0.001 },
+    LengthUnit { name: "inch", metres: 0.0254 },
+    LengthUnit { name: "0.45 inch", metres: 0.0254 / 0.45 },
+];
+/// Symbols of the first four units.
+const SYMBOLS: [&str; 4] = ["m", "cm", "mm", "inch"];
 /// Typical length of upper arm and forearm of an adult, metres.
 const ARM_METRES: f64 = 0.54;
 /// Maximum angle to +z at which a speaker still counts as facing +z.
 const MAX_FACING_DEGREES: f64 = 60.0;
 /// Arm lengths accepted as a person's, metres.
 const ARM_RANGE: std::ops::Range<f64> = 0.33..0.85;
+
+/// Unit of length of a captured skeleton.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LengthUnit {
+    pub name: &'static str,
+    /// Length in metres.
+    metres: f64,
+}
+
+/// Parses `m`, `cm`, `mm` or `inch`.
+impl FromStr for LengthUnit {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let known = SYMBOLS.into_iter().zip(UNITS).find(|(symbol, _)| *symbol == text);
+        known.map(|(_, unit)| unit).ok_or_else(|| format!("expected one of {}", SYMBOLS.join(", ")))
+    }
+}
 
 /// Joints of a frame that define the orientation and size of a skeleton, in the source's unit and axes.
 #[derive(Clone, Copy, Debug)]
@@ -45,16 +71,17 @@ pub struct AxisAlignment {
 }
 
 impl AxisAlignment {
-    /// Fits the alignment to all frames of a take.
+    /// Fits the alignment to all frames of a take; without `units`, the unit of length is detected from the arms.
     ///
     /// # Errors
     ///
     /// No frame has neck, shoulders and hips; the arm length is not a person's in any known unit; the spine follows
     /// no axis; the shoulders are vertical, or turn so much that the take has no front.
-    pub fn fit(frames: &[TorsoLandmarks]) -> Result<Self> {
+    pub fn fit(frames: &[TorsoLandmarks], units: Option<LengthUnit>) -> Result<Self> {
         let frames: Vec<&TorsoLandmarks> = frames.iter().filter(|f| f.is_finite()).collect();
         ensure!(!frames.is_empty(), "no frame has a neck, shoulders and hips");
-        let (unit, metres) = unit(frames.iter().filter_map(|f| f.arm).collect())?;
+        let LengthUnit { name: unit, metres } =
+            units.map_or_else(|| detect_unit(frames.iter().filter_map(|f| f.arm).collect()), Ok)?;
         let sum = |of: &dyn Fn(&TorsoLandmarks) -> Vec3| frames.iter().fold([0.0; 3], |sum, f| vec3::add(sum, of(f)));
         let spine = sum(&|f| vec3::sub(f.neck, f.hips));
         let (up_axis, up) = vertical_axis(spine)?;
@@ -103,16 +130,19 @@ impl TorsoLandmarks {
     }
 }
 
-/// Name and metres of the unit in which the median arm length is closest to an adult's.
-fn unit(arms: Vec<f64>) -> Result<(&'static str, f64)> {
+/// Unit in which the median arm length is closest to an adult's.
+fn detect_unit(arms: Vec<f64>) -> Result<LengthUnit> {
     let arm = upper_median(arms).context("no frame has an arm from which to derive the unit")?;
-    let deviation = |metres: f64| (arm * metres / ARM_METRES).ln().abs();
-    let is_plausible = |metres: f64| ARM_RANGE.contains(&(arm * metres));
-    let best = UNITS.into_iter().filter(|u| is_plausible(u.1)).min_by(|a, b| deviation(a.1).total_cmp(&deviation(b.1)));
-    let Some(unit) = best else {
-        bail!("the arms are {arm:.4} long, which is implausible in every known unit: {}", UNITS.map(|u| u.0).join(", "))
-    };
-    Ok(unit)
+    let deviation = |unit: LengthUnit| (arm * unit.metres / ARM_METRES).ln().abs();
+    let plausible = UNITS.into_iter().filter(|unit| ARM_RANGE.contains(&(arm * unit.metres)));
+    let best = plausible.min_by(|&a, &b| deviation(a).total_cmp(&deviation(b)));
+    best.with_context(|| {
+        format!(
+            "the arms are {arm:.4} long, which is implausible in every known unit: {}; \
+             `orator animate` and `orator import` accept another scale with --units",
+            UNITS.map(|unit| unit.name).join(", ")
+        )
+    })
 }
 
 /// Name and direction of the axis that the spine follows.

@@ -2,12 +2,11 @@
 //! by the hierarchy.
 
 use crate::bvh::read::Bvh;
+use crate::skeleton::joint_names::FINGERS;
 use orator_base::math::vec3;
 use orator_base::types::pose2d::N_HAND;
 use orator_base::types::skeleton::Side;
-
-/// Names of the fingers, thumb first.
-const FINGERS: [&[&str]; 5] = [&["thumb"], &["index"], &["middle", "mid"], &["ring"], &["pinky", "little", "pinkie"]];
+use std::collections::BTreeMap;
 
 /// Indices of the hand joints of one side: wrist, then thumb to little finger, each base to tip; `None` unless at
 /// least two fingers share a wrist.
@@ -23,6 +22,24 @@ pub fn hand(bvh: &Bvh, side: Side) -> Option<[Option<usize>; N_HAND]> {
         bones.for_each(|(&joint, k)| joints[1 + 4 * finger + k] = Some(joint));
     }
     Some(joints)
+}
+
+/// Hand joints among the joints of our bones, for names that number the fingers; the tip is the end of the last bone.
+/// `None` for fewer than two fingers.
+pub(super) fn matched_hand(bvh: &Bvh, bones: &BTreeMap<String, usize>, side: Side) -> Option<[Option<usize>; N_HAND]> {
+    let side = if side == Side::Left { "Left" } else { "Right" };
+    let bone = |name: String| bones.get(&name).copied();
+    let end_of = |last: usize| {
+        (last + 1..bvh.joints.len()).find(|&n| bvh.joints[n].parent == Some(last) && bone_length(bvh, n) > 0.0)
+    };
+    let mut joints = [None; N_HAND];
+    joints[0] = bone(format!("{side}Hand"));
+    for (finger, (own, _)) in FINGERS.iter().enumerate() {
+        let [first, second, third] = [1, 2, 3].map(|k| bone(format!("{side}Hand{own}{k}")));
+        joints[1 + 4 * finger..][..4].copy_from_slice(&[first, second, third, third.and_then(end_of)]);
+    }
+    let n_fingers = (0..5).filter(|finger| joints[1 + 4 * finger].is_some()).count();
+    (n_fingers > 1).then_some(joints)
 }
 
 /// Joints of a finger from its base to the end site of its last bone; empty if there are fewer than two.
@@ -46,7 +63,7 @@ fn parse_name(name: &str) -> Option<(Side, usize)> {
     }
     // "lthumb" is one word: what remains without the finger name is the side.
     let (finger, rest) = words.iter().enumerate().find_map(|(i, word)| {
-        FINGERS.iter().enumerate().find_map(|(finger, names)| {
+        FINGERS.iter().enumerate().find_map(|(finger, (_, names))| {
             let (before, after) = names.iter().find_map(|name| word.split_once(name))?;
             let ends = after.is_empty() || ["finger", "end", "tip", "l", "r", "left", "right"].contains(&after);
             let others = words.iter().enumerate().filter(|(k, _)| *k != i).map(|(_, w)| w.as_str());
@@ -105,6 +122,7 @@ fn has_metacarpal(bvh: &Bvh, wrist: usize, finger: usize, chain: &[usize]) -> bo
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::skeleton::joint_names::match_names;
 
     #[test]
     fn joint_names_of_common_rigs_are_parsed() {
@@ -157,5 +175,21 @@ mod tests {
         assert_eq!(ends, (Some("LeftHandMiddle3"), None, None), "a bone without length ends nowhere");
         assert_eq!(hand(&bvh, Side::Right), None);
         assert_eq!(hand(&Bvh::parse(&HAND.replace("LeftHand", "Tail")).unwrap(), Side::Left), None);
+
+        // Fingers with numbers instead of names.
+        let numbers = [("LeftHandThumb", "LeftFinger1-"), ("LeftHandMiddle", "LeftFinger3-")];
+        let numbered = numbers.iter().fold(HAND.to_owned(), |text, (name, number)| text.replace(name, number));
+        let numbered = Bvh::parse(&numbered.replace("LeftHandIndex", "Tail")).unwrap();
+        assert_eq!(hand(&numbered, Side::Left), None);
+        let names: Vec<&str> = numbered.joints.iter().map(|joint| joint.name.as_str()).collect();
+        let bones = match_names(&names);
+        let joints = matched_hand(&numbered, &bones, Side::Left).unwrap();
+        let named = joints.map(|joint| joint.map(|joint| names[joint]));
+        assert_eq!(
+            named[..5],
+            ["LeftHand", "LeftFinger1-1", "LeftFinger1-2", "LeftFinger1-3", "LeftFinger1-3_end"].map(Some)
+        );
+        assert_eq!((named[5], named[9]), (None, Some("LeftFinger3-1")));
+        assert_eq!(matched_hand(&numbered, &bones, Side::Right), None);
     }
 }

@@ -3,6 +3,7 @@
 //! (`formats::joints_description`), or else from the caller.
 
 use super::bvh;
+use super::facing::LengthUnit;
 use crate::npz::{AxisLength, Npz};
 use crate::{authors_txt, joints_description, npy};
 use anyhow::{Context, Result, bail, ensure};
@@ -41,12 +42,22 @@ pub fn has_ending(path: &Path) -> bool {
 /// The file is missing, empty or of another kind, has another number of joints, no frames or no visible joint; the
 /// message names the file, what it contains and what was expected.
 pub fn read(path: &Path, fps: Option<FrameRate>) -> Result<MotionFile> {
+    read_in(path, fps, None)
+}
+
+/// [`read`], with the unit of length of a .bvh file.
+fn read_in(path: &Path, fps: Option<FrameRate>, units: Option<LengthUnit>) -> Result<MotionFile> {
     let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
     let meta = input::open(path).and_then(|file| file.metadata());
     let size = meta.with_context(|| format!("cannot read {}", path.display()))?.len();
     ensure!(size > 0, "{} is empty (0 bytes): expected motion", path.display());
     let (mut notes, mut has_rate, assumed) = (Vec::new(), true, fps.unwrap_or(DEFAULT_FPS));
     let ending = path.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
+    ensure!(
+        units.is_none() || ending == "bvh",
+        "{}: --units applies to .bvh files; other files are in metres",
+        path.display()
+    );
     let motion = match ending.as_str() {
         "npz" => {
             let (motion, is_stated) = read_npz(path, assumed)?;
@@ -61,8 +72,8 @@ pub fn read(path: &Path, fps: Option<FrameRate>) -> Result<MotionFile> {
             Motion { fps: stated.unwrap_or(assumed), ..motion }
         }
         "bvh" => {
-            let captured = bvh::read_unrotated(path)?;
-            notes.extend(bvh::unit_note(&captured.facts).map(|note| format!("{name}: {note}")));
+            let captured = bvh::read_unrotated(path, units)?;
+            notes.extend(bvh::notes(&captured.facts).into_iter().map(|note| format!("{name}: {note}")));
             let rotated_degrees =
                 captured.facts.get("turned_degrees").and_then(serde_json::Value::as_f64).unwrap_or(0.0);
             if rotated_degrees.abs() > 0.0 {
@@ -97,13 +108,13 @@ pub fn read(path: &Path, fps: Option<FrameRate>) -> Result<MotionFile> {
 }
 
 /// Reads the motion of `path` at the frame rate `fps` given by the user; without it, a file that does not state its
-/// frame rate is read at 15.
+/// frame rate is read at 15. `units` is the unit of length of a .bvh file; without it, the unit is detected.
 ///
 /// # Errors
 ///
-/// Those of [`read`], and a file that states a rate other than `fps`.
-pub fn read_at(path: &Path, fps: Option<FrameRate>) -> Result<MotionFile> {
-    let read = read(path, Some(fps.unwrap_or(DEFAULT_FPS)))?;
+/// Those of [`read`], a file that states a rate other than `fps`, and `units` for another kind of file.
+pub fn read_at(path: &Path, fps: Option<FrameRate>, units: Option<LengthUnit>) -> Result<MotionFile> {
+    let read = read_in(path, Some(fps.unwrap_or(DEFAULT_FPS)), units)?;
     if let Some(fps) = fps.filter(|fps| read.has_rate && *fps != read.motion.fps) {
         let own = read.motion.fps;
         bail!(

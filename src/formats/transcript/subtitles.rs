@@ -1,9 +1,22 @@
 //! Subtitles in SubRip (`.srt`) and WebVTT (`.vtt`) format: the words of a cue share its time, except for words with
-//! their own times in WebVTT.
+//! their own times. Rolling captions, whose cues repeat the lines before the new one, give each word once.
 
 use super::word::{self, Word};
 use anyhow::{Context, Result, bail, ensure};
-use std::collections::BTreeSet;
+
+/// Maximum number of lines that a rolling cue repeats.
+const MAX_REPEATED: usize = 8;
+
+/// A cue, without its blank lines.
+struct SubtitleCue<'a> {
+    /// Line number of its times.
+    n: usize,
+    start_secs: f64,
+    end_secs: f64,
+    lines: Vec<&'a str>,
+    /// The lines without markup.
+    shown: Vec<String>,
+}
 
 /// The words of all cues, in file order.
 ///
@@ -11,35 +24,75 @@ use std::collections::BTreeSet;
 ///
 /// The line of an invalid time; text without any cue.
 pub fn read(text: &str) -> Result<Vec<Word>> {
+    let cues = cues(text)?;
+    ensure!(
+        !cues.is_empty() || text.trim().is_empty() || text.starts_with("WEBVTT"),
+        "no cues: expected lines such as `00:00:01,000 --> 00:00:02,000`"
+    );
+    let is_rolling = text.split('<').skip(1).any(|part| inline_time(part).is_some()) || is_rolling(&cues);
     let mut words = Vec::new();
-    let mut lines = text.lines().map(str::trim).zip(1..).peekable();
-    let mut n_cues = 0;
-    // With timed words (rolling captions), a cue repeats the previous line.
-    let is_rolling = text.split('<').skip(1).any(|part| inline_time(part).is_some());
-    let mut previous: BTreeSet<String> = BTreeSet::new();
-    while let Some((line, n)) = lines.next() {
+    let mut previous: &[String] = &[];
+    for cue in &cues {
+        let n_repeated = if is_rolling { n_repeated(previous, &cue.shown) } else { 0 };
+        push_cue(&mut words, &cue.lines[n_repeated..].join(" "), cue.start_secs, cue.end_secs)
+            .with_context(|| format!("line {}", cue.n))?;
+        previous = &cue.shown;
+    }
+    Ok(words)
+}
+
+fn cues(text: &str) -> Result<Vec<SubtitleCue<'_>>> {
+    let all: Vec<&str> = text.lines().collect();
+    let (mut cues, mut at) = (Vec::new(), 0);
+    while at < all.len() {
+        at += 1;
+        let (line, n) = (all[at - 1], at);
         let Some((start, rest)) = line.split_once("-->") else { continue };
         let end = rest.split_whitespace().next().unwrap_or_default();
         let [start, end] = [start.trim(), end].map(|time| seconds(time).with_context(|| format!("line {n}")));
-        let (start, end) = (start?, end?);
-        ensure!(end >= start, "line {n}: the cue ends before it starts");
-        n_cues += 1;
-        let mut cue: Vec<&str> = Vec::new();
-        while let Some((line, _)) = lines.next_if(|(line, _)| !line.is_empty() && !line.contains("-->")) {
-            cue.push(line);
+        let (start_secs, end_secs) = (start?, end?);
+        ensure!(end_secs >= start_secs, "line {n}: the cue ends before it starts");
+        let mut lines = Vec::new();
+        while at < all.len() && !all[at].contains("-->") {
+            if !all[at].trim().is_empty() {
+                lines.push(all[at].trim());
+                at += 1;
+            } else if let Some(next) = continuation(&all, at, lines.is_empty()) {
+                at = next;
+            } else {
+                break;
+            }
         }
-        let shown: Vec<String> = cue.iter().map(|line| plain(line)).collect();
-        let is_new = |shown: &String| !is_rolling || !previous.contains(shown);
-        let new_lines: Vec<&str> =
-            cue.iter().zip(&shown).filter(|(_, shown)| is_new(shown)).map(|(line, _)| *line).collect();
-        push_cue(&mut words, &new_lines.join(" "), start, end).with_context(|| format!("line {n}"))?;
-        previous = shown.into_iter().collect();
+        let shown = lines.iter().map(|line| plain(line)).collect();
+        cues.push(SubtitleCue { n, start_secs, end_secs, lines, shown });
     }
-    ensure!(
-        n_cues > 0 || text.trim().is_empty() || text.starts_with("WEBVTT"),
-        "no cues: expected lines such as `00:00:01,000 --> 00:00:02,000`"
-    );
-    Ok(words)
+    Ok(cues)
+}
+
+/// Next line of the cue in which line `at` is blank; `None` if the cue ends there. A line with spaces, and an empty line
+/// before the first text, are part of a cue unless another block follows.
+fn continuation(lines: &[&str], at: usize, is_first: bool) -> Option<usize> {
+    if lines[at].is_empty() && !is_first {
+        return None;
+    }
+    let next = at + lines[at..].iter().position(|line| !line.trim().is_empty())?;
+    let has_times = lines[next..].iter().take(2).any(|line| line.contains("-->"));
+    let is_comment = ["NOTE", "STYLE", "REGION"].iter().any(|kind| lines[next].starts_with(kind));
+    (!has_times && !is_comment).then_some(next)
+}
+
+/// Number of lines at the start of a cue that are the last ones of the `previous` cue.
+fn n_repeated(previous: &[String], shown: &[String]) -> usize {
+    let most = previous.len().min(shown.len()).min(MAX_REPEATED);
+    (1..=most).rev().find(|&n| previous[previous.len() - n..] == shown[..n]).unwrap_or(0)
+}
+
+/// Whether most cues repeat lines of the cue before, and some of these add new ones.
+fn is_rolling(cues: &[SubtitleCue]) -> bool {
+    let repeated = cues.windows(2).map(|pair| (n_repeated(&pair[0].shown, &pair[1].shown), pair[1].shown.len()));
+    let n_repeating = repeated.clone().filter(|(n, _)| *n > 0).count();
+    let adds_lines = repeated.clone().any(|(n, n_lines)| n > 0 && n < n_lines);
+    adds_lines && 2 * n_repeating >= repeated.len()
 }
 
 /// Adds the words of a cue, split at the inline times.
@@ -65,7 +118,7 @@ fn push_cue(words: &mut Vec<Word>, text: &str, start: f64, end: f64) -> Result<(
 /// Time of a tag `00:00:01.500>`, and the text after it.
 fn inline_time(part: &str) -> Option<(f64, &str)> {
     let (time, rest) = part.split_once('>')?;
-    let is_time = time.contains(':') && time.bytes().all(|byte| byte.is_ascii_digit() || b":.".contains(&byte));
+    let is_time = time.contains(':') && time.bytes().all(|byte| byte.is_ascii_digit() || b":.,".contains(&byte));
     if !is_time {
         return None;
     }
@@ -145,5 +198,59 @@ mod tests {
         let expected = [("so", 1.0, 1.5), ("well", 1.5, 2.0), ("&", 2.0, 3.0), ("now", 3.01, 3.5), ("then", 3.5, 4.0)];
         assert_eq!(found, expected);
         assert!(words.iter().all(|word| word.source == WordSource::Given));
+    }
+
+    /// Words with the start and end of their cues.
+    fn spoken(text: &str) -> Vec<(String, f64, f64)> {
+        let words = read(text).unwrap();
+        let mut cues: Vec<(String, f64, f64)> = Vec::new();
+        for word in words {
+            match cues.last_mut().filter(|(_, _, end)| *end == word.start_secs && word.source == WordSource::Shared) {
+                Some((text, _, end)) => {
+                    *text += &format!(" {}", word.word);
+                    *end = word.end_secs;
+                }
+                None => cues.push((word.word, word.start_secs, word.end_secs)),
+            }
+        }
+        cues
+    }
+
+    #[test]
+    fn rolling_captions_give_each_word_once() {
+        let srt = "1\n00:00:01,000 --> 00:00:02,000\n[Applause]\nwe have a plan\n\n\
+                   2\n00:00:02,000 --> 00:00:02,010\nwe have a plan\n \n\n\
+                   3\n00:00:03,000 --> 00:00:04,000\nwe have a plan\nno no\n\n\
+                   4\n00:00:04,000 --> 00:00:04,010\nno no\n \n\n\
+                   5\n00:00:05,000 --> 00:00:06,000\nno no\nno no\n\n\
+                   6\n00:00:06,000 --> 00:00:06,010\nno no\n \n\n";
+        let expected = [("we have a plan", 1.0, 2.0), ("no no", 3.0, 4.0), ("no no", 5.0, 6.0)];
+        assert_eq!(spoken(srt), expected.map(|(text, start, end)| (text.to_owned(), start, end)));
+        // Lines of normal subtitles may be repeated.
+        let cue = |n: usize, text: &str| format!("{n}\n00:00:{n:02},000 --> 00:00:{n:02},500\n{text}\n\n");
+        let n_words = |texts: &[&str]| {
+            let srt: String = texts.iter().zip(1..).map(|(text, n)| cue(n, text)).collect();
+            read(&srt).unwrap().len()
+        };
+        assert_eq!(n_words(&["yes", "yes", "well", "no", "no"]), 5);
+        assert_eq!(n_words(&["a", "b", "b\nc", "d", "e", "f"]), 7);
+    }
+
+    #[test]
+    fn blank_lines_in_cues_are_no_ends() {
+        let vtt = "WEBVTT\nKind: captions\n\n00:00:01.000 --> 00:00:03.000 align:start\n \n\
+                   so<00:00:01.500><c> well</c>\n\n00:00:03.000 --> 00:00:03.010\nso well\n \n\n\
+                   00:00:03.010 --> 00:00:05.000\nso well\nnow<00:00:04.000><c> then</c>\n";
+        let found: Vec<_> = read(vtt).unwrap().into_iter().map(|w| (w.word, w.start_secs, w.end_secs)).collect();
+        let expected = [("so", 1.0, 1.5), ("well", 1.5, 3.0), ("now", 3.01, 4.0), ("then", 4.0, 5.0)];
+        assert_eq!(found, expected.map(|(word, start, end)| (word.to_owned(), start, end)));
+        // An empty first line, an empty cue, and a cue of a number.
+        let srt = "1\n00:00:01,000 --> 00:00:02,000\n\nso\n\n2\n00:00:02,000 --> 00:00:03,000\n\n\
+                   3\n00:00:03,000 --> 00:00:04,000\n4\n \n5\n00:00:04,000 --> 00:00:05,000\nnow\n \nthen\n";
+        let found: Vec<String> = read(srt).unwrap().into_iter().map(|word| word.word).collect();
+        assert_eq!(found, ["so", "4", "now", "then"]);
+        // SubRip with times of words.
+        let srt = "1\n00:00:01,000 --> 00:00:02,000\nso<00:00:01,500> well\n";
+        assert_eq!(read(srt).unwrap()[1].start_secs, 1.5);
     }
 }

@@ -1,27 +1,29 @@
-//! Praat TextGrid, in the long and the short text format: the words of its word tier.
+//! Praat TextGrid, in the long and the short text format: the words of the speaker's tier.
 
+use super::tiers;
 use super::word::{self, Word};
-use anyhow::{Context, Result, ensure};
+use anyhow::{Context, Result};
 
-/// The non-empty intervals of the first tier with `word` in its name, or else of the first interval tier.
+/// Beginnings of the lines of the long format that follow a label.
+const KEYS: [&str; 6] = ["xmin =", "intervals [", "item [", "points [", "number =", "time ="];
+
+/// The non-empty intervals of the tier of `speaker` (`tiers::words_of`).
 ///
 /// # Errors
 ///
-/// No interval tier; an interval without two valid times.
-pub fn read(text: &str) -> Result<Vec<Word>> {
-    let values = values(text);
-    let mut tiers = Vec::new();
+/// No tier of words, or none of the speaker; a label without end; an interval without two valid times.
+pub fn read(text: &str, speaker: &str) -> Result<Vec<Word>> {
+    let values = values(text)?;
+    let mut all = Vec::new();
     let mut at = 0;
     while at < values.len() {
         let is_tier = matches!(&values[at], TextGridValue::Text(kind) if kind == "IntervalTier");
         at += 1;
         if is_tier {
-            tiers.push(tier(&values, &mut at)?);
+            all.push(tier(&values, &mut at)?);
         }
     }
-    let word_tier = tiers.iter().position(|(name, _)| name.to_lowercase().contains("word")).unwrap_or(0);
-    ensure!(!tiers.is_empty(), "the file has no interval tier");
-    Ok(tiers.swap_remove(word_tier).1)
+    tiers::words_of(all, speaker)
 }
 
 /// A number or quoted text; both formats have the same sequence of values. Labels such as `xmin =` and `[1]` are not
@@ -31,18 +33,28 @@ enum TextGridValue {
     Text(String),
 }
 
-fn values(text: &str) -> Vec<TextGridValue> {
+/// Numbers, and the text of each line from its first to its last quote. A text ends with an unpaired quote, as quotes
+/// in it are doubled, and may have several lines.
+fn values(text: &str) -> Result<Vec<TextGridValue>> {
     let mut values = Vec::new();
-    for line in text.lines().map(str::trim) {
-        if let (Some(first), Some(last)) = (line.find('"'), line.rfind('"'))
-            && first < last
+    let mut lines = text.lines().map(str::trim).zip(1..).peekable();
+    while let Some((line, n)) = lines.next() {
+        let (before, quoted) = line.split_once('"').map_or((line, None), |(before, rest)| (before, Some(rest)));
+        let numbers = before.split(|c: char| c == '=' || c.is_whitespace()).filter_map(|word| word.parse::<f64>().ok());
+        values.extend(numbers.map(TextGridValue::Number));
+        let Some(quoted) = quoted else { continue };
+        let (mut label, mut n_quotes) = (quoted.to_owned(), quoted.matches('"').count());
+        while n_quotes.is_multiple_of(2)
+            && let Some((next, _)) = lines.next_if(|(next, _)| !KEYS.iter().any(|key| next.starts_with(key)))
         {
-            values.push(TextGridValue::Text(line[first + 1..last].replace("\"\"", "\"")));
-        } else if let Some(number) = line.rsplit(['=', ' ']).find_map(|word| word.parse::<f64>().ok()) {
-            values.push(TextGridValue::Number(number));
+            n_quotes += next.matches('"').count();
+            label.push('\n');
+            label.push_str(next);
         }
+        let end = label.rfind('"').with_context(|| format!("line {n}: the label has no closing quote"))?;
+        values.push(TextGridValue::Text(label[..end].replace("\"\"", "\"")));
     }
-    values
+    Ok(values)
 }
 
 /// Name and intervals of a tier. The values are its name, start, end and number of intervals, then two times and a
@@ -88,13 +100,32 @@ mod tests {
     #[test]
     fn both_formats_yield_the_words() {
         for text in [LONG, SHORT] {
-            let words = read(text).unwrap();
+            let words = read(text, "").unwrap();
             let found: Vec<_> = words.iter().map(|word| (word.word.as_str(), word.start_secs, word.end_secs)).collect();
             assert_eq!(found, [("so", 0.5, 2.0)]);
         }
-        assert!(read("File type = \"ooTextFile\"\n").is_err());
+        assert!(read("File type = \"ooTextFile\"\n", "").is_err());
         for end in 0..SHORT.len() {
-            let _ = read(&SHORT[..end]);
+            let _ = read(&SHORT[..end], "");
         }
+    }
+
+    #[test]
+    fn labels_may_contain_line_breaks_and_quotes() {
+        let found = |text: &str| {
+            let words = read(text, "").map_err(|error| error.to_string())?;
+            Ok::<_, String>(words.into_iter().map(|word| word.word).collect::<Vec<_>>().join(" "))
+        };
+        for text in [LONG, SHORT] {
+            let labelled = |label: &str| found(&text.replace("\"so\"", label));
+            assert_eq!(labelled("\"so\n\"").unwrap(), "so");
+            assert_eq!(labelled("\"so\nwell\"").unwrap(), "so well");
+            assert_eq!(labelled("\"\"\"so\"\"\n\nthey \"\"said\"\"\"").unwrap(), "\"so\" they \"said\"");
+            assert_eq!(labelled("\"{LG}\n\"").unwrap(), "");
+            assert!(labelled("\"so").unwrap_err().contains("closing quote"));
+        }
+        // Undoubled quotes, as some programs write them.
+        assert_eq!(found(&LONG.replace("text = \"s\"", "text = \"5\" s\"")).unwrap(), "so");
+        assert_eq!(found(&SHORT.replace("0.5\n2\n\"so\"", "0.5 2 \"so\"")).unwrap(), "so");
     }
 }

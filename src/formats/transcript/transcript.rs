@@ -3,7 +3,7 @@
 
 use super::json::JsonTranscript;
 use super::word::{self, Word, WordSource};
-use super::{encoding, json, subtitles, textgrid};
+use super::{encoding, json, marks, subtitles, textgrid};
 use anyhow::{Context, Result, bail, ensure};
 use orator_base::input;
 use std::collections::BTreeSet;
@@ -48,6 +48,10 @@ impl Transcript {
             )
         });
         words.sort_by(|a, b| a.start_secs.total_cmp(&b.start_secs));
+        // A mark such as `[loud music]` may consist of several words with times.
+        let tokens: Vec<&str> = words.iter().map(|word| word.word.as_str()).collect();
+        let mut are_spoken = marks::are_spoken(&tokens).into_iter();
+        words.retain(|_| are_spoken.next().unwrap_or(true));
         let mut notes: Vec<String> = disorder.into_iter().chain(overlaps(&words)).chain(untimed(&words)).collect();
         if words.is_empty() {
             notes.push("the transcript holds no word".to_owned());
@@ -56,37 +60,48 @@ impl Transcript {
         Self { text, words, notes }
     }
 
-    /// Reads a transcript in the format of its file extension.
+    /// Reads a transcript of one speaker in the format of its file extension.
     ///
     /// # Errors
     ///
-    /// The file is unreadable, larger than 256 MiB, in another encoding or not a transcript; the message names the
-    /// line or the word.
+    /// Those of `of_speaker`.
     pub fn read(path: &Path) -> Result<Self> {
+        Self::of_speaker(path, "")
+    }
+
+    /// Reads a transcript in the format of its file extension; `speaker` selects the words in a file of several speakers.
+    ///
+    /// # Errors
+    ///
+    /// The file is unreadable, larger than 256 MiB, in another encoding or not a transcript, or has several speakers of
+    /// other names; the message names the line or the word.
+    pub fn of_speaker(path: &Path, speaker: &str) -> Result<Self> {
         let reading = || format!("cannot read {}", path.display());
         let bytes = input::read(path, MAX_BYTES).with_context(reading)?;
         let ending = path.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
         let stem = path.file_stem().unwrap_or_default().to_string_lossy();
-        let read = encoding::text_of(&bytes).and_then(|text| Self::parse(&text, &ending, &stem));
+        let read = encoding::text_of(&bytes).and_then(|text| Self::parse(&text, &ending, (&*stem, speaker)));
         read.with_context(|| format!("{} is not a valid transcript", path.display()))
     }
 
-    /// Parses text in the format of a lower-case file extension; `stem` selects the recording in a file of several.
+    /// Parses text in the format of a lower-case file extension; `stem` selects the recording in a file of several,
+    /// `speaker` the person.
     ///
     /// # Errors
     ///
-    /// The line or the word that does not conform to the format.
-    pub fn parse(text: &str, ending: &str, stem: &str) -> Result<Self> {
+    /// The line or the word that does not conform to the format; several recordings or speakers of other names.
+    pub fn parse(text: &str, ending: &str, (stem, speaker): (&str, &str)) -> Result<Self> {
+        let without_marks = |text: &str| Self::of_text(&marks::spoken(text).join(" "));
         let words = match ending {
             "tsv" => tsv(text)?,
             "ctm" => ctm(text, stem)?,
             "srt" | "vtt" => subtitles::read(text)?,
-            "textgrid" => textgrid::read(text)?,
-            "json" => match json::read(text)? {
+            "textgrid" => textgrid::read(text, speaker)?,
+            "json" => match json::read(text, speaker)? {
                 JsonTranscript::Words(words) => words,
-                JsonTranscript::Text(text) => return Ok(Self::of_text(&text)),
+                JsonTranscript::Text(text) => return Ok(without_marks(&text)),
             },
-            _ => return Ok(Self::of_text(text)),
+            _ => return Ok(without_marks(text)),
         };
         Ok(Self::of_words(words))
     }
@@ -196,7 +211,7 @@ mod tests {
     use super::*;
 
     fn parse(text: &str, ending: &str) -> Result<Transcript> {
-        Transcript::parse(text, ending, "a")
+        Transcript::parse(text, ending, ("a", ""))
     }
 
     fn words_of(text: &str, ending: &str) -> String {

@@ -1,5 +1,6 @@
 //! Words of a transcript with their times.
 
+use super::marks;
 use anyhow::{Result, ensure};
 use serde::{Deserialize, Serialize};
 
@@ -30,8 +31,8 @@ pub enum WordSource {
     Interpolated,
 }
 
-/// Appends the words of `text`, spoken from `start_secs` to `end_secs`. Several words share the time in proportion to
-/// their number of characters. A `confidence` outside 0..1 is dropped.
+/// Appends the words of `text`, spoken from `start_secs` to `end_secs`, without its marks. Several words share the time
+/// in proportion to their number of characters. A `confidence` outside 0..1 is dropped.
 ///
 /// # Errors
 ///
@@ -49,11 +50,12 @@ pub fn push(
         text.chars().take(40).collect::<String>()
     );
     let confidence = confidence.filter(|confidence| (0.0..=1.0).contains(confidence));
-    let n_letters: usize = text.split_whitespace().map(|word| word.chars().count()).sum();
+    let spoken = marks::spoken(text);
+    let n_letters: usize = spoken.iter().map(|word| word.chars().count()).sum();
     let secs = (end_secs - start_secs) / n_letters.max(1) as f64;
     let is_single_word = text.split_whitespace().nth(1).is_none();
     let (mut n_before, mut at) = (0, start_secs);
-    for word in text.split_whitespace() {
+    for word in spoken {
         n_before += word.chars().count();
         let until = if n_before == n_letters { end_secs } else { start_secs + secs * n_before as f64 };
         let source = if is_single_word { WordSource::Given } else { WordSource::Shared };

@@ -20,6 +20,8 @@ const RECORDS: &str = ".made";
 pub struct SpeechBatch {
     /// The sounds (`sounds::of_folder`, `sounds::of_table`).
     pub sounds: Vec<BatchSound>,
+    /// Files of the folder that are neither sounds nor transcripts.
+    pub passed_over: Vec<String>,
     /// Output folder.
     pub folder: PathBuf,
     /// File extensions of the output formats: npy, txt, json, bvh, fbx, glb, vrm, vrma, mp4.
@@ -45,6 +47,8 @@ pub struct BatchReport {
     pub up_to_date: usize,
     /// Number of sounds that failed.
     pub failed: usize,
+    /// Files of the folder that are neither sounds nor transcripts.
+    pub passed_over: Vec<String>,
     /// Output folder.
     pub out_folder: PathBuf,
     /// Outcome of every sound, in the order of the batch.
@@ -96,7 +100,8 @@ impl SpeechBatch {
         // One sound at a time, since the network itself uses all cores.
         let ended = runner::run(&stage, &units, &records, &hashes, (1, self.again), progress);
         hashes.save()?;
-        let mut report = BatchReport { out_folder: self.folder.clone(), ..BatchReport::default() };
+        let (out_folder, passed_over) = (self.folder.clone(), self.passed_over.clone());
+        let mut report = BatchReport { passed_over, out_folder, ..BatchReport::default() };
         for (sound, ended) in self.sounds.iter().zip(ended) {
             let (count, ended, error, facts) = match ended {
                 StageOutcome::Done(done) => (&mut report.created, BatchState::Created, None, done.facts),

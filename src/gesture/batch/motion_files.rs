@@ -93,7 +93,10 @@ pub(super) fn measure(path: &Path) -> Result<(usize, Option<String>)> {
         return Err(UnreadableMedia(format!("{name} has no audio track; give a file with speech")).into());
     };
     match sound_stream::n_samples(path, SAMPLE_RATE)? {
-        Some(n) if n > 0 => Ok((n, narrow_band_note(track.rate))),
+        Some((n, phase)) if n > 0 => {
+            let notes: Vec<String> = phase.into_iter().chain(narrow_band_note(track.rate)).collect();
+            Ok((n, (!notes.is_empty()).then(|| notes.join("; "))))
+        }
         _ => {
             let problem = format!("{name}: the audio track ({}) has no samples; give a file with speech", track.codec);
             Err(UnreadableMedia(problem).into())

@@ -9,8 +9,9 @@ use orator_avatar::animate::export::file::{ExportFormat, FigureOptions};
 use orator_base::stage::progress::Progress;
 use orator_base::stage::workdir;
 use orator_base::text::counted;
+use orator_dataset::words;
 use orator_formats::transcript::{Transcript, after_end};
-use orator_media::ffmpeg::audio;
+use orator_media::ffmpeg::{audio, origin};
 use orator_nn::seq2seq::predict::StateAtSeams;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -37,11 +38,14 @@ pub fn write_sequence(
         "this network animates the BVH skeleton it was trained on, with its bone names and frame rate: omit \
          --names and --fps"
     );
-    let parsed = transcript.map(Transcript::read).transpose()?;
+    let mut parsed = transcript.map(Transcript::read).transpose()?;
     let task = progress.begin("speech to motion", 0);
     measure(audio)?;
-    let sound = audio::read_mono(audio, speaker.metadata.rate)?;
-    let sound = sound.with_context(|| format!("{} has no audio", audio.display()))?;
+    let sound = audio::read_mono_with_note(audio, speaker.metadata.rate)?;
+    let (sound, phase_note) = sound.with_context(|| format!("{} has no audio", audio.display()))?;
+    if let Some(parsed) = &mut parsed {
+        words::from_secs(&mut parsed.words, origin::start_secs(audio)?);
+    }
     let words = parsed.as_ref().map_or(&[][..], |parsed| &parsed.words);
     let no_motion = || format!("cannot generate motion for {}", audio.display());
     let seams = speaker.seams(carry_state);
@@ -63,11 +67,12 @@ pub fn write_sequence(
     let known = parsed.as_ref().map(|parsed| [parsed.words.len(), speaker.metadata.vocabulary.n_known(&parsed.words)]);
     let words_from_table = parsed.as_ref().and_then(|parsed| speaker.n_from_table(&parsed.words));
     let notes = transcript.zip(parsed).map(|(path, parsed)| notes(speaker, path, &parsed, sound.secs()));
+    let notes: Vec<String> = phase_note.into_iter().chain(notes.into_iter().flatten()).collect();
     Ok(MotionReport {
         secs: sound.secs(),
         n_frames: poses.features.nrows(),
         motion_secs,
-        note: notes.filter(|notes| !notes.is_empty()).map(|notes| notes.join("; ")),
+        note: (!notes.is_empty()).then(|| notes.join("; ")),
         segments: Some(SegmentFacts {
             state: seams,
             seam_jump: poses.seam_jump,

@@ -5,7 +5,7 @@ use anyhow::{Context, Result, bail, ensure};
 use orator_avatar::animate::export::file::ExportFormat;
 use orator_base::input;
 use orator_base::text::counted;
-use orator_dataset::config::patterns::{SOUND_EXTENSIONS, VIDEO_EXTENSIONS, has_extension};
+use orator_dataset::config::patterns::{SOUND_EXTENSIONS, TRANSCRIPT_EXTENSIONS, VIDEO_EXTENSIONS, has_extension};
 use orator_formats::search;
 use std::collections::BTreeMap;
 use std::path::{Component, Path, PathBuf};
@@ -24,11 +24,12 @@ pub struct BatchSound {
 }
 
 /// All sounds below `folder`, named after their files, including the extension if two names would be equal. Files below
-/// the output folder `out` are skipped, since generated films contain sound too.
+/// the output folder `out` are skipped, since generated films contain sound too. Also returns the names of the files
+/// that are neither sounds nor transcripts.
 ///
 /// # Errors
 /// A path that is not a folder, a folder without sounds, or `out` equal to `folder`.
-pub fn of_folder(folder: &Path, out: &Path) -> Result<Vec<BatchSound>> {
+pub fn of_folder(folder: &Path, out: &Path) -> Result<(Vec<BatchSound>, Vec<String>)> {
     ensure!(folder.is_dir(), "{} is not a folder", folder.display());
     let out = out.canonicalize().ok();
     ensure!(
@@ -39,10 +40,10 @@ pub fn of_folder(folder: &Path, out: &Path) -> Result<Vec<BatchSound>> {
     );
     let mut enter = |folder: &Path| folder.canonicalize().ok() != out;
     let endings = [&SOUND_EXTENSIONS[..], &VIDEO_EXTENSIONS].concat();
-    let sounds = |path: &PathBuf| has_extension(path, &endings);
     let relative = |path: PathBuf| (path.strip_prefix(folder).unwrap_or(&path).to_string_lossy().into_owned(), path);
-    let files: Vec<(String, PathBuf)> =
-        search::files(folder, &mut enter)?.into_iter().filter(sounds).map(relative).collect();
+    let all = search::files(folder, &mut enter)?.into_iter().map(relative);
+    let (files, mut others): (Vec<_>, Vec<_>) = all.partition(|(_, path)| has_extension(path, &endings));
+    others.retain(|(_, path)| !has_extension(path, &TRANSCRIPT_EXTENSIONS));
     ensure!(!files.is_empty(), "no audio or video files in {}: expected {}", folder.display(), endings.join(", "));
     let stem = |file: &str| file.rsplit_once('.').map_or(file, |(stem, _)| stem).to_owned();
     let mut name_counts = BTreeMap::<String, usize>::new();
@@ -56,7 +57,7 @@ pub fn of_folder(folder: &Path, out: &Path) -> Result<Vec<BatchSound>> {
             transcript: None,
         }
     });
-    distinct(rows.collect())
+    Ok((distinct(rows.collect())?, others.into_iter().map(|(file, _)| file).collect()))
 }
 
 /// Sounds of the table `path` with the column `audio`, and optionally `out`, `checkpoint` (or `speaker`) and
@@ -202,10 +203,12 @@ mod tests {
             std::fs::write(dir.path().join(file), "").unwrap();
         }
         let names = |out: &str| -> Vec<String> {
-            of_folder(dir.path(), &dir.path().join(out)).unwrap().into_iter().map(|row| row.name).collect()
+            of_folder(dir.path(), &dir.path().join(out)).unwrap().0.into_iter().map(|row| row.name).collect()
         };
         assert_eq!(names("elsewhere"), ["A_mp3", "a_wav", "b", "sub/a"]);
         assert_eq!(names("sub"), ["A_mp3", "a_wav", "b"]);
+        std::fs::write(dir.path().join("sub/scan.pdf"), "").unwrap();
+        assert_eq!(of_folder(dir.path(), &dir.path().join("out")).unwrap().1, ["sub/scan.pdf"]);
         assert!(of_folder(dir.path(), dir.path()).unwrap_err().to_string().contains("--out-folder"));
         assert!(of_folder(&dir.path().join("none"), dir.path()).is_err());
     }

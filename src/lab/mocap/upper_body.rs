@@ -13,10 +13,10 @@ use orator_base::math::vec3;
 use orator_base::math::vec3::Vec3;
 use orator_base::motion::upper_body::{COCO, N_POINTS, Pose};
 use orator_base::text::counted;
-use orator_formats::bvh::joint_names;
 use orator_formats::bvh::read::{Bvh, Positions};
 use orator_formats::npz::Npz;
 use orator_formats::search;
+use orator_formats::skeleton::joint_names;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 

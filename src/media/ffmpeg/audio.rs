@@ -4,13 +4,14 @@
 //! damaged.
 
 use super::decode::StreamDecoder;
+use super::downmix::Downmix;
 use super::origin;
 use super::resample::{Resampler, SoundFormat, first_not_finite, format_of};
 use super::source::{self, MAX_GAP_SECS, MAX_SECS, UnreadableMedia};
 use anyhow::{Context, Result, bail};
 use ffmpeg_next::format::{Sample, sample};
 use ffmpeg_next::{ChannelLayout, frame};
-use orator_base::types::sound::{AudioTracks, SAMPLE_RATE, Sound};
+use orator_base::types::sound::{AudioTracks, SAMPLE_RATE, Sound, opposite_phase_note};
 use std::path::Path;
 
 /// Difference between timestamp and sample count that counts as a gap, seconds: less than a lost frame of any codec,
@@ -28,12 +29,17 @@ const CHUNK: usize = 65_536;
 /// All audio of `path` (wav, flac, mp3, a video, ...) as mono at `rate` samples per second; `None` if it has no
 /// audio.
 pub fn read_mono(path: &Path, rate: u32) -> Result<Option<Sound>> {
+    Ok(read_mono_with_note(path, rate)?.map(|(sound, _)| sound))
+}
+
+/// [`read_mono`], with a note on the mix, if any.
+pub fn read_mono_with_note(path: &Path, rate: u32) -> Result<Option<(Sound, Option<String>)>> {
     let mut samples = Vec::new();
     let streamed = stream_mono(path, 0, rate, &mut |chunk| {
         samples.extend_from_slice(chunk);
         Ok(())
     })?;
-    Ok(streamed.map(|_| Sound { rate, samples }))
+    Ok(streamed.map(|streamed| (Sound { rate, samples }, opposite_phase_note(streamed.opposite_phase_secs))))
 }
 
 /// Resamples a sound to `rate` with unchanged duration; frequencies above half the lower rate are removed.
@@ -80,6 +86,8 @@ pub struct StreamedSound {
     pub tracks: AudioTracks,
     /// Note on audio that was dropped.
     pub damage: Option<String>,
+    /// Seconds in which the two channels of stereo cancel out, so that the louder one replaces their mix.
+    pub opposite_phase_secs: f64,
 }
 
 /// Decodes the audio track `track` of `path` (from 1; 0: automatic choice) and passes it to `sink` in chunks; `None`
@@ -113,7 +121,8 @@ pub fn stream_mono(
         let at = frame.timestamp().map(|ticks| ticks as f64 * secs_per_tick);
         let zero = *zero_secs.get_or_insert(at.unwrap_or(0.0));
         // A time far beyond the stated end of the file is invalid; the audio continues without a gap.
-        let at = at.map(|at| at - zero).filter(|at| *at < latest_secs);
+        let is_joined = !decode.joins().is_empty();
+        let at = at.map(|at| at - zero).filter(|at| *at < latest_secs || is_joined);
         if timeline.is_plausible_time(at) {
             n_frames += 1;
             if let Some(sample_idx) = first_not_finite(&frame) {
@@ -136,7 +145,8 @@ pub fn stream_mono(
         return Err(UnreadableMedia(problem).into());
     }
     timeline.end_run()?;
-    Ok(Some(StreamedSound { secs: timeline.n_written as f64 / f64::from(rate), tracks, damage }))
+    let [secs, opposite_phase_secs] = [timeline.n_written, timeline.n_single].map(|n| n as f64 / f64::from(rate));
+    Ok(Some(StreamedSound { secs, tracks, damage, opposite_phase_secs }))
 }
 
 /// Accumulated difference between timestamps and sample count.
@@ -167,7 +177,9 @@ struct SoundTimeline<'a> {
     /// Samples to skip at the start of the run, because they are before time 0 or already written.
     n_skip: u64,
     /// Current run, and its start time in seconds.
-    run: Option<(Resampler, f64)>,
+    run: Option<(Downmix, f64)>,
+    /// Number of samples of a single channel.
+    n_single: u64,
     drift: ClockDrift,
     ready: Vec<f32>,
     sink: &'a mut dyn FnMut(&[f32]) -> Result<()>,
@@ -175,7 +187,8 @@ struct SoundTimeline<'a> {
 
 impl<'a> SoundTimeline<'a> {
     fn new(rate: u32, sink: &'a mut dyn FnMut(&[f32]) -> Result<()>) -> Self {
-        Self { rate, n_written: 0, n_skip: 0, run: None, drift: ClockDrift::default(), ready: Vec::new(), sink }
+        let (drift, ready) = (ClockDrift::default(), Vec::new());
+        Self { rate, n_written: 0, n_skip: 0, run: None, n_single: 0, drift, ready, sink }
     }
 
     /// End time of the audio so far, seconds.
@@ -199,7 +212,7 @@ impl<'a> SoundTimeline<'a> {
         let continues = self.run.is_some() && (at - end).abs() <= GAP_SECS;
         if !continues || self.run.as_ref().is_none_or(|(run, _)| run.format() != format) {
             self.end_run()?;
-            self.start_run(Resampler::new(format, self.rate)?, at)?;
+            self.start_run(Downmix::new(format, self.rate)?, at)?;
         }
         if let Some((run, _)) = &mut self.run {
             if continues
@@ -214,7 +227,7 @@ impl<'a> SoundTimeline<'a> {
         self.deliver()
     }
 
-    fn start_run(&mut self, run: Resampler, at: f64) -> Result<()> {
+    fn start_run(&mut self, run: Downmix, at: f64) -> Result<()> {
         let start_sample = (at * f64::from(self.rate)).round() as i64;
         let delay = start_sample.saturating_sub(i64::try_from(self.n_written)?);
         self.n_skip = delay.min(0).unsigned_abs();
@@ -233,7 +246,7 @@ impl<'a> SoundTimeline<'a> {
 
     fn end_run(&mut self) -> Result<()> {
         if let Some((run, _)) = self.run.take() {
-            run.finish(&mut self.ready)?;
+            self.n_single += run.finish(&mut self.ready)?;
         }
         self.deliver()
     }

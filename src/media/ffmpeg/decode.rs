@@ -1,6 +1,7 @@
 //! Decodes one stream frame by frame, with presentation times. Broken packets are counted and skipped.
 
-use anyhow::{Context, Result};
+use super::clock::StreamClock;
+use anyhow::{Context, Result, ensure};
 use ffmpeg_next as ffmpeg;
 use ffmpeg_next::{Frame, Packet, Rational, codec, decoder, format, media};
 use std::path::{Path, PathBuf};
@@ -14,6 +15,8 @@ pub(crate) struct StreamDecoder {
     input: format::context::Input,
     stream_idx: usize,
     decoder: decoder::Opened,
+    /// Clock of the packets; `None` if it cannot jump, or after a seek.
+    clock: Option<StreamClock>,
     time_base: Rational,
     draining: bool,
     n_bad: usize,
@@ -55,13 +58,24 @@ impl StreamDecoder {
         };
         let decoder =
             open().with_context(|| format!("cannot decode the {kind} of {}, codec {id:?}", path.display()))?;
-        let path = path.to_owned();
-        Ok(Self { path, input, stream_idx, decoder, time_base, draining: false, n_bad: 0, n_flawed: 0, stopped: None })
+        let clock = StreamClock::new(path, &input, stream_idx)?;
+        let (path, draining, stopped) = (path.to_owned(), false, None);
+        Ok(Self { path, input, stream_idx, decoder, clock, time_base, draining, n_bad: 0, n_flawed: 0, stopped })
     }
 
     /// Duration of one tick of the stream's clock, seconds, as a fraction.
     pub(crate) fn time_base(&self) -> Rational {
         self.time_base
+    }
+
+    /// Whether the clock of the container may jump, so that its stated length is not reliable.
+    pub(crate) fn may_jump(&self) -> bool {
+        self.clock.is_some()
+    }
+
+    /// Times in ticks at which another recording begins in a file of joined recordings, as far as it has been read.
+    pub(crate) fn joins(&self) -> &[i64] {
+        self.clock.as_ref().map_or(&[][..], StreamClock::joins)
     }
 
     /// Decodes the next frame into `frame`, in presentation order; false at the end.
@@ -90,8 +104,10 @@ impl StreamDecoder {
     }
 
     /// Seeks to the last point at or before `ticks` of the stream's clock at which decoding can start, as far as the
-    /// container knows. The next frames may be from another position, or flawed.
+    /// container knows. The next frames may be from another position, or flawed. Joined recordings cannot be sought.
     pub(crate) fn seek(&mut self, ticks: i64) -> Result<()> {
+        ensure!(self.joins().is_empty(), "cannot seek in {}: it consists of joined recordings", self.path.display());
+        self.clock = None;
         // SAFETY: the context is owned here, and the stream is one of its streams.
         let code = unsafe {
             ffmpeg::ffi::av_seek_frame(
@@ -115,11 +131,16 @@ impl StreamDecoder {
         let mut packet = Packet::empty();
         match packet.read(&mut self.input) {
             Ok(()) if packet.stream() != self.stream_idx => {}
-            Ok(()) => match self.decoder.send_packet(&packet) {
-                Ok(()) => {}
-                Err(error) if is_out_of_memory(error) => return self.fail(error),
-                Err(_) => self.n_bad += 1,
-            },
+            Ok(()) => {
+                if let Some(clock) = &mut self.clock {
+                    clock.correct(&mut packet)?;
+                }
+                match self.decoder.send_packet(&packet) {
+                    Ok(()) => {}
+                    Err(error) if is_out_of_memory(error) => return self.fail(error),
+                    Err(_) => self.n_bad += 1,
+                }
+            }
             Err(error) => {
                 if error != ffmpeg::Error::Eof {
                     self.stopped = Some(error);

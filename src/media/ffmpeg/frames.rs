@@ -9,7 +9,7 @@ use super::filter::{HdrTransfer, deinterlaced};
 use super::orientation::Orientation;
 use super::picture::Converter;
 use super::probe::{self, ProbedMedia};
-use super::source::{self, MAX_GAP_SECS, UnreadableMedia};
+use super::source::{self, MAX_GAP_SECS, MAX_SECS, UnreadableMedia};
 use anyhow::{Context, Result, bail};
 use ffmpeg_next::frame;
 use orator_base::types::image::{Image, PictureOptions};
@@ -44,6 +44,8 @@ pub struct FrameTime {
     pub repeated: bool,
     /// Change of the coded image size since the previous output frame.
     pub resize: Resize,
+    /// Whether another recording of a file of joined recordings begins since the previous output frame.
+    pub is_join: bool,
 }
 
 /// Change of the image size within a file.
@@ -211,9 +213,15 @@ impl FrameReader {
         self.image_size
     }
 
-    /// Number of frames expected from the headers, for progress bars.
+    /// Number of frames expected from the headers; `None` if they do not state it reliably.
     pub fn expected_frames(&self) -> Option<usize> {
-        self.info.duration_secs.map(|secs| self.fps.frames_in(secs))
+        let stated = self.info.duration_secs.filter(|_| !self.decode.may_jump());
+        stated.map(|secs| self.fps.frames_in(secs))
+    }
+
+    /// Times at which another recording begins in a file of joined recordings, as far as it has been read, seconds.
+    pub fn joins_secs(&self) -> Vec<f64> {
+        self.decode.joins().iter().map(|join| self.secs(join.saturating_sub(self.origin))).collect()
     }
 
     /// Length of the video read so far, seconds; its total length once all frames have been read.
@@ -228,7 +236,8 @@ impl FrameReader {
         let last = self.secs_of(self.following.as_ref().unwrap_or(&self.shown));
         let endless = (last > MAX_GAP_SECS).then(|| format!("the last picture claims to last {last:.0} s"));
         let read = self.duration_secs();
-        let stated = self.info.duration_secs.filter(|stated| self.following.is_none() && *stated > read + 1.0);
+        let is_complete = self.following.is_none() && self.decode.joins().is_empty();
+        let stated = self.info.duration_secs.filter(|stated| is_complete && *stated > read + 1.0);
         let short = stated.map(|stated| format!("pictures end at {read:.2} s of {stated:.2} s"));
         let parts: Vec<String> =
             self.decode.damage().into_iter().chain(misplaced).chain(endless).chain(short).collect();
@@ -255,9 +264,13 @@ impl FrameReader {
             return Ok(None);
         }
         self.next_idx += 1;
-        let repeated = self.last_shown.replace(self.shown.ticks) == Some(self.shown.ticks);
-        let resize = self.resize();
-        Ok(Some(FrameTime { frame_idx, source_secs: self.secs(self.shown.ticks), repeated, resize }))
+        let shown = self.shown.ticks;
+        let last = self.last_shown.replace(shown);
+        let is_new =
+            |join: &i64| last.is_some_and(|last| (last + 1..=shown).contains(&join.saturating_sub(self.origin)));
+        let is_join = self.decode.joins().iter().any(is_new);
+        let (repeated, resize) = (last == Some(shown), self.resize());
+        Ok(Some(FrameTime { frame_idx, source_secs: self.secs(shown), repeated, resize, is_join }))
     }
 
     /// The shown image, upright, in full size or scaled to `size` (width, height in px).
@@ -323,7 +336,9 @@ impl FrameReader {
             let own = frame.timestamp().map(|at| at.saturating_sub(self.origin));
             let at = own.unwrap_or_else(|| ticks.saturating_add(frame.packet().duration.max(1)));
             let is_near = self.secs(at.saturating_sub(ticks)) <= MAX_GAP_SECS;
-            if at > ticks && is_near && self.secs(at) < self.latest_secs {
+            // The stated length of joined recordings is that of one of them.
+            let latest_secs = if self.decode.joins().is_empty() { self.latest_secs } else { MAX_SECS };
+            if at > ticks && is_near && self.secs(at) < latest_secs {
                 return Ok(Some(SourceFrame { frame, ticks: at }));
             }
             self.n_misplaced += 1;

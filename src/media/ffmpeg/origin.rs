@@ -1,14 +1,28 @@
-//! Time 0 of a file: the presentation time of its first image that decodes, on the container's clock. Audio is
-//! aligned to it.
+//! Time 0 of a file: the presentation time of its first image that decodes, on the container's clock. Audio and the
+//! times of transcripts are aligned to it.
 
 use super::decode::StreamDecoder;
 use super::source;
 use anyhow::Result;
-use ffmpeg_next::{Packet, frame};
+use ffmpeg_next::{Packet, ffi, frame};
 use std::path::Path;
 
 /// Maximum number of packets read in search of the first image.
 const MAX_PACKETS: usize = 100_000;
+
+/// Presentation time of time 0 of `path`, seconds from the start of the file as players count it, to 0.1 ms: later than
+/// 0 if the first image is later than the first sound. 0 without images.
+pub fn start_secs(path: &Path) -> Result<f64> {
+    let Some(first_secs) = first_picture_secs(path)? else { return Ok(0.0) };
+    let input = source::open(path)?;
+    // SAFETY: the context is live and only read here.
+    let start = unsafe { (*input.as_ptr()).start_time };
+    if start == ffi::AV_NOPTS_VALUE {
+        return Ok(0.0);
+    }
+    let secs = first_secs - start as f64 / f64::from(ffi::AV_TIME_BASE);
+    Ok((secs * 1e4).round().max(0.0) / 1e4)
+}
 
 /// Presentation time of the first image of `path` that decodes, seconds on the container's clock; `None` without
 /// images.

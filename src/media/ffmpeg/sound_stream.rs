@@ -2,6 +2,7 @@
 
 use super::audio::stream_mono;
 use anyhow::{Result, bail};
+use orator_base::types::sound::opposite_phase_note;
 use std::path::Path;
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 
@@ -9,14 +10,15 @@ use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 const CHUNK: usize = 16_384;
 const N_AHEAD: usize = 8;
 
-/// Number of samples of the audio of `path` as mono at `rate`, found by decoding it; `None` without audio.
-pub fn n_samples(path: &Path, rate: u32) -> Result<Option<usize>> {
+/// Number of samples of the audio of `path` as mono at `rate`, found by decoding it, and a note on the mix, if any;
+/// `None` without audio.
+pub fn n_samples(path: &Path, rate: u32) -> Result<Option<(usize, Option<String>)>> {
     let mut n = 0;
     let streamed = stream_mono(path, 0, rate, &mut |chunk| {
         n += chunk.len();
         Ok(())
     })?;
-    Ok(streamed.map(|_| n))
+    Ok(streamed.map(|streamed| (n, opposite_phase_note(streamed.opposite_phase_secs))))
 }
 
 /// Audio of a file in chunks of mono samples in -1..1.

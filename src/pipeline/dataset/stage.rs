@@ -160,11 +160,13 @@ impl DatasetStage {
             .speakers
             .iter()
             .any(|configured| configured.name == video.speaker && !configured.transcripts.is_empty());
-        Ok(if has_words { opened.with_words(self.transcript(video)) } else { opened })
+        Ok(if has_words { opened.with_words(self.transcripts(video)) } else { opened })
     }
 
-    fn transcript(&self, video: &Unit) -> Option<&Path> {
-        Some(self.inputs.all.iter().find(|videos| videos.speaker == video.speaker)?.transcripts.get(&video.video)?)
+    /// Files that may be the transcript of a video.
+    fn transcripts(&self, video: &Unit) -> &[PathBuf] {
+        let videos = self.inputs.all.iter().find(|videos| videos.speaker == video.speaker);
+        videos.and_then(|videos| videos.transcripts.get(&video.video)).map(Vec::as_slice).unwrap_or_default()
     }
 
     fn about(&self, speaker: &Unit, first: &LiftedVideo) -> About {
@@ -246,12 +248,17 @@ impl Stage for DatasetStage {
         let mut inputs = Vec::new();
         for video in self.ready(unit) {
             inputs.push(Input { role: format!("{} video", video.video), path: video.source.clone() });
-            if let Some(path) = self.transcript(video).filter(|path| path.is_file()) {
-                inputs.push(Input { role: format!("{} transcript", video.video), path: path.to_owned() });
+            for (path, nth) in self.transcripts(video).iter().zip(1..).filter(|(path, _)| path.is_file()) {
+                let further = if nth > 1 { format!(" {nth}") } else { String::new() };
+                inputs.push(Input { role: format!("{} transcript{further}", video.video), path: path.clone() });
             }
             let offset = self.fixes_offset.then_some((Artifact::SoundOffset, true));
             let portrait = Some((Artifact::Portrait, true));
-            for (file, optional) in FILES.into_iter().chain(offset).chain(portrait) {
+            let media = MediaInfo::read(&Artifact::MediaInfo.path(&self.work, video));
+            let moves_words =
+                !self.transcripts(video).is_empty() && media.is_ok_and(|media| media.first_image_secs > 0.0);
+            let media = moves_words.then_some((Artifact::MediaInfo, true));
+            for (file, optional) in FILES.into_iter().chain(offset).chain(portrait).chain(media) {
                 let path = file.path(&self.work, video);
                 if !optional || path.exists() {
                     inputs.push(Input { role: format!("{} {}", video.video, file.file()), path });

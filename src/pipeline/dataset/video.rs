@@ -19,7 +19,8 @@ use orator_base::types::sound::{SAMPLE_RATE, Sound, SoundOffset, samples_of};
 use orator_dataset::bones::VideoBones;
 use orator_dataset::config::videos::slug;
 use orator_dataset::sample::Sample;
-use orator_dataset::words::VideoWords;
+use orator_dataset::words::{self, VideoWords};
+use orator_formats::media_json::MediaInfo;
 use orator_formats::{joints_npz, keypoints_npz, sound_offset_json};
 use std::fs::File;
 use std::io::BufReader;
@@ -42,6 +43,8 @@ pub struct LiftedVideo {
     pub unit: Unit,
     /// Number of samples by which the audio is read later than the frames.
     shift: i64,
+    /// Time of the first frame in the file, on whose clock transcripts are, seconds.
+    first_image_secs: f64,
     sound: PathBuf,
     keypoints: PathBuf,
     joints: PathBuf,
@@ -124,6 +127,8 @@ impl LiftedVideo {
             unit: unit.clone(),
             bones: VideoBones::read(&path_of(Artifact::Bones))?,
             shift,
+            first_image_secs: MediaInfo::read(&path_of(Artifact::MediaInfo))
+                .map_or(0.0, |media| media.first_image_secs),
             sound: path_of(Artifact::Sound),
             keypoints: path_of(Artifact::Keypoints),
             joints: path_of(Artifact::Joints),
@@ -134,15 +139,23 @@ impl LiftedVideo {
         })
     }
 
-    /// Adds the words of a transcript; `None` if no transcript matches the video.
-    pub fn with_words(mut self, transcript: Option<&Path>) -> Self {
+    /// Adds the words of the first usable one of the files `transcripts`; may be empty.
+    pub fn with_words(mut self, transcripts: &[PathBuf]) -> Self {
         let n_samples = hound::WavReader::open(&self.sound).map_or(0.0, |wav| f64::from(wav.duration()));
         let rate = f64::from(SAMPLE_RATE);
-        let hash = transcript.and_then(|path| hash_file(path).ok()).unwrap_or_default();
-        let name = transcript.and_then(Path::file_name).unwrap_or_default().to_string_lossy().into_owned();
+        let described = |path: &PathBuf| {
+            let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+            format!("{name} {}", hash_file(path).unwrap_or_default())
+        };
+        let files: Vec<String> = transcripts.iter().map(described).collect();
+        let files = if files.is_empty() { " ".to_owned() } else { files.join("\n") };
+        let first = self.first_image_secs;
+        let moved = if first > 0.0 { format!(" from {first} s") } else { String::new() };
         self.files_hash =
-            blake3::hash(format!("{} words {name} {hash}\n", self.files_hash).as_bytes()).to_hex().to_string();
-        self.words = Some(VideoWords::read(transcript, n_samples / rate, self.shift as f64 / rate));
+            blake3::hash(format!("{} words {files}{moved}\n", self.files_hash).as_bytes()).to_hex().to_string();
+        let end_secs = first + n_samples / rate;
+        let choice = words::choose(transcripts, &self.unit.speaker, end_secs);
+        self.words = Some(VideoWords::of(choice, transcripts, end_secs, first + self.shift as f64 / rate));
         self
     }
 

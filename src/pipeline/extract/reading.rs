@@ -26,7 +26,7 @@ pub struct PictureReading {
 
 /// Reads all pictures once. Each is reduced to a thumbnail of `area` (of the full picture if `None`), unless the
 /// survey wants the full picture. Tracking restarts where the size changes; a shot begins where the aspect ratio
-/// changes.
+/// changes, and where another recording begins in a file of joined recordings.
 pub fn read(
     reader: &mut FrameReader,
     rate: FrameRate,
@@ -36,7 +36,7 @@ pub fn read(
 ) -> Result<PictureReading> {
     let (mut timeline, mut n_resizes) = (Timeline::default(), 0);
     let (mut shots, mut previous) = (ShotFinder::new(rate), None);
-    let (mut resizes, mut checksums) = (Vec::new(), Vec::new());
+    let (mut resizes, mut cuts, mut checksums) = (Vec::new(), Vec::new(), Vec::new());
     let task = progress.begin("frames", reader.expected_frames().unwrap_or(0) as u64);
     while let Some(time) = reader.advance()? {
         timeline.source_secs.push(time.source_secs);
@@ -53,11 +53,12 @@ pub fn read(
         previous = picture.or(previous);
         n_resizes += usize::from(time.resize != Resize::None);
         resizes.push(time.resize);
+        cuts.push(time.is_join || time.resize == Resize::Reshaped);
         task.advance(1);
     }
     timeline.shot_score = shots.finish();
-    for (score, resize) in timeline.shot_score.iter_mut().zip(&resizes) {
-        *score = if *resize == Resize::Reshaped { 1.0 } else { *score };
+    for (score, is_cut) in timeline.shot_score.iter_mut().zip(cuts) {
+        *score = if is_cut { 1.0 } else { *score };
     }
     let frames = timeline.shot_score.iter().zip(&resizes);
     timeline.restart = frames.map(|(score, resize)| *score >= RESTART || *resize != Resize::None).collect();

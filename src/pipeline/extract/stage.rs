@@ -14,8 +14,8 @@ use orator_base::types::image::PictureOptions;
 use orator_base::types::sound::SAMPLE_RATE;
 use orator_dataset::config::{self, Config, videos};
 use orator_formats::media_json::MediaInfo;
-use orator_media::ffmpeg;
 use orator_media::ffmpeg::frames::FrameReader;
+use orator_media::ffmpeg::{self, origin};
 use serde_json::json;
 use std::path::{Path, PathBuf};
 
@@ -52,7 +52,7 @@ impl Stage for ExtractStage {
     }
 
     fn version(&self) -> u32 {
-        5
+        6
     }
 
     fn settings(&self, unit: &Unit) -> serde_json::Value {
@@ -88,7 +88,8 @@ impl Stage for ExtractStage {
         if self.settings.keep_frames {
             reading::write_pictures(&mut open(pictures)?, &Artifact::Frames.within(out), progress)?;
         }
-        if reader.damage().is_none() {
+        // Joined recordings cannot be sought, so they are one span.
+        if reader.damage().is_none() && reader.joins_secs().is_empty() {
             spans::mark(&mut read, || open(pictures), active_area, rate)?;
         }
         let timeline = read.timeline;
@@ -100,6 +101,7 @@ impl Stage for ExtractStage {
 
         let n_frames = timeline.n_frames();
         let n_cuts = timeline.restart.iter().filter(|restart| **restart).count();
+        let opposite_phase_secs = sound.as_ref().map_or(0.0, |sound| sound.opposite_phase_secs);
         let damage: Vec<String> = reader.damage().into_iter().chain(sound.and_then(|sound| sound.damage)).collect();
         let damage = (!damage.is_empty()).then(|| damage.join(", "));
         let video = reader.info().video.as_ref();
@@ -119,6 +121,9 @@ impl Stage for ExtractStage {
             hdr,
             n_resizes: read.n_resizes,
             audio_tracks,
+            first_image_secs: origin::start_secs(&unit.source)?,
+            joins_secs: reader.joins_secs(),
+            opposite_phase_secs,
             keypoints_from: None,
         };
         media.write(&Artifact::MediaInfo.within(out))?;

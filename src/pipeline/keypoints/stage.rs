@@ -17,13 +17,14 @@ use orator_dataset::config::{ExtractConfig, KeypointSource, Settings};
 use orator_formats::media_json::MediaInfo;
 use orator_formats::timeline_npz::Timeline;
 use orator_formats::{keypoints, keypoints_npz};
+use orator_media::ffmpeg::origin;
 use serde_json::json;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs::File;
 use std::path::{Path, PathBuf};
 
 /// Version of the readers; increased when the same file yields different keypoints.
-const READERS: u32 = 2;
+const READERS: u32 = 3;
 
 /// `extract` for keypoints: audio, timeline and keypoints at the dataset rate.
 pub struct KeypointExtractStage {
@@ -103,18 +104,22 @@ impl Stage for KeypointExtractStage {
         let sound =
             extract_wav(&self.sound(unit)?, self.settings.audio_track, &Artifact::Sound.within(out), SAMPLE_RATE)?;
         let audio_secs = sound.as_ref().map(|sound| sound.secs);
+        let opposite_phase_secs = sound.as_ref().map_or(0.0, |sound| sound.opposite_phase_secs);
         let media = MediaInfo {
             image_size: image_size.map(|px| px as usize),
             source_fps: Some(source_fps),
             has_audio: audio_secs.is_some(),
             audio_secs,
             damage: sound.and_then(|sound| sound.damage),
+            first_image_secs: origin::start_secs(&self.sound(unit)?)?,
+            opposite_phase_secs,
             keypoints_from: Some(format),
             ..MediaInfo::new(duration_secs, n_frames, fps)
         };
         media.write(&Artifact::MediaInfo.within(out))?;
         let sound = audio_secs.map_or("no audio".to_owned(), |secs| format!("{} of audio", length(secs)));
-        let remarks = media.not_judged().into_iter().chain(media.damage.clone()).chain(notes.clone());
+        let remarks =
+            media.not_judged().into_iter().chain(media.notes()).chain(media.damage.clone()).chain(notes.clone());
         let remarks = remarks.collect::<Vec<_>>().join("; ");
         let mut facts = serde_json::to_value(&media)?.as_object().cloned().unwrap_or_default();
         facts.insert("notes".into(), notes.into());

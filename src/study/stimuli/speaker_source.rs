@@ -9,6 +9,7 @@ use orator_base::types::time::FrameRate;
 use orator_dataset::Dataset;
 use orator_dataset::config::patterns::{SOUND_EXTENSIONS, SearchRoot, TRANSCRIPT_EXTENSIONS, expand};
 use orator_dataset::index::SampleRef;
+use orator_formats::search::NamedFiles;
 use orator_formats::transcript::{Transcript, Word};
 use orator_media::ffmpeg::audio;
 use std::path::{Path, PathBuf};
@@ -133,5 +134,6 @@ impl SpeakerSource {
 
 /// Transcript with the sound's file name in the same folder.
 fn transcript_beside(sound: &Path) -> Option<PathBuf> {
-    TRANSCRIPT_EXTENSIONS.iter().map(|ending| sound.with_extension(ending)).find(|path| path.is_file())
+    let stem = sound.file_stem()?.to_str()?;
+    NamedFiles::default().find(sound.parent()?, &[stem], &TRANSCRIPT_EXTENSIONS).into_iter().next()
 }

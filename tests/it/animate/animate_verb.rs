@@ -18,7 +18,7 @@ use std::path::Path;
 use std::process::Command;
 
 /// Exit code, JSON and standard error of `orator --json animate ...`.
-fn animate(dir: &Path, args: &str) -> (i32, Value, String) {
+pub(super) fn animate(dir: &Path, args: &str) -> (i32, Value, String) {
     let mut command = Command::new(env!("CARGO_BIN_EXE_orator"));
     let output = command.args(["--json", "animate"]).args(args.split_whitespace()).current_dir(dir).output().unwrap();
     let json = serde_json::from_slice(&output.stdout).unwrap_or_default();
@@ -231,7 +231,7 @@ fn errors_name_the_cause_and_leave_no_output() {
         ("good.npy --out x.bvh --audio good.npy", "--audio applies to .mp4"),
         ("good.npy --out x.npy --names vrm", "--names applies to .bvh"),
         ("good.npy --out x.vrm --names mixamo", "--names applies to .bvh"),
-        ("good.npy --out x.bvh --retarget good.npy", "expected .bvh or .glb"),
+        ("good.npy --out x.bvh --retarget good.npy", "expected .bvh, .glb or .vrm"),
         ("good.npy --out x.bvh --bone-map bones.toml", "--retarget"),
         ("good.npy --out x.bvh --keypoints good.npy", "good.npy"),
     ] {

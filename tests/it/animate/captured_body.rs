@@ -36,7 +36,7 @@ const BONES: [([&str; 2], [&str; 2]); 10] = [
 type Pose = BTreeMap<String, (Rotation, Vec3)>;
 
 /// A walking, bowing and turning person whose proportions differ from those of the rig.
-fn capture(has_legs: bool) -> BvhClip {
+pub(super) fn capture(has_legs: bool) -> BvhClip {
     let mut skeleton = Skeleton::default();
     let hips = skeleton.push("Hips", None, [0.0; 3], false);
     let spine = skeleton.push("Spine", Some(hips), [0.0, 9.0, 0.0], false);

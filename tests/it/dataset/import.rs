@@ -26,7 +26,7 @@ use std::path::{Path, PathBuf};
 const FPS: FrameRate = FrameRate::new(15, 1);
 
 /// A BVH take of `n_frames` at 30 fps: the reference's nine frames back and forth.
-fn bvh(n_frames: usize) -> String {
+pub(crate) fn bvh(n_frames: usize) -> String {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/reference/bvh_take.bvh");
     let text = fs::read_to_string(path).unwrap();
     let (head, frames) = text.split_once("Frames: 9\nFrame Time: 0.0333333\n").unwrap();
@@ -37,24 +37,24 @@ fn bvh(n_frames: usize) -> String {
 }
 
 /// Writes seeded noise.
-fn wav(path: &Path, secs: f64, seed: u64) {
+pub(crate) fn wav(path: &Path, secs: f64, seed: u64) {
     let mut noise = rand_chacha::ChaCha8Rng::seed_from_u64(seed);
     let samples = (0..(secs * 22_050.0) as usize).map(|_| noise.random_range(-0.5f32..0.5)).collect();
     fs::create_dir_all(path.parent().unwrap()).unwrap();
     orator_formats::wav::write(path, &Sound { rate: 22_050, samples }).unwrap();
 }
 
-fn write(path: PathBuf, text: &str) {
+pub(crate) fn write(path: PathBuf, text: &str) {
     fs::create_dir_all(path.parent().unwrap()).unwrap();
     fs::write(path, text).unwrap();
 }
 
-fn plan(sources: &[&Path]) -> ImportPlan {
+pub(crate) fn plan(sources: &[&Path]) -> ImportPlan {
     ImportPlan {
         sources: sources.iter().map(|path| path.to_path_buf()).collect(),
         kind: None,
         about: About::new("host", FPS),
-        limits: TakeLimits { fps: FPS, min_frames: 64, max_difference_secs: 0.5, no_sound: false },
+        limits: TakeLimits { fps: FPS, min_frames: 64, max_difference_secs: 0.5, no_sound: false, units: None },
         dataset: orator_dataset::config::DatasetConfig { validation: 0.0, test: 0.0, ..Default::default() },
     }
 }
@@ -68,7 +68,7 @@ fn imported(sources: &[&Path], out: &Path) -> Imported {
 }
 
 /// Samples in the shards of a dataset by key, with their JSON.
-fn samples(dir: &Path) -> BTreeMap<String, (Sample, Vec<u8>)> {
+pub(crate) fn samples(dir: &Path) -> BTreeMap<String, (Sample, Vec<u8>)> {
     let tars: Vec<PathBuf> = files_under(dir).into_iter().map(|(_, path)| path).filter(|path| is_tar(path)).collect();
     let loose = shards::open(&tars);
     let all = loose.videos.into_iter().flat_map(|video| video.samples);
@@ -154,6 +154,39 @@ fn bvh_files_with_audio_become_a_dataset() {
     let bytes = |dir: &Path| files_under(dir).into_iter().map(|(name, path)| (name, fs::read(path).unwrap())).collect();
     let (first, second): (Vec<_>, Vec<(String, Vec<u8>)>) = (bytes(&out), bytes(&again));
     assert!(first == second);
+}
+
+#[test]
+fn names_of_recorders_and_stereo_of_opposite_phase_are_imported() {
+    let dir = tempfile::tempdir().unwrap();
+    let at = |name: &str| dir.path().join("in").join(name);
+    write(at("TAKE_4.BVH"), &bvh(200));
+    write(at("TAKE_4.TXT"), "so it goes");
+    // One name is composed, the other decomposed.
+    write(at("gru\u{308}n.bvh"), &bvh(220));
+    wav(&at("gr\u{fc}n.Wav"), 7.333, 4);
+    write(at("cover.jpg"), "no motion");
+    let spec = hound::WavSpec {
+        channels: 2,
+        sample_rate: 48_000,
+        bits_per_sample: 16,
+        sample_format: hound::SampleFormat::Int,
+    };
+    let mut stereo = hound::WavWriter::create(at("TAKE_4.WAV"), spec).unwrap();
+    for n in 0..320_000 {
+        let left = (12_000.0 * (f64::from(n) * 0.02).sin()) as i16;
+        [left, -left].into_iter().for_each(|value| stereo.write_sample(value).unwrap());
+    }
+    stereo.finalize().unwrap();
+    let out = dir.path().join("out");
+    let answer = imported(&[&at("")], &out);
+    assert!(answer.lines.iter().all(|line| line.outcome == "kept") && answer.lines.len() == 2, "{:?}", answer.lines);
+    let message = &answer.lines.iter().find(|line| line.file.contains("TAKE_4")).unwrap().message;
+    assert!(message.contains("stereo channels of opposite phase"), "{message}");
+    assert!(answer.notes.iter().any(|note| note.ends_with("of the same name: cover.jpg")), "{:?}", answer.notes);
+    let samples = samples(&out);
+    let (sample, _) = samples.values().find(|(sample, _)| sample.meta["text"] == "so it goes").unwrap();
+    assert!(sample.sound.samples.iter().any(|sample| *sample > 0.3));
 }
 
 #[test]

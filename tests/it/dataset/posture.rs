@@ -66,7 +66,7 @@ fn angles_are_stored_exactly_and_removed_with_their_video() {
         sources: files_under(&target).into_iter().map(|(_, path)| path).filter(is_tar).collect(),
         kind: None,
         about: About::new("host", fps),
-        limits: TakeLimits { fps, min_frames: 64, max_difference_secs: 0.5, no_sound: false },
+        limits: TakeLimits { fps, min_frames: 64, max_difference_secs: 0.5, no_sound: false, units: None },
         dataset: DatasetConfig::default(),
     };
     let imported = folder.path().join("imported");

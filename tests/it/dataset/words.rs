@@ -3,6 +3,7 @@
 
 use crate::fixtures::media::lifted_videos::{settings, shard_with_words, video};
 use orator_base::stage::Unit;
+use orator_base::stage::artifacts::{StageName, dir};
 use orator_base::stage::ledger::{TranscriptReport, WordCount};
 use orator_base::stage::progress::Silent;
 use orator_base::types::time::FrameRate;
@@ -14,6 +15,7 @@ use orator_dataset::import::write::ImportPlan;
 use orator_dataset::info::About;
 use orator_dataset::verify::verify::{read_ledgers, verify};
 use orator_dataset::{Dataset, Split};
+use orator_formats::media_json::MediaInfo;
 use orator_formats::transcript::Word;
 use orator_test_support::project::files_under;
 use std::collections::{BTreeMap, BTreeSet};
@@ -95,7 +97,7 @@ fn every_word_is_in_one_sample_or_counted() {
         sources: tars,
         kind: None,
         about: About::new("host", fps),
-        limits: TakeLimits { fps, min_frames: 64, max_difference_secs: 0.5, no_sound: false },
+        limits: TakeLimits { fps, min_frames: 64, max_difference_secs: 0.5, no_sound: false, units: None },
         dataset: DatasetConfig { validation: 0.0, test: 0.0, ..DatasetConfig::default() },
     };
     let imported = talks.dir.path().join("imported");
@@ -113,6 +115,22 @@ fn every_word_is_in_one_sample_or_counted() {
         files_under(&out).into_iter().any(|(_, path)| String::from_utf8_lossy(&fs::read(path).unwrap()).contains(word))
     };
     assert!(!is_stored("alpha") && !is_stored("a.srt") && is_stored("omega"));
+}
+
+#[test]
+fn words_are_moved_by_the_delay_of_the_first_picture() {
+    let talks = TwoTalks::new();
+    let path = dir(&talks.dir.path().join("work"), StageName::Extract, &talks.videos[0]).join("media.json");
+    MediaInfo { first_image_secs: 1.5, ..MediaInfo::read(&path).unwrap() }.write(&path).unwrap();
+    // The sound ends at 21.5 s of the file.
+    let (_, out) = talks.dataset([Some(("a.srt", srt(21, "so").as_bytes())), None], "out");
+    let expected = WordCount { n_words: 21, n_accepted: 20, n_rejected: 1, n_outside: 0 };
+    assert_eq!(transcript_report(&out, "first").count, expected);
+    let by_sample = words(&out);
+    let first = by_sample.values().flatten().flatten().find(|word| word.word == "so1").unwrap();
+    assert_eq!((first.start_secs, first.end_secs), (0.0, 0.5));
+    let second = by_sample.values().flatten().flatten().find(|word| word.word == "so2").unwrap();
+    assert_eq!((second.start_secs, second.end_secs), (0.5, 1.5));
 }
 
 #[test]
@@ -153,6 +171,31 @@ fn transcript_errors_are_reported_and_exclude_no_video() {
     }
     let (line, _) = talks.dataset([Some(("good.srt", good.as_bytes())), None], "one");
     assert!(line.contains("second.mp4: no transcript has the name of the video"), "{line}");
+}
+
+#[test]
+fn the_next_transcript_of_a_video_is_read() {
+    let talks = TwoTalks::new();
+    let [tracker, subtitles, cut] = [
+        ("b.json", r#"{"names": ["jawOpen"], "frames": [{"weights": [0.5], "time": 0.1}]}"#.to_owned()),
+        ("b.srt", srt(20, "so")),
+        ("a.json", "{".to_owned()),
+    ]
+    .map(|(name, text)| {
+        let path = talks.dir.path().join(name);
+        fs::write(&path, text).unwrap();
+        path
+    });
+    let [first, second] = &talks.videos;
+    let transcripts = [(first, cut), (second, tracker), (second, subtitles)];
+    let named: Vec<_> = talks.videos.iter().map(|unit| (unit, Split::Train)).collect();
+    let (report, out) = shard_with_words(&settings(talks.dir.path()), &talks.videos, &named, &transcripts, "out");
+    let line = report.unwrap().line;
+    assert!(line.contains("b.json is not a valid transcript") && line.contains("b.srt was read instead"), "{line}");
+    assert!(line.contains("a.json is not a valid transcript"), "{line}");
+    let of_second = transcript_report(&out, "second");
+    assert_eq!((of_second.file.as_deref(), of_second.count.n_accepted), (Some("b.srt"), 20));
+    assert_eq!(verify(&out, true, &Silent).unwrap().problems, []);
 }
 
 #[test]

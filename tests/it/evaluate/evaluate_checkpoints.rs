@@ -173,9 +173,14 @@ fn networks_of_both_trainings_are_evaluated_in_one_table() {
 fn imported(dir: &Path, name: &str) -> Sample {
     let file = |ending: &str| Some(dir.join(format!("{name}.{ending}"))).filter(|path| path.exists());
     let [motion, sound, transcript] = ["bvh", "wav", "tsv"].map(file);
-    let files = TakeFiles { kind: MotionKind::Bvh, motion: motion.unwrap(), sound, transcript };
-    let limits = TakeLimits { fps: FPS, min_frames: 30, max_difference_secs: 0.5, no_sound: false };
-    match ImportedTake::read(&files, &limits).unwrap().outcome {
+    let files = TakeFiles {
+        kind: MotionKind::Bvh,
+        motion: motion.unwrap(),
+        sound,
+        transcripts: transcript.into_iter().collect(),
+    };
+    let limits = TakeLimits { fps: FPS, min_frames: 30, max_difference_secs: 0.5, no_sound: false, units: None };
+    match ImportedTake::read(&files, &limits, "host").unwrap().outcome {
         TakeOutcome::Accepted(accepted) => accepted.sample,
         TakeOutcome::Rejected(rejection) => panic!("{rejection:?}"),
     }

@@ -20,7 +20,7 @@ fn motion() -> Performance {
 }
 
 /// GLB of the built-in avatar in centimetres, under a root node that scales and rotates it, as exporters write it.
-fn glb_with_armature(folder: &Path) -> PathBuf {
+pub(crate) fn glb_with_armature(folder: &Path) -> PathBuf {
     let (_, path) = written(folder, 0, Names::Mixamo);
     let Glb { mut scene, bytes } = Glb::read(&path);
     for node in scene["nodes"].as_array_mut().unwrap() {
@@ -42,7 +42,7 @@ fn glb_with_armature(folder: &Path) -> PathBuf {
 }
 
 /// Bytes of a GLB file with this scene and binary chunk.
-fn glb_file(scene: &Value, bytes: &[u8]) -> Vec<u8> {
+pub(crate) fn glb_file(scene: &Value, bytes: &[u8]) -> Vec<u8> {
     let mut text = scene.to_string().into_bytes();
     text.resize(text.len().next_multiple_of(4), b' ');
     let mut file = b"glTF".to_vec();

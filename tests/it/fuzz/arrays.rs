@@ -14,7 +14,7 @@ use orator_pipeline::segment::Measures;
 
 #[test]
 fn npy() {
-    let files = [corpus("arrays", "motion"), corpus("arrays", "keypoints.npy")].concat();
+    let files = ["motion", "keypoints.npy", "keypoints-coco"].map(|name| corpus("arrays", name)).concat();
     fuzz_file("npy", &files, "a.npy", |path| {
         let _ = npy::read(path, FrameRate::new(15, 1));
         let _ = keypoints::read(path);

@@ -7,7 +7,8 @@ use crate::fixtures::media::foreign_keypoints as foreign;
 use crate::fixtures::motion_folders;
 use crate::fixtures::samples::constant_sample;
 use crate::fixtures::write_dataset::write_dataset;
-use ndarray::{Array1, Array2, Array3, arr1};
+use crate::foreign::transcripts::FORMATS;
+use ndarray::{Array1, Array2, Array3, arr1, s};
 use ndarray_npy::{NpzWriter, write_npy};
 use orator_base::types::skeleton::N_BONES;
 use orator_base::types::sound::Sound;
@@ -66,6 +67,8 @@ fn arrays() {
     write_npy(at("arrays", "motion-flat.npy"), &Array2::<f64>::from_elem((2, 147), 0.1)).unwrap();
     let sample = foreign::sample(3, FPS);
     foreign::holistic(&at("arrays", "keypoints.npy"), &sample, foreign::HolisticOrder::NoFace);
+    let positions = foreign::sample(6, FPS).body.slice(s![.., .., ..2]).as_standard_layout().to_owned();
+    write_npy(at("arrays", "keypoints-coco.npy"), &positions).unwrap();
     let points = Array3::<f32>::from_elem((2, 59, 3), 0.5);
     fs::write(at("arrays", "slice.npy"), npy::write_f32(points.shape(), points.iter())).unwrap();
     let mask = Array2::from_elem((2, 49), true);
@@ -95,6 +98,13 @@ fn motion() {
     let (from, to) = (at("arrays", "motion.npy"), at("motion", "a.bvh"));
     let mut command = Command::new(env!("CARGO_BIN_EXE_orator"));
     assert!(command.arg("animate").arg(from).arg("--out").arg(to).output().unwrap().status.success());
+    // A comment and a name in Shift-JIS, a rounded frame time, and an incomplete last frame.
+    let bvh = fs::read_to_string(at("motion", "a.bvh")).unwrap();
+    let (before, after) = bvh.split_once("JOINT Spine").unwrap();
+    let after = after.replace("0.06666667", "0.067");
+    let after = &after.as_bytes()[..after.len() - 700];
+    let parts = [b"// \x8dr\r\n".as_slice(), before.as_bytes(), b"JOINT \x83{\x81[\x83\x93", after];
+    fs::write(at("motion", "a.bvh-cut-off"), parts.concat()).unwrap();
     for (name, n) in [("labels-nyu.txt", 42), ("labels-icvl.txt", 48)] {
         let line = |t: usize| (0..n).map(|k| format!("{} ", 100 + (13 * k + t) % 90)).collect::<String>();
         write_text("motion", name, &(0..3).map(|t| line(t) + "\n").collect::<String>());
@@ -107,6 +117,8 @@ fn texts() {
     let first = fs::read_dir(fixtures("texts").join("openpose")).unwrap().next().unwrap().unwrap().path();
     fs::rename(first, at("texts", "keypoints-openpose.json")).unwrap();
     fs::remove_dir_all(fixtures("texts").join("openpose")).unwrap();
+    let text = fs::read_to_string(at("texts", "keypoints-openpose.json")).unwrap();
+    write_text("texts", "keypoints-openpose-before-1.3.json", &text.replace("keypoints_2d", "keypoints"));
     foreign::mmpose(&at("texts", "keypoints-mmpose.json"), &sample, 17);
     foreign::alphapose(&at("texts", "keypoints-alphapose.json"), &sample, 17);
     foreign::wholebody(&at("texts", "keypoints-wholebody.json"), &sample);
@@ -122,6 +134,9 @@ fn texts() {
         ),
     ] {
         write_text("texts", &format!("words.{ending}"), text);
+    }
+    for format in FORMATS {
+        write_text("texts", &format!("words-{}.{}", format.name, format.ending), format.text);
     }
     let speaker = "\n[[speaker]]\nname = \"host\"\nvideos = [\"*.mp4\", \"**/a.mov\"]\ntrain = [\"a.mp4\"]\n";
     write_text("texts", "pipeline.toml", &format!("{}{speaker}", orator_dataset::config::DEFAULT_FILE));

@@ -17,7 +17,7 @@ const FPS: FrameRate = FrameRate::new(15, 1);
 #[test]
 fn bvh() {
     fuzz_bytes("bvh", &corpus("motion", "a.bvh"), |bytes| {
-        if let Ok(bvh) = Bvh::parse(&String::from_utf8_lossy(bytes)) {
+        if let Ok(bvh) = Bvh::from_bytes(bytes) {
             drop(bvh.positions(Positions::Auto));
         }
     });
@@ -26,7 +26,12 @@ fn bvh() {
 #[test]
 fn bvh_motion() {
     fuzz_file("bvh_motion", &corpus("motion", "a.bvh"), "a.bvh", |path| {
-        let _ = (motion_file::read(path, None), upper_body::read(path), fingers::read(path), CapturedBody::read(path));
+        let _ = (
+            motion_file::read(path, None),
+            upper_body::read(path),
+            fingers::read(path),
+            CapturedBody::read(path, None),
+        );
     });
 }
 
@@ -46,7 +51,7 @@ fn hand_labels() {
 
 #[test]
 fn take() {
-    let limits = TakeLimits { fps: FPS, min_frames: 1, max_difference_secs: 60.0, no_sound: true };
+    let limits = TakeLimits { fps: FPS, min_frames: 1, max_difference_secs: 60.0, no_sound: true, units: None };
     let kinds = [(MotionKind::Authors, "a.txt"), (MotionKind::Bvh, "a.bvh"), (MotionKind::Ted, "capture-ted.npz")];
     let dir = folder();
     let files = kinds.map(|(_, name)| {
@@ -57,7 +62,8 @@ fn take() {
         for (kind, name) in kinds {
             let motion = dir.path().join(name);
             std::fs::write(&motion, bytes).unwrap();
-            let _ = ImportedTake::read(&TakeFiles { kind, motion, sound: None, transcript: None }, &limits);
+            let files = TakeFiles { kind, motion, sound: None, transcripts: Vec::new() };
+            let _ = ImportedTake::read(&files, &limits, "host");
         }
     });
 }

@@ -27,7 +27,8 @@ fn streamed_audio_gives_the_motion_of_loaded_audio() {
         let path = dir.join("speech.wav");
         wav::write(&path, &sound).unwrap();
         let loaded = read_mono(&path, 16_000).unwrap().unwrap();
-        let n = n_samples(&path, 16_000).unwrap().unwrap();
+        let (n, note) = n_samples(&path, 16_000).unwrap().unwrap();
+        assert_eq!(note, None);
         assert_eq!(n, loaded.samples.len());
         let mut n_done = 0;
         let streamed =

@@ -3,3 +3,4 @@
 pub(crate) mod bad_input;
 pub(crate) mod dataset_from_keypoints;
 pub(crate) mod formats;
+pub(crate) mod point_orders;

@@ -244,7 +244,7 @@ fn the_command_lifts_a_body_without_hands_and_reports_bad_input() {
     fails(&[&npz, to, &dir.path().join("j.bvh")], ".npy");
     fails(&[&dir.path().join("none.npz"), to, &out], "none.npz");
     write("bodies", &k.body);
-    fails(&[&npz, to, &out], "expected an array `body`");
+    fails(&[&npz, to, &out], "give it with --input-fps");
     write("body", &k.left_hand);
     fails(&[&npz, to, &out], "[40, 21, 3]");
     write("body", &Array3::zeros((0, 17, 3)));

@@ -3,6 +3,7 @@
 pub(crate) mod audio_tracks;
 pub(crate) mod extract;
 pub(crate) mod image_formats;
+pub(crate) mod joined;
 pub(crate) mod media_audio;
 pub(crate) mod media_frames;
 pub(crate) mod shots;

@@ -193,8 +193,6 @@ fn errors_in_captures_name_the_file() {
     };
     let text = error_of("joint", &[], &other);
     assert!(text.contains("a.bvh") && text.contains("no joint LeftHand") && text.contains("LeftPaw"), "{text}");
-    let text = error_of("transcript", &[], &|dir| std::fs::write(dir.join("b.json"), "{").unwrap());
-    assert!(text.contains("b.json is not a valid transcript"), "{text}");
     let text =
         error_of("short", &[], &|dir| ["a", "b"].iter().for_each(|name| write_capture(dir, name, 1.0, 0.0, false)));
     assert!(text.contains("no training motion is as long as a segment (30 frames)"), "{text}");
@@ -253,6 +251,15 @@ fn doubtful_transcripts_and_changed_captures_are_reported() {
         let log = training_log(&open(), None, &out(&note.len().to_string())).unwrap();
         assert!(log.contains(note), "{log}");
     }
+
+    // A transcript that cannot be read costs no capture: the next one of that name is read.
+    std::fs::write(dir.join("b.tsv"), "so").unwrap();
+    std::fs::write(dir.join("b.json"), r#"[{"word": "hello", "start": 0.5, "end": 1.0}]"#).unwrap();
+    let log = training_log(&open(), None, &out("next")).unwrap();
+    assert!(log.contains("b.tsv is not a valid transcript") && log.contains("b.json was read instead"), "{log}");
+    std::fs::write(dir.join("b.json"), "{").unwrap();
+    let log = training_log(&open(), None, &out("none")).unwrap();
+    assert!(log.contains("b.json is not a valid transcript") && !log.contains("read instead"), "{log}");
 
     // Equal length, different content.
     std::fs::write(dir.join("b.tsv"), words(3, "hello")).unwrap();

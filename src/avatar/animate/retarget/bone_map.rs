@@ -1,11 +1,12 @@
-//! Mapping between our bones and the joints of a user's skeleton, found by name or read from an editable text with one
-//! line `LeftArm = "upperarm_l"` per bone.
+//! Mapping between our bones and the joints of a user's skeleton, found by name or structure, assigned by the file
+//! (VRM), or read from an editable text with one line `LeftArm = "upperarm_l"` per bone.
 
-use super::bone_names;
-use super::user_rig::UserRig;
+use super::user_rig::{JointTransform, UserRig};
 use anyhow::{Context as _, Result, bail, ensure};
 use orator_base::motion::fk::Skeleton;
-use std::collections::BTreeMap;
+use orator_base::text::counted;
+use orator_formats::skeleton::matched::{MatchJoint, MatchedJoints};
+use std::collections::{BTreeMap, BTreeSet};
 
 /// Bones that a skeleton must have to receive a gesture.
 const REQUIRED: [&str; 7] = ["Hips", "LeftArm", "LeftForeArm", "LeftHand", "RightArm", "RightForeArm", "RightHand"];
@@ -16,28 +17,46 @@ const MAX_LISTED: usize = 60;
 #[derive(Clone, Debug, PartialEq)]
 pub struct BoneMap {
     joints: BTreeMap<String, usize>,
+    /// Bones that were found by the structure of the skeleton instead of a name.
+    by_structure: BTreeSet<String>,
 }
 
 impl BoneMap {
-    /// Finds the joints by name; the chest is the joint that carries both arms and the neck.
+    /// The complete map of [`Self::draft`].
     ///
     /// # Errors
-    /// No joint name matches the hips, an arm, forearm or hand.
+    /// Those of [`Self::check`].
     pub fn detect(rig: &UserRig) -> Result<Self> {
-        // Empty names exclude joints that cannot move.
-        let names: Vec<&str> =
-            rig.joints.iter().map(|joint| if joint.moves { joint.name.as_str() } else { "" }).collect();
-        let mut joints: BTreeMap<String, usize> = bone_names::match_names(&names).into_iter().collect();
+        let map = Self::draft(rig);
+        map.check(rig)?;
+        Ok(map)
+    }
+
+    /// Finds the joints as far as possible; the chest is the joint that carries both arms and the neck.
+    pub fn draft(rig: &UserRig) -> Self {
+        let positions = rig.standing_pose();
+        let joint = |(n, at): (usize, &JointTransform)| MatchJoint {
+            name: &rig.joints[n].name,
+            parent: rig.joints[n].parent,
+            position: at.position,
+            moves: rig.joints[n].moves,
+        };
+        let named: Vec<MatchJoint> = positions.iter().enumerate().map(joint).collect();
+        let matched = match rig.humanoid.is_empty() {
+            true => MatchedJoints::by_name(&named, &REQUIRED),
+            false => MatchedJoints::with_named(rig.humanoid.clone(), &named, &REQUIRED),
+        };
+        let MatchedJoints { mut joints, by_structure } = matched;
         if let Some(chest) = chest(rig, &joints) {
             joints.insert("Chest".to_owned(), chest);
         }
-        Self { joints }.checked(rig)
+        Self { joints, by_structure }
     }
 
     /// Parses the text of a map.
     ///
     /// # Errors
-    /// The text is not TOML, names a bone or joint that does not exist, or lacks a required bone.
+    /// The text is not TOML, or names a bone or joint that does not exist; those of [`Self::check`].
     pub fn parse(text: &str, rig: &UserRig, ours: &Skeleton) -> Result<Self> {
         let table: BTreeMap<String, String> =
             toml::from_str(text).context("expected lines like LeftArm = \"upperarm_l\"")?;
@@ -51,18 +70,30 @@ impl BoneMap {
             let joint = found.with_context(|| format!("{own}: the skeleton has no joint {name}; {}", listed(rig)))?;
             joints.insert(own, joint);
         }
-        Self { joints }.checked(rig)
+        let map = Self { joints, by_structure: BTreeSet::new() };
+        map.check(rig)?;
+        Ok(map)
     }
 
-    /// Text of the map in the order of our bones; bones without a joint are commented out.
+    /// Text of the map in the order of our bones; bones without a joint are commented out, and joints without a bone
+    /// are listed if a required bone is missing.
     pub fn text(&self, rig: &UserRig, ours: &Skeleton) -> String {
         let line = |own: &str| match self.joint(own) {
+            Some(joint) if self.by_structure.contains(own) => {
+                format!("{own} = {:?} # found by structure, not by name\n", rig.joints[joint].name)
+            }
             Some(joint) => format!("{own} = {:?}\n", rig.joints[joint].name),
             None => format!("# {own} = \"\"\n"),
         };
         let head = "# Bone of orator = joint of your skeleton that it moves. Bones without a line move no joint.\n";
         let bones = ours.joints.iter().filter(|joint| !joint.end).map(|joint| line(&joint.name));
-        head.to_owned() + &bones.collect::<String>()
+        let mut text = head.to_owned() + &bones.collect::<String>();
+        if !self.missing().is_empty() {
+            let is_free = |n: &usize| rig.joints[*n].moves && !self.joints.values().any(|joint| joint == n);
+            let free = (0..rig.joints.len()).filter(is_free).map(|n| format!("{:?}", rig.joints[n].name));
+            text += &format!("# Joints without a bone: {}\n", free.collect::<Vec<_>>().join(" "));
+        }
+        text
     }
 
     /// Joint of the user's skeleton for one of our bones.
@@ -70,15 +101,34 @@ impl BoneMap {
         self.joints.get(own).copied()
     }
 
-    /// Number of bones that have a joint.
-    pub fn n_bones(&self) -> usize {
-        self.joints.len()
+    /// Assumptions made when matching the joints, one sentence each.
+    pub fn notes(&self) -> Vec<String> {
+        let mut notes = Vec::new();
+        if !self.by_structure.is_empty() {
+            notes.push(format!(
+                "{} found by the structure of the skeleton, since the names are unknown: check the bone map",
+                counted(self.by_structure.len(), "bone")
+            ));
+        }
+        if self.joint("Neck").is_none() {
+            notes.push("the skeleton has no neck: the middle of the shoulders takes its position".to_owned());
+        }
+        notes
     }
 
-    fn checked(self, rig: &UserRig) -> Result<Self> {
-        let missing: Vec<&str> = REQUIRED.into_iter().filter(|own| !self.joints.contains_key(*own)).collect();
+    /// Checks that the required bones have joints whose transforms can be used.
+    ///
+    /// # Errors
+    /// Hips, an arm, a forearm or a hand has no joint, the joints of an arm are not descendants of each other, or a
+    /// mapped joint or its ancestor is sheared or has a scale that is not uniform and positive.
+    pub fn check(&self, rig: &UserRig) -> Result<()> {
+        let missing = self.missing();
         if !missing.is_empty() {
-            bail!("no joint found for {}; {}; map them with --bone-map", missing.join(", "), listed(rig));
+            bail!(
+                "no joint found for {}; {}; --write-bone-map FILE writes a draft to edit and pass to --bone-map",
+                missing.join(", "),
+                listed(rig)
+            );
         }
         for side in ["Left", "Right"] {
             for (above, below) in [("Arm", "ForeArm"), ("ForeArm", "Hand")] {
@@ -90,7 +140,17 @@ impl BoneMap {
                 );
             }
         }
-        Ok(self)
+        for &joint in self.joints.values() {
+            if let Some(error) = rig.path(joint).find_map(|at| rig.joints[at].scale_error.as_ref()) {
+                bail!("{error}");
+            }
+        }
+        Ok(())
+    }
+
+    /// Required bones without a joint.
+    fn missing(&self) -> Vec<&'static str> {
+        REQUIRED.into_iter().filter(|own| !self.joints.contains_key(*own)).collect()
     }
 }
 
@@ -108,4 +168,87 @@ fn chest(rig: &UserRig, joints: &BTreeMap<String, usize>) -> Option<usize> {
 fn listed(rig: &UserRig) -> String {
     let names: Vec<&str> = rig.joints.iter().filter(|joint| joint.moves).map(|joint| joint.name.as_str()).collect();
     format!("available joints: {}", names[..names.len().min(MAX_LISTED)].join(" "))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::animate::retarget::user_rig::UserJoint;
+    use crate::animate::rig::names::Names;
+    use crate::animate::rig::rig::tests::default_rig;
+    use orator_base::math::rotation::Rotation;
+    use orator_formats::skeleton::joint_names::match_names;
+
+    /// Our skeleton at rest with other names of the joints.
+    fn renamed(rename: impl Fn(&str) -> String) -> (UserRig, Skeleton) {
+        let ours = default_rig().skeleton;
+        let joint = |(n, joint): (usize, &orator_base::motion::fk::Joint)| UserJoint {
+            name: if joint.end { format!("end{n}") } else { rename(&joint.name) },
+            parent: joint.parent,
+            offset: joint.offset,
+            rest: Rotation::IDENTITY,
+            scale: 1.0,
+            scale_error: None,
+            moves: !joint.end,
+        };
+        (UserRig { joints: ours.joints.iter().enumerate().map(joint).collect(), ..UserRig::default() }, ours)
+    }
+
+    #[test]
+    fn every_naming_convention_is_matched_completely() {
+        let rig = default_rig().skeleton;
+        for names in Names::ALL {
+            let file_names = names.of(&rig);
+            let file_names: Vec<&str> = file_names.iter().map(String::as_str).collect();
+            let found = match_names(&file_names);
+            let expected = rig.joints.iter().filter(|joint| !joint.end && joint.name != "Chest").count();
+            assert_eq!(found.len(), expected, "{names:?}");
+            for (own, joint) in found {
+                assert_eq!(rig.joints[joint].name, own, "{names:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_draft_of_unknown_names_marks_what_the_structure_shows() {
+        let (rig, ours) = renamed(|_| "joint".to_owned());
+        let map = BoneMap::detect(&rig).unwrap();
+        for own in
+            REQUIRED.into_iter().chain(["Spine", "Chest", "Neck", "Head", "LeftShoulder", "RightUpLeg", "LeftFoot"])
+        {
+            assert_eq!(map.joint(own), ours.find(own), "{own}");
+        }
+        let text = map.text(&rig, &ours);
+        assert!(text.contains("# found by structure") && !text.contains("Joints without"), "{text}");
+        assert!(map.notes()[0].contains("by the structure"), "{:?}", map.notes());
+    }
+
+    #[test]
+    fn a_draft_without_a_required_bone_lists_the_joints() {
+        let (mut rig, ours) = renamed(|name| name.replace("RightForeArm", "Crank"));
+        // Arms of different lengths have no common structure.
+        rig.joints[ours.find("RightForeArm").unwrap()].offset = [-90.0, 0.0, 0.0];
+        let map = BoneMap::draft(&rig);
+        let text = map.text(&rig, &ours);
+        assert!(
+            text.contains("# RightForeArm = \"\"\n") && text.contains("# Joints without a bone: \"Crank\"\n"),
+            "{text}"
+        );
+        let error = BoneMap::detect(&rig).unwrap_err().to_string();
+        assert!(error.contains("no joint found for RightForeArm") && error.contains("--write-bone-map"), "{error}");
+        let edited = text.replace("# RightForeArm = \"\"", "RightForeArm = \"Crank\"");
+        assert_eq!(BoneMap::parse(&edited, &rig, &ours).unwrap().joint("RightForeArm"), ours.find("RightForeArm"));
+    }
+
+    #[test]
+    fn a_scale_counts_only_on_mapped_joints_and_their_ancestors() {
+        let (mut rig, ours) = renamed(|name| name.replace("Head", "Crown"));
+        rig.joints[ours.find("Head").unwrap()].scale_error = Some("scale 1, 2, 1 of Crown".to_owned());
+        BoneMap::detect(&rig).unwrap();
+        rig.joints[ours.find("LeftShoulder").unwrap()].scale_error = Some("scale 1, 2, 1 of LeftShoulder".to_owned());
+        let error = BoneMap::detect(&rig).unwrap_err().to_string();
+        assert!(error.contains("of LeftShoulder"), "{error}");
+        let (rig, _) = renamed(|name| name.replace("Neck", "Pole"));
+        assert!(BoneMap::detect(&rig).unwrap().notes()[0].contains("the middle of the shoulders"));
+    }
 }

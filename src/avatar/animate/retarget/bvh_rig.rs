@@ -42,9 +42,11 @@ impl BvhRig {
             offset: joint.offset,
             rest: Rotation::IDENTITY,
             scale: 1.0,
+            scale_error: None,
             moves: !joint.channels.is_empty(),
         };
-        UserRig { joints: self.skeleton.joints.iter().map(joint).collect(), standing_pose: self.local(&self.first) }
+        let joints = self.skeleton.joints.iter().map(joint).collect();
+        UserRig { joints, standing_pose: self.local(&self.first), ..UserRig::default() }
     }
 
     /// Text of the file with new motion: the local rotations of all joints for each frame.

@@ -14,6 +14,7 @@ use orator_base::math::vec3::{Vec3, norm, scale, sub, unit};
 use orator_formats::bvh::read::{Bvh, Positions};
 use orator_formats::bvh::write::BvhClip;
 use orator_formats::mocap;
+use orator_formats::mocap::facing::LengthUnit;
 use serde::Serialize;
 use std::ops::Range;
 use std::path::Path;
@@ -75,23 +76,23 @@ struct CapturedBone {
 
 impl CapturedBody {
     /// Reads the body of a .bvh file; `None` for other files, and if hips, trunk or arms are not found by name, a joint
-    /// does not have three rotation channels, or a value is not finite.
+    /// does not have three rotation channels, or a value is not finite. Without `units`, the unit is detected.
     ///
     /// # Errors
     /// The file is unreadable or not BVH.
-    pub fn read(path: &Path) -> Result<Option<Self>> {
+    pub fn read(path: &Path, units: Option<LengthUnit>) -> Result<Option<Self>> {
         let is_bvh = path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("bvh"));
-        Ok(if is_bvh { Self::from_bvh(&Bvh::read(path)?) } else { None })
+        Ok(if is_bvh { Self::from_bvh(&Bvh::read(path)?, units) } else { None })
     }
 
-    fn from_bvh(bvh: &Bvh) -> Option<Self> {
+    fn from_bvh(bvh: &Bvh, units: Option<LengthUnit>) -> Option<Self> {
         let file = BvhRig::new(bvh).ok()?;
         let user = file.rig();
         let map = BoneMap::detect(&user).ok()?;
         let reference = ReferencePose::of(&user, &map).ok()?;
         let bones = captured_bones(&map)?;
         let positions = bvh.positions(Positions::Auto);
-        let alignment = mocap::bvh::unrotated_alignment(bvh, &positions).ok()?;
+        let alignment = mocap::bvh::unrotated_alignment(bvh, &positions, units).ok()?;
         let (axes, cm) = (alignment.rotation(), alignment.metres * CM);
         let bone_at =
             |t: usize, from: usize, to: usize| axes.turn(scale(sub(positions[t][to], positions[t][from]), cm));
@@ -202,17 +203,21 @@ impl CapturedBody {
 /// Bones of ours that the mapped joints move; `None` without a trunk.
 fn captured_bones(map: &BoneMap) -> Option<Vec<CapturedBone>> {
     let bone = |part, ours, joint, to| CapturedBone { part, ours, joint, to };
-    let (hips, neck) = (map.joint("Hips")?, map.joint("Neck")?);
+    let (hips, neck) = (map.joint("Hips")?, map.joint("Neck"));
     let spine = map.joint("Spine").or(map.joint("Chest"))?;
     let chest = map.joint("Chest").unwrap_or(spine);
-    let above = if spine == chest { neck } else { chest };
+    let above = if spine == chest { neck } else { Some(chest) };
+    // Without a neck, the bone below it takes the rotation of its joint alone.
+    let up_to = |joint: Option<usize>| joint.map(|joint| (joint, UP));
     let mut bones = vec![
         bone(CapturedPart::Spine, "Hips", hips, None),
-        bone(CapturedPart::Spine, "Spine", spine, Some((above, UP))),
-        bone(CapturedPart::Spine, "Chest", chest, Some((neck, UP))),
+        bone(CapturedPart::Spine, "Spine", spine, up_to(above)),
+        bone(CapturedPart::Spine, "Chest", chest, up_to(neck)),
     ];
     if let Some(head) = map.joint("Head") {
-        bones.push(bone(CapturedPart::Head, "Neck", neck, Some((head, UP))));
+        if let Some(neck) = neck {
+            bones.push(bone(CapturedPart::Head, "Neck", neck, up_to(Some(head))));
+        }
         bones.push(bone(CapturedPart::Head, "Head", head, None));
     }
     let leg = |names: [&'static str; 3]| {

@@ -1,21 +1,24 @@
-//! A user's skeleton in a GLB file, and the file with an animation appended; nodes, meshes and animations are
-//! preserved.
+//! A user's skeleton in a GLB or VRM file, and the file with an animation appended; nodes, meshes and animations are
+//! preserved, but moved nodes with a matrix get translation, rotation and scale, since glTF animates only these.
 
 use super::user_rig::{UserJoint, UserRig};
 use crate::animate::export::glb::{BufferUse, GlbBuffer};
 use crate::animate::export::glb_scene::with_continuous_signs;
 use anyhow::{Context as _, Result, ensure};
 use orator_base::math::rotation::Rotation;
-use orator_base::math::vec3::Vec3;
+use orator_base::math::vec3::{Vec3, cross, dot, norm, unit};
 use orator_base::text::number;
 use orator_base::types::time::FrameRate;
 use orator_formats::bvh::read::MAX_JOINTS;
+use orator_formats::skeleton::joint_names;
 use serde::Deserialize;
 use serde_json::{Value, json};
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// Maximum relative difference of the three scale factors of a node.
 const MAX_SCALE_DIFFERENCE: f64 = 1e-3;
+/// Maximum cosine of the angle between two axes of a matrix without shear.
+const MAX_SHEAR: f64 = 1e-3;
 /// Maximum size of the scene's JSON, which takes several times as much memory once parsed, bytes.
 const MAX_SCENE_BYTES: u32 = 32 << 20;
 
@@ -33,8 +36,7 @@ impl GlbRig {
     /// Parses a file.
     ///
     /// # Errors
-    /// The bytes are not a GLB file, buffers are in other files, the nodes do not form a tree, or a node is scaled
-    /// non-uniformly or has a matrix.
+    /// The bytes are not a GLB file, buffers are in other files, or the nodes do not form a tree.
     pub fn new(file: &[u8]) -> Result<Self> {
         let (scene, bytes) = chunks(file)?;
         let buffers = scene["buffers"].as_array().map_or(0, Vec::len);
@@ -50,6 +52,11 @@ impl GlbRig {
         let skin_joints = list("skins").flat_map(|skin| skin["joints"].as_array().into_iter().flatten());
         let skin_joints: BTreeSet<u64> = skin_joints.filter_map(Value::as_u64).collect();
         let has_skin = list("skins").next().is_some();
+        let bone_nodes = humanoid_nodes(&scene);
+        let may_move = |node: usize| {
+            let is_bone = bone_nodes.iter().any(|(_, bone)| *bone == node);
+            !has_skin || skin_joints.contains(&(node as u64)) || is_bone
+        };
         let mut is_child = vec![false; nodes.len()];
         for &child in nodes.iter().flat_map(|node| &node.children) {
             let has_parent = is_child.get_mut(child).with_context(|| format!("child node {child} does not exist"))?;
@@ -61,12 +68,19 @@ impl GlbRig {
         let (mut order, mut joints) = (Vec::new(), Vec::new());
         while let Some((node, parent)) = stack.pop() {
             let at = joints.len();
-            joints.push(nodes[node].joint(node, parent, !has_skin || skin_joints.contains(&(node as u64)))?);
+            joints.push(nodes[node].joint(node, parent, may_move(node))?);
             order.push(node);
             stack.extend(nodes[node].children.iter().rev().map(|&child| (child, Some(at))));
         }
         ensure!(joints.len() == nodes.len(), "the nodes do not form a tree");
-        Ok(Self { nodes: order, rig: UserRig { joints, standing_pose: Vec::new() }, scene, bytes })
+        let bone_names: Vec<&str> = bone_nodes.iter().map(|(name, _)| *name).collect();
+        let assigned = joint_names::match_names(&bone_names).into_iter();
+        let joint_of = |(own, bone): (String, usize)| {
+            let joint = order.iter().position(|node| *node == bone_nodes[bone].1)?;
+            Some((own, joint))
+        };
+        let humanoid: BTreeMap<String, usize> = assigned.filter_map(joint_of).collect();
+        Ok(Self { rig: UserRig { joints, humanoid, ..UserRig::default() }, nodes: order, scene, bytes })
     }
 
     /// The skeleton at rest.
@@ -97,6 +111,7 @@ impl GlbRig {
             let input = buffer.floats(&times, "SCALAR", BufferUse::Other);
             let (mut samplers, mut channels) = (Vec::new(), Vec::new());
             for (joint, track) in tracks {
+                self.decompose(joint, &mut scene);
                 let output = buffer.floats(&with_continuous_signs(track.into_iter()), "VEC4", BufferUse::Other);
                 let target = json!({ "node": self.nodes[joint], "path": "rotation" });
                 channels.push(json!({ "sampler": samplers.len(), "target": target }));
@@ -110,6 +125,27 @@ impl GlbRig {
         }
         buffer.file(scene)
     }
+
+    /// Replaces the matrix of a joint's node, if there is one, by translation, rotation and scale.
+    fn decompose(&self, joint: usize, scene: &mut Value) {
+        let Some(node) = scene["nodes"][self.nodes[joint]].as_object_mut() else { return };
+        if node.remove("matrix").is_some() {
+            let UserJoint { offset, rest: Rotation { w, v: [x, y, z] }, scale, .. } = self.rig.joints[joint];
+            node.insert("translation".to_owned(), json!(offset));
+            node.insert("rotation".to_owned(), json!([x, y, z, w]));
+            node.insert("scale".to_owned(), json!([scale, scale, scale]));
+        }
+    }
+}
+
+/// Nodes that a VRM file (1.0 or 0.x) assigns to humanoid bones, with the names of these bones.
+fn humanoid_nodes(scene: &Value) -> Vec<(&str, usize)> {
+    let node = |bone: &Value| bone["node"].as_u64().map(|node| node as usize);
+    let bones = |extension: &str| &scene["extensions"][extension]["humanoid"]["humanBones"];
+    let current = bones("VRMC_vrm").as_object().into_iter().flatten();
+    let former = bones("VRM").as_array().into_iter().flatten();
+    let current = current.filter_map(|(name, bone)| Some((name.as_str(), node(bone)?)));
+    current.chain(former.filter_map(|bone| Some((bone["bone"].as_str()?, node(bone)?)))).collect()
 }
 
 /// Splits a GLB file into its scene and its binary data.
@@ -148,7 +184,8 @@ fn parsed_chunks(file: &[u8]) -> Option<(Value, Vec<u8>)> {
 struct SceneNode {
     name: Option<String>,
     children: Vec<usize>,
-    matrix: Option<Value>,
+    /// Columns of the local transform.
+    matrix: Option<[f64; 16]>,
     translation: Vec3,
     rotation: [f64; 4],
     scale: Vec3,
@@ -164,21 +201,76 @@ impl Default for SceneNode {
 impl SceneNode {
     fn joint(&self, index: usize, parent: Option<usize>, moves: bool) -> Result<UserJoint> {
         let name = self.name.clone().unwrap_or_else(|| format!("node {index}"));
-        let is_plain = self.matrix.is_none();
-        ensure!(is_plain, "{name} has a matrix: export the file with translation, rotation and scale");
-        let [x, y, z, w] = self.rotation;
-        let length = (x * x + y * y + z * z + w * w).sqrt();
-        ensure!(length > 1e-6, "invalid rotation {:?} of {name}: expected a unit quaternion", self.rotation);
-        let rest = Rotation { w: w / length, v: [x / length, y / length, z / length] };
-        let [x, y, z] = self.scale;
+        let (offset, rest, factors, is_sheared) = match &self.matrix {
+            Some(matrix) => decomposed(matrix),
+            None => {
+                let [x, y, z, w] = self.rotation;
+                let length = (x * x + y * y + z * z + w * w).sqrt();
+                ensure!(length > 1e-6, "invalid rotation {:?} of {name}: expected a unit quaternion", self.rotation);
+                let rest = Rotation { w: w / length, v: [x / length, y / length, z / length] };
+                (self.translation, rest, self.scale, false)
+            }
+        };
+        let [x, y, z] = factors;
         let is_uniform = (x - y).abs().max((x - z).abs()) <= MAX_SCALE_DIFFERENCE * x.abs();
-        ensure!(
-            is_uniform && x > 0.0,
-            "scale {}, {}, {} of {name}: expected a uniform positive scale; apply the scale and export again",
-            number(x),
-            number(y),
-            number(z)
-        );
-        Ok(UserJoint { name, parent, offset: self.translation, rest, scale: x, moves })
+        let scale_error = (is_sheared || !is_uniform || x <= 0.0).then(|| {
+            format!(
+                "scale {}, {}, {}{} of {name}: expected a uniform positive scale of the bones and their parents; apply \
+                 the scale and export again",
+                number(x),
+                number(y),
+                number(z),
+                if is_sheared { " with shear" } else { "" }
+            )
+        });
+        Ok(UserJoint { name, parent, offset, rest, scale: x, scale_error, moves })
+    }
+}
+
+/// Translation, rotation, scale factors of a matrix, and whether its axes are not perpendicular. The factors of a
+/// reflection are negative.
+fn decomposed(matrix: &[f64; 16]) -> (Vec3, Rotation, Vec3, bool) {
+    let column = |k: usize| [matrix[4 * k], matrix[4 * k + 1], matrix[4 * k + 2]];
+    let columns = [0, 1, 2].map(column);
+    let sign = if dot(cross(columns[0], columns[1]), columns[2]) < 0.0 { -1.0 } else { 1.0 };
+    let factors = columns.map(|axis| sign * norm(axis));
+    let [x, y, z] = columns.map(|axis| unit(axis, 0.0).unwrap_or_default().map(|v| sign * v));
+    let is_sheared = [dot(x, y), dot(y, z), dot(z, x)].iter().any(|cos| cos.abs() > MAX_SHEAR);
+    (column(3), Rotation::from_axes(x, y, z), factors, is_sheared)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use orator_base::math::vec3::{scale, sub};
+
+    /// Matrix of the images of the axes and of the origin.
+    fn matrix(axes: [Vec3; 3], origin: Vec3) -> [f64; 16] {
+        let columns = [axes[0], axes[1], axes[2], origin];
+        std::array::from_fn(|n| match n % 4 {
+            3 => f64::from(u8::from(n == 15)),
+            row => columns[n / 4][row],
+        })
+    }
+
+    #[test]
+    fn a_matrix_is_decomposed_and_shear_and_reflections_are_found() {
+        for n in 0..40 {
+            let angles = [0.4, -0.7, 1.1].map(|step| step * f64::from(n));
+            let turn = Rotation::from_euler([2, 0, 1], angles);
+            let factor = 0.01 + 0.3 * f64::from(n);
+            let (offset, rest, factors, is_sheared) =
+                decomposed(&matrix(turn.axes().map(|axis| scale(axis, factor)), [1.0, -2.0, f64::from(n)]));
+            assert_eq!((offset, is_sheared), ([1.0, -2.0, f64::from(n)], false));
+            assert!(factors.iter().all(|found| (found - factor).abs() < 1e-9 * factor), "{factors:?}");
+            for v in [[1.0, 2.0, -0.5], [0.0, 0.3, 4.0]] {
+                assert!(norm(sub(rest.turn(v), turn.turn(v))) < 1e-9, "{rest:?} {turn:?}");
+            }
+        }
+        let [x, y, z] = [[2.0, 0.0, 0.0], [0.0, 2.0, 0.0], [0.0, 0.0, 2.0]];
+        assert_eq!(decomposed(&matrix([scale(x, -1.0), y, z], [0.0; 3])).2, [-2.0; 3]);
+        assert!(decomposed(&matrix([x, [0.5, 2.0, 0.0], z], [0.0; 3])).3);
+        let (_, rest, factors, _) = decomposed(&[0.0; 16]);
+        assert!(rest.w.is_finite() && rest.v.iter().all(|v| v.is_finite()) && factors == [0.0; 3]);
     }
 }

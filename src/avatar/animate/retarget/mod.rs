@@ -2,7 +2,6 @@
 //! directions and wrist positions.
 
 pub mod bone_map;
-pub mod bone_names;
 pub mod bvh_rig;
 pub mod captured_body;
 pub mod glb_rig;

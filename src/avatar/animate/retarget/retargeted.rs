@@ -18,6 +18,8 @@ use std::path::Path;
 pub struct RetargetRig {
     file: RigFile,
     rig: UserRig,
+    /// Whether the file is a VRM avatar.
+    is_vrm: bool,
 }
 
 #[derive(Clone, Debug)]
@@ -27,7 +29,7 @@ enum RigFile {
 }
 
 impl RetargetRig {
-    /// Reads a .bvh or .glb file.
+    /// Reads a .bvh, .glb or .vrm file.
     ///
     /// # Errors
     /// The file cannot be read, or contains no usable skeleton.
@@ -35,18 +37,18 @@ impl RetargetRig {
         let invalid_rig = || format!("{} has no usable skeleton", path.display());
         let file = match extension(path).as_str() {
             "bvh" => RigFile::Bvh(BvhRig::new(&Bvh::read(path)?).with_context(invalid_rig)?),
-            "glb" => {
+            "glb" | "vrm" => {
                 let bytes =
                     input::read(path, input::MAX_DATA).with_context(|| format!("cannot read {}", path.display()))?;
                 RigFile::Glb(GlbRig::new(&bytes).with_context(invalid_rig)?)
             }
-            _ => bail!("{}: unsupported skeleton format: expected .bvh or .glb", path.display()),
+            _ => bail!("{}: unsupported skeleton format: expected .bvh, .glb or .vrm", path.display()),
         };
         let rig = match &file {
             RigFile::Bvh(bvh) => bvh.rig(),
             RigFile::Glb(glb) => glb.rig().clone(),
         };
-        Ok(Self { file, rig })
+        Ok(Self { file, rig, is_vrm: extension(path) == "vrm" })
     }
 
     /// Its joints at rest.
@@ -54,13 +56,14 @@ impl RetargetRig {
         &self.rig
     }
 
-    /// Checks that `path` has the same extension as the skeleton's own file.
+    /// Checks that `path` has the same extension as the skeleton's own file; a VRM avatar may also be written as .glb.
     ///
     /// # Errors
     /// The extensions differ.
     pub fn check_output(&self, path: &Path) -> Result<()> {
         let own = match self.file {
             RigFile::Bvh(_) => "bvh",
+            RigFile::Glb(_) if self.is_vrm && extension(path) == "vrm" => "vrm",
             RigFile::Glb(_) => "glb",
         };
         ensure!(extension(path) == own, "{}: expected a .{own} file, the format of the skeleton", path.display());

@@ -2,6 +2,7 @@
 
 use orator_base::math::rotation::Rotation;
 use orator_base::math::vec3::{Vec3, add, scale};
+use std::collections::BTreeMap;
 
 /// A joint of a user's skeleton.
 #[derive(Clone, Debug, PartialEq)]
@@ -15,6 +16,8 @@ pub struct UserJoint {
     pub rest: Rotation,
     /// Scale factor of the joint's descendants, relative to its parent.
     pub scale: f64,
+    /// Why the transform of the joint cannot be used, if its scale is not uniform and positive.
+    pub scale_error: Option<String>,
     /// Whether the joint may be animated; false for bone ends, cameras and meshes.
     pub moves: bool,
 }
@@ -35,6 +38,8 @@ pub struct UserRig {
     /// Local rotations of a pose that is upright in the world of the file, since a zero pose may lie down. Empty if the
     /// rest pose is to be used.
     pub standing_pose: Vec<Rotation>,
+    /// Joints that the file itself assigns to our bones; empty to match them by name.
+    pub humanoid: BTreeMap<String, usize>,
 }
 
 impl UserRig {
@@ -74,6 +79,11 @@ impl UserRig {
 
     /// Whether `joint` is a descendant of `above`.
     pub fn is_below(&self, joint: usize, above: usize) -> bool {
-        std::iter::successors(self.joints[joint].parent, |&at| self.joints[at].parent).any(|at| at == above)
+        self.path(joint).skip(1).any(|at| at == above)
+    }
+
+    /// A joint and its ancestors.
+    pub fn path(&self, joint: usize) -> impl Iterator<Item = usize> {
+        std::iter::successors(Some(joint), |&at| self.joints[at].parent)
     }
 }

@@ -1,6 +1,7 @@
 //! Matching of files by name: ground truth, prediction and sound of each clip. No file is opened here.
 
 use anyhow::{Context, Result, bail, ensure};
+use orator_base::text::composed;
 use orator_dataset::config::patterns::{self, SOUND_EXTENSIONS, VIDEO_EXTENSIONS};
 use orator_formats::mocap::motion_file;
 use std::collections::BTreeMap;
@@ -144,9 +145,9 @@ fn by_key(files: impl IntoIterator<Item = PathBuf>) -> Result<BTreeMap<String, P
     Ok(named)
 }
 
-/// Clip name of a file: its stem without the prefix for ground truth or prediction.
+/// Clip name of a file: its stem, with composed letters and without the prefix for ground truth or prediction.
 fn key(path: &Path) -> String {
-    let stem = stem(path);
+    let stem = composed(&stem(path));
     let start = TRUTH.iter().chain(&PREDICTION).find(|start| stem.starts_with(**start) && stem.len() > start.len());
     start.map_or(stem.as_str(), |start| &stem[start.len()..]).to_owned()
 }

@@ -9,7 +9,8 @@ use orator_base::stage::fingerprint::hash_file;
 use orator_base::types::sound::Sound;
 use orator_formats::bvh::exponential_maps::{ExponentialMaps, FPS, JointMapping};
 use orator_formats::bvh::read::Bvh;
-use orator_formats::transcript::{ENDINGS, Transcript, after_end};
+use orator_formats::search::NamedFiles;
+use orator_formats::transcript::{ENDINGS, TranscriptChoice, after_end};
 use orator_media::ffmpeg::{audio, probe};
 use rayon::prelude::*;
 use std::path::{Path, PathBuf};
@@ -28,7 +29,7 @@ pub struct CaptureFolder {
 struct Capture {
     bvh: PathBuf,
     wav: PathBuf,
-    transcript: Option<PathBuf>,
+    transcript: TranscriptChoice,
     is_held_out: bool,
 }
 
@@ -42,13 +43,16 @@ impl CaptureFolder {
         let entries = std::fs::read_dir(dir).with_context(|| format!("cannot list {}", dir.display()))?;
         let paths = entries.map(|entry| Ok(entry?.path())).collect::<Result<Vec<PathBuf>>>()?;
         let of_kind = |kind: &'static str| paths.iter().filter(move |path| has_ending(path, kind));
-        if let Some(wav) = of_kind("wav").find(|wav| !paths.contains(&wav.with_extension("bvh"))) {
+        let mut named = NamedFiles::default();
+        let mut beside = |path: &Path, endings: &[&str]| named.find(dir, &[&stem(path)], endings);
+        if let Some(wav) = of_kind("wav").find(|wav| beside(wav, &["bvh"]).is_empty()) {
             bail!("{} has no motion: {} does not exist", wav.display(), wav.with_extension("bvh").display());
         }
         let capture = |bvh: &PathBuf| -> Result<Capture> {
-            let wav = bvh.with_extension("wav");
-            ensure!(paths.contains(&wav), "{} has no audio: {} does not exist", bvh.display(), wav.display());
-            let transcript = ENDINGS.iter().map(|ending| bvh.with_extension(ending)).find(|path| paths.contains(path));
+            let wav = beside(bvh, &["wav"]).into_iter().next().with_context(|| {
+                format!("{} has no audio: {} does not exist", bvh.display(), bvh.with_extension("wav").display())
+            })?;
+            let transcript = TranscriptChoice::first(&beside(bvh, &ENDINGS), "", |_, _| Ok(()));
             let is_held_out = hold_out.contains(&stem(bvh));
             Ok(Capture { bvh: bvh.clone(), wav, transcript, is_held_out })
         };
@@ -84,7 +88,8 @@ impl CaptureFolder {
     /// Hash of the names and contents of all files, and of which of them are held out.
     pub fn hash(&self) -> Result<String> {
         let line = |capture: &Capture| -> Result<String> {
-            let files = [Some(&capture.bvh), Some(&capture.wav), capture.transcript.as_ref()].into_iter().flatten();
+            let transcript = capture.transcript.found.as_ref().map(|(path, _)| path);
+            let files = [Some(&capture.bvh), Some(&capture.wav), transcript].into_iter().flatten();
             let line = |path: &PathBuf| {
                 let name = path.file_name().unwrap_or_default().to_string_lossy();
                 Ok(format!("{name} {} {}\n", hash_file(path)?, capture.is_held_out))
@@ -117,25 +122,27 @@ impl CaptureFolder {
         Ok(SequenceSplits { train, held_out, notes })
     }
 
-    /// Sequence of a capture, and warnings about its transcript.
+    /// Sequence of a capture, and notes on its motion and its transcript.
     fn sequence(
         &self,
         capture: &Capture,
         maps: &ExponentialMaps,
         context: usize,
     ) -> Result<(PoseSequence, Vec<String>)> {
-        let poses = maps.features(&Bvh::read(&capture.bvh)?).with_context(|| capture.bvh.display().to_string())?;
+        let bvh = Bvh::read(&capture.bvh)?;
+        let poses = maps.features(&bvh).with_context(|| capture.bvh.display().to_string())?;
         let sound = read_sound(&capture.wav, self.rate)?;
         let n = poses.nrows().min(mfcc::n_poses(sound.samples.len(), sound.rate, FPS.per_sec()));
         let audio = architecture::audio_features(&sound, FPS, n, n, context);
-        let Transcript { words, mut notes, .. } =
-            capture.transcript.as_deref().map(Transcript::read).transpose()?.unwrap_or_default();
-        notes.extend(after_end(&words, sound.secs()));
-        let named = |note: String| match &capture.transcript {
-            Some(path) => format!("{}: {note}", path.display()),
-            None => note,
-        };
-        let notes = notes.into_iter().map(named).collect();
+        let TranscriptChoice { found, mut notes, .. } = capture.transcript.clone();
+        let words = found.map_or_else(Vec::new, |(path, transcript)| {
+            let named = |note: String| format!("{}: {note}", path.display());
+            let after_end = after_end(&transcript.words, sound.secs());
+            notes.extend(transcript.notes.into_iter().chain(after_end).map(named));
+            transcript.words
+        });
+        let of_bvh = bvh.notes.iter().map(|note| format!("{}: {note}", capture.bvh.display()));
+        let notes = of_bvh.chain(notes).collect();
         let poses = poses.slice(s![..n, ..]).to_owned();
         Ok((PoseSequence::new(poses, Array2::from_elem((n, maps.n_columns()), true), audio, words), notes))
     }
@@ -146,7 +153,7 @@ fn read_sound(path: &Path, rate: u32) -> Result<Sound> {
 }
 
 fn has_ending(path: &Path, kind: &str) -> bool {
-    path.extension().is_some_and(|ending| ending == kind)
+    path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case(kind))
 }
 
 fn stem(path: &Path) -> String {
