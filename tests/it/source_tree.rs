@@ -13,8 +13,8 @@ const SIBLINGS: [(&str, &[&str]); 2] = [
     ("src/media", &["ffmpeg", "opencv", "aligner"]),
 ];
 
-/// Crates whose code is not part of the product.
-const NOT_PRODUCT: [&str; 2] = ["src/lab/", "src/test-support/"];
+/// Folders whose code is not part of the product.
+const NOT_PRODUCT: [&str; 2] = ["src/lab/", "tests/"];
 
 /// Names that several types may have.
 const COMMON_NAMES: [&str; 3] = ["Args", "Config", "Cli"];
@@ -40,7 +40,11 @@ fn assert_none(violations: &[String]) {
 /// Manifests of the root package and of all members: path relative to the repository, and names of dependencies.
 fn manifests() -> Vec<(String, BTreeSet<String>)> {
     let members = fs::read_dir(root().join("src")).unwrap().map(|entry| entry.unwrap().path().join("Cargo.toml"));
-    let files = std::iter::once(root().join("Cargo.toml")).chain(members).filter(|file| file.is_file());
+    let files = ["Cargo.toml", "tests/support/Cargo.toml"]
+        .map(|file| root().join(file))
+        .into_iter()
+        .chain(members)
+        .filter(|file| file.is_file());
     let read = |file: PathBuf| {
         let manifest: toml::Table = fs::read_to_string(&file).unwrap().parse().unwrap();
         let dependencies = manifest.get("dependencies").and_then(toml::Value::as_table);

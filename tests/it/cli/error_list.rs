@@ -10,7 +10,7 @@ const CALLS: [&str; 8] =
     ["bail!(", "ensure!(", "anyhow!(", ".context(", ".with_context(", "Err(format!(", "Error::new(", ".problem("];
 
 /// Crates whose errors no user of `orator` meets.
-const OTHER: [&str; 2] = ["src/lab/", "src/test-support/"];
+const OTHER: [&str; 2] = ["src/lab/", "tests/support/"];
 
 /// End of the call whose arguments begin at `start`.
 fn end_of_call(code: &str, start: usize) -> usize {
