@@ -5,12 +5,13 @@
 # make test-data   the tests that the last `make test` skipped, with the real data and models in ORATOR_DATA
 # make prove   the long-running tests and the benchmarks
 # make build   target/release/orator and target/release/orator-lab
+# make dist    a Python wheel and relocatable archives in target/dist, with all libraries and licences
 # Requires Debian 12 (x86-64) and Rust. The scripts in .ci/setup install all other dependencies.
 
 SHELL := /bin/bash
 .SHELLFLAGS := -euo pipefail -c
 .DEFAULT_GOAL := build
-.PHONY: spelling test-data setup runtime models readers aligner browser blender validator vrm driver loader build check test prove prove-rule prove-people prove-cluster prove-study demo demo-study clean-demo
+.PHONY: spelling test-data setup runtime models readers aligner browser blender validator vrm driver loader build dist check test prove prove-dist prove-rule prove-people prove-cluster prove-study demo demo-study clean-demo
 
 TARGET := $(or $(CARGO_TARGET_DIR),target)
 ORATOR := $(TARGET)/release/orator
@@ -37,6 +38,9 @@ models: build ; @.ci/setup/models.sh
 build: setup runtime
 	cargo build --release --locked --workspace
 
+dist: build
+	.ci/dist
+
 # Integration tests that do not start other programs or load ONNX Runtime and take a few seconds.
 QUICK := source_tree:: wording:: vocabulary:: lift:: segment::segment cli::guide cli::completions animate::animate:: animate::bvh animate::motion_files \
 	dataset::shard:: dataset::dataset_verify dataset::import_readers evaluate::metrics evaluate::golden_metrics \
@@ -48,12 +52,13 @@ check:
 	cargo test --release --locked --workspace --lib --bins
 	cargo test --release --locked --test it -- $(QUICK)
 
-test: build models readers aligner browser blender validator vrm driver spelling
+test: dist models readers aligner browser blender validator vrm driver spelling
 	@rm -f $(SKIPPED)
 	cargo fmt --check
 	$(ORATOR_SPELLING)/bin/typos
 	cargo clippy --release --locked --workspace --all-targets -- -D warnings
 	cargo test --release --locked --workspace
+	.ci/prove-dist
 	$(MAKE) demo DEMO=$(TARGET)/demo-test DRAW= STEPS=30 SPEECH=1
 	@if [ -s $(SKIPPED) ]; then echo 'skipped tests:'; sort -u $(SKIPPED); else echo 'no test was skipped'; fi
 	@echo 'make test: all passed'
@@ -66,6 +71,12 @@ test-data: build
 
 prove prove-rule prove-people prove-cluster: build models aligner loader
 	.ci/$@
+
+prove: prove-dist
+
+# The wheel and the archives in bare Debian 12 and 13, and a second build. Requires root.
+prove-dist: dist
+	.ci/prove-dist --full
 
 # The study analysis on simulated studies: coverage of the intervals, error rates of the tests, power.
 prove-study:

@@ -72,8 +72,8 @@ impl Runtime {
     }
 }
 
-/// Path of the library: `explicit`, or else the variable ORT_DYLIB_PATH, or else a `lib` folder in the program's
-/// folder or one of its ancestors, or else the `lib` folder of the models.
+/// Path of the library: `explicit`, or else the variable ORT_DYLIB_PATH, or else a folder `lib/orator` (of `make dist`)
+/// or `lib` in the program's folder or one of its ancestors, or else the `lib` folder of the models.
 pub fn find_library(explicit: &Path, models_dir: &Path) -> Result<PathBuf> {
     if !explicit.as_os_str().is_empty() {
         if explicit.is_file() {
@@ -88,7 +88,7 @@ pub fn find_library(explicit: &Path, models_dir: &Path) -> Result<PathBuf> {
         bail!("{VARIABLE}: {} is not a file; set it to the path of {LIBRARY}", named.display());
     }
     let program = std::env::current_exe().and_then(std::fs::canonicalize).unwrap_or_default();
-    let lib_folders = program.ancestors().skip(1).map(|folder| folder.join("lib"));
+    let lib_folders = program.ancestors().skip(1).flat_map(|folder| ["lib/orator", "lib"].map(|lib| folder.join(lib)));
     lib_folders.chain([models_dir.join("lib")]).find_map(|folder| library_in(&folder)).ok_or_else(|| {
         anyhow!(
             "the ONNX Runtime library ({LIBRARY}) was not found; download it with `orator models fetch`, or set \

@@ -2,7 +2,6 @@
 
 pub(crate) mod bench;
 pub(crate) mod completions;
-pub(crate) mod container;
 mod error_list;
 pub(crate) mod error_texts;
 pub(crate) mod examples;
