@@ -8,8 +8,7 @@ use orator_dataset::config::Settings;
 use orator_dataset::config::videos::Videos;
 use orator_media::ffmpeg;
 use orator_media::opencv::png;
-use orator_pipeline::dataset::persons;
-use orator_pipeline::dataset::persons::VideoPerson;
+use orator_pipeline::dataset::persons::{self, VideoPerson};
 use std::path::Path;
 
 /// Maximum number of faces shown per person.

@@ -5,8 +5,8 @@ use super::file::StudyFile;
 use super::folder::{StudyFolder, read_json};
 use super::plan::{StudyKey, StudyPlan, TaskDesign};
 use super::store::answers::{self, SubmittedAnswer};
+use super::store::database;
 use super::store::participants::{self, PARAMETERS, Participant, Status};
-use super::store::{database, starts};
 use super::vote::{Response, StudyVote, VOTE_COLUMNS};
 use anyhow::{Context, Result};
 use orator_base::stage::workdir;
@@ -78,7 +78,7 @@ pub fn responses(folder: &StudyFolder) -> Result<(Vec<Participant>, Vec<StudyVot
     db.execute_batch("BEGIN")?;
     let (all, mut votes) = (participants::all(&db)?, Vec::new());
     for participant in &all {
-        let reloads = starts::reloads(&db, &participant.id)?;
+        let reloads = answers::reloads(&db, &participant.id)?;
         for answer in answers::of(&db, &participant.id)? {
             let reloads = reloads.get(&answer.position).copied().unwrap_or_default();
             votes.push(joined.vote(participant, answer, reloads)?);

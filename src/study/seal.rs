@@ -7,9 +7,8 @@ use orator_base::stage::fingerprint::hash_file;
 use orator_base::stage::workdir;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
-use std::fmt;
-use std::fs;
 use std::path::{Path, PathBuf};
+use std::{fmt, fs};
 
 /// Version of the file format.
 const VERSION: u32 = 1;

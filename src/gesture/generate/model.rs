@@ -3,7 +3,7 @@
 use super::normalisation::Normalisation;
 use super::representation::Representation;
 use super::seq2seq::metadata::is_sequence_kind;
-use super::variant;
+use super::trained;
 use anyhow::{Context, Result, bail, ensure};
 use ndarray::ArrayView2;
 use orator_base::audio::mel;
@@ -127,7 +127,7 @@ impl SpeakerMetadata {
 pub struct GenerationChoice {
     /// Name of the speaker; required for networks of several speakers.
     pub speaker: Option<String>,
-    /// Seed of the variant (see `variant`); `None`: the complete network.
+    /// Seed of the variant (see `trained`); `None`: the complete network.
     pub seed: Option<u64>,
 }
 
@@ -138,7 +138,7 @@ pub fn load(path: &Path, choice: &GenerationChoice) -> Result<(SpeakerMetadata, 
     check(&contents.facts["speaker"]).with_context(context)?;
     select_speaker(&mut contents, choice.speaker.as_deref()).with_context(|| path.display().to_string())?;
     if let Some(seed) = choice.seed {
-        variant::vary(&mut contents, GENERATOR, seed).with_context(|| format!("{} has no variants", path.display()))?;
+        trained::vary(&mut contents, GENERATOR, seed).with_context(|| format!("{} has no variants", path.display()))?;
     }
     build(&contents).with_context(context)
 }

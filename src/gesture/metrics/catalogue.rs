@@ -1,10 +1,9 @@
 //! The catalogue of all metrics of a convention, and their computation in two steps: measuring every interval as
 //! additive sums, and computing values from the sum of any intervals. The arithmetic of each metric is in its own file.
 
-use super::convention;
 use super::definition::MetricFamily;
 use super::pair::PairedFrames;
-use super::settings::MetricSettings;
+use super::settings::{self, MetricSettings};
 use super::sums::{self, BlockSums, CostlySums};
 use anyhow::ensure;
 use ndarray::{Array2, ArrayView2};
@@ -51,7 +50,7 @@ impl Catalogue {
                 "invalid alpha {alpha} of PCK: expected a number > 0, such as 0.2"
             );
         }
-        let metrics = convention::metrics(settings);
+        let metrics = settings::metrics(settings);
         let mut definitions: Vec<Definition> = metrics.iter().flat_map(|metric| metric.definitions.clone()).collect();
         for definition in &mut definitions {
             definition.parameters["convention"] = serde_json::to_value(settings.convention)?;

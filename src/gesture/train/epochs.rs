@@ -1,8 +1,7 @@
 //! Training loop that selects the best step by validation: optimiser steps, a validation after each epoch, and periodic
 //! checkpoints. A stop request takes effect after the current step, with a checkpoint.
 
-use super::log::MetricsLog;
-use super::progress_log::ProgressLog;
+use super::log::{MetricsLog, ProgressLog};
 use super::resume::last_checkpoint;
 use crate::generate::model::BEST;
 use anyhow::{Context, Result, bail};

@@ -6,7 +6,7 @@
 
 use super::axis::{AxisWindows, ConvAxis};
 use super::kernel::{MAX_ROWS, TileSteps};
-use super::packed_weights::{PackedWeights, StepBlock, WeightOrder};
+use super::packed_matrix::{PackedWeights, StepBlock, WeightOrder};
 use super::spin_pool::parallel_for;
 use super::tensor::{Scalar, SharedOutputPtr, scratch, written};
 use std::ops::Range;

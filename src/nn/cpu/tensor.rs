@@ -2,8 +2,7 @@
 //! Every function gives identical bits for any number of threads: work is divided into pieces of fixed size, and each
 //! value is summed by one thread in a fixed order.
 
-use super::kernel;
-use super::kernel::TileKernel;
+use super::kernel::{self, TileKernel};
 use super::vectorised::exp_f32;
 use candle_core::{CpuStorage, DType, Layout, Result, Storage, Tensor, WithDType};
 use rayon::prelude::*;

@@ -4,10 +4,9 @@
 use super::fallback;
 use super::operator::{CpuOperator, CustomOperator, Gradients, Operand};
 use crate::cpu::axis::ConvAxis;
-use crate::cpu::channel_stats;
 use crate::cpu::direct_conv::{self, ConvSizes};
 use crate::cpu::tensor::Scalar;
-use crate::cpu::weight_gradient;
+use crate::cpu::{channel_stats, weight_gradient};
 use crate::params::{Init, Params};
 use candle_core::{Result, Shape, Tensor};
 

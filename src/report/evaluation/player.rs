@@ -3,15 +3,14 @@
 //! total, and motion is in whole millimetres, which bounds the size of the page.
 
 use super::charts::colour_legend;
-use crate::html::chart::tracks::{Track, tracks};
+use crate::html::chart::timeline::{Track, tracks};
 use crate::html::{Node, node};
 use anyhow::Result;
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
 use ndarray::ArrayView3;
 use orator_base::text::clock;
-use orator_base::types::skeleton;
-use orator_base::types::skeleton::{L_WRIST, N_JOINTS, R_WRIST, is_duplicate};
+use orator_base::types::skeleton::{self, L_WRIST, N_JOINTS, R_WRIST, is_duplicate};
 use orator_base::types::sound::{SAMPLE_RATE, Sound};
 use orator_formats::wav;
 use orator_gesture::evaluate::clips::clips::{EvalClip, EvalClips};

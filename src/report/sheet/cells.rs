@@ -4,8 +4,7 @@
 use anyhow::{Context, Result};
 use ndarray::ArrayView2;
 use orator_avatar::animate::draw::figure::{FigureView, INK, PAPER, draw_pose, mix};
-use orator_avatar::animate::draw::overlay;
-use orator_avatar::animate::draw::overlay::ImageTransform;
+use orator_avatar::animate::draw::overlay::{self, ImageTransform};
 use orator_base::types::image::Image;
 use orator_base::types::pose2d::Keypoints;
 use orator_media::ffmpeg::frames::FrameReader;

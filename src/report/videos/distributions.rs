@@ -5,8 +5,7 @@ use super::thresholds::THRESHOLDS;
 use crate::html::chart::histogram::{Counts, ThresholdLine, histogram};
 use crate::html::{Node, node};
 use orator_base::stage::ledger::Ledger;
-use orator_base::text::counted;
-use orator_base::text::percent;
+use orator_base::text::{counted, percent};
 use orator_dataset::config::Settings;
 use orator_pipeline::segment::Measures;
 

@@ -14,7 +14,6 @@ pub mod registration;
 pub mod result;
 pub mod share;
 pub mod statistic;
-pub mod strength;
 pub mod task;
 pub mod text;
 pub mod votes;

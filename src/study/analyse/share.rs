@@ -6,9 +6,8 @@ use super::statistic::{StatisticMethod, StatisticSet, TestResult};
 use crate::stats::cluster::crossed::crossed_estimate;
 use crate::stats::cluster::sign_flips::{SideBlock, side_p, sign_flip_p};
 use crate::stats::cluster::votes::{ClipVote, participant_estimate, participant_sd};
-use crate::stats::equivalence::Equivalence;
 use crate::stats::glmm::fit::MixedLogit;
-use crate::stats::proportion::BinomialCount;
+use crate::stats::proportion::{BinomialCount, Equivalence};
 use std::collections::BTreeMap;
 
 /// Proportion of successes by guessing.

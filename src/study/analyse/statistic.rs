@@ -1,8 +1,8 @@
 //! Statistics of an analysis: intervals, tests and equivalence tests of one quantity by several methods, each with its
 //! origin, and those that could not be computed.
 
-use crate::stats::equivalence::Equivalence;
 use crate::stats::estimate::{ConfidenceInterval, StatisticsError, StudentEstimate, holm};
+use crate::stats::proportion::Equivalence;
 use serde::Serialize;
 
 /// Method of a statistic.

@@ -1,9 +1,8 @@
 //! Designs a study from its file and its clips.
 
 use super::clip_needs::{ClipNeeds, SharedClips};
-use super::clip_scheduler::{ClipScheduler, stream};
+use super::clip_scheduler::{ClipScheduler, SquareRows, stream};
 use super::designer::{Designer, numbers};
-use super::latin_square::SquareRows;
 use super::task_design::{TaskBalance, TaskDesigner};
 use crate::file::StudyFile;
 use crate::plan::{FilmContent, PlannedTask, StudyPlan};

@@ -2,8 +2,7 @@
 //! the main trials.
 
 use super::clip_needs::SharedClips;
-use super::clip_scheduler::{ClipScheduler, stream};
-use super::latin_square::SquareRows;
+use super::clip_scheduler::{ClipScheduler, SquareRows, stream};
 use super::task_design::{AssignedTrial, TaskBalance, TaskDesigner, assign, right_response};
 use crate::file::{FilmLayout, StudyCondition, StudyFile, StudyTask, TaskOrder};
 use crate::plan::{FilmContent, FilmSound, PlannedSession, Trial, TrialPhase};

@@ -5,7 +5,6 @@ mod clip_needs;
 mod clip_scheduler;
 mod design;
 mod designer;
-mod latin_square;
 mod task_design;
 
 pub use clip_needs::ClipNeeds;

@@ -2,8 +2,7 @@
 //! order of its trials, and the balance of votes over its cells.
 
 use super::clip_needs::SharedClips;
-use super::clip_scheduler::{AssignedClip, ClipScheduler, stream};
-use super::latin_square::SquareRows;
+use super::clip_scheduler::{AssignedClip, ClipScheduler, SquareRows, stream};
 use crate::file::{StudyCondition, StudyFile, StudyTask};
 use crate::plan::TaskDesign;
 use crate::vote::{Response, ScreenSide};

@@ -3,7 +3,7 @@
 use super::layers::{self, StudyPreset};
 use super::rules;
 use super::study_file::{StudyFile, fill_defaults};
-use crate::pages::page_texts::text_keys;
+use crate::pages::assets::text_keys;
 use anyhow::{Context, Result};
 use orator_base::input;
 use orator_base::stage::workdir;

@@ -1,7 +1,7 @@
 //! Requests and replies: JSON bodies, bearer tokens, errors as a sentence with a status, and the headers of every
 //! reply.
 
-use crate::store::writer::NotStored;
+use crate::store::database::NotStored;
 use axum::body::Bytes;
 use axum::extract::{FromRequest, Request};
 use axum::http::header::{self, HeaderName};

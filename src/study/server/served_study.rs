@@ -2,7 +2,7 @@
 
 use crate::file::StudyFile;
 use crate::folder::{StudyFolder, read_json};
-use crate::pages::page_texts::page_texts;
+use crate::pages::assets::page_texts;
 use crate::plan::{PlannedTask, StudyPlan, TaskDesign, Trial, TrialPhase};
 use crate::store::participants::Quota;
 use anyhow::{Context, Result, ensure};

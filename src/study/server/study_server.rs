@@ -1,6 +1,7 @@
-//! Opens, runs and shuts down a study's server; routes of its API and pages.
+//! Opens, runs and shuts down a study's server; routes of its API and pages. The clock for all times that the server
+//! stores and compares: corrections of the wall clock, even across a restart, neither block participants nor end their
+//! sessions.
 
-use super::clock::Clock;
 use super::host::{AllowedHosts, check_host};
 use super::limits::RateLimits;
 use super::reply::{HEADERS, method_not_allowed, not_found, text_reply};
@@ -10,18 +11,17 @@ use super::{api, listen};
 use crate::folder::StudyFolder;
 use crate::pages::assets::ASSETS;
 use crate::seal::StudySeal;
-use crate::store::writer::ResponseStore;
-use crate::store::{database, participants};
+use crate::store::database::{self, ResponseStore};
+use crate::store::participants;
 use anyhow::{Context, Result};
-use axum::Router;
 use axum::extract::DefaultBodyLimit;
 use axum::http::{HeaderValue, StatusCode, header};
-use axum::middleware;
 use axum::routing::{get, post};
+use axum::{Router, middleware};
 use std::net::SocketAddr;
 use std::sync::Arc;
 use std::thread::JoinHandle;
-use std::time::Duration;
+use std::time::{Duration, Instant, SystemTime};
 use tokio::net::TcpListener;
 use tokio::signal::unix::{SignalKind, signal};
 use tower_http::set_header::SetResponseHeaderLayer;
@@ -130,4 +130,43 @@ fn router(app: App, hosts: AllowedHosts) -> Router {
         router = router.layer(SetResponseHeaderLayer::overriding(name, HeaderValue::from_static(value)));
     }
     router.with_state(Arc::new(app))
+}
+
+/// Clock that reads the wall clock once at the start and is monotonic afterwards.
+#[derive(Clone, Copy, Debug)]
+pub struct Clock {
+    start_ms: i64,
+    started: Instant,
+}
+
+impl Clock {
+    /// Starts at the wall clock's time or at `latest_ms` (the latest stored time, milliseconds since 1970), whichever
+    /// is later.
+    pub fn start(latest_ms: i64) -> Self {
+        let since = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH);
+        let wall_ms = since.map_or(0, |since| since.as_millis() as i64);
+        Self { start_ms: wall_ms.max(latest_ms), started: Instant::now() }
+    }
+
+    /// Milliseconds since 1970.
+    pub fn now_ms(&self) -> i64 {
+        self.start_ms.saturating_add(self.started.elapsed().as_millis() as i64)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn time_continues_from_the_wall_clock_or_the_latest_stored_time() {
+        let wall_ms = Clock::start(0).now_ms();
+        assert!(wall_ms > 1_700_000_000_000, "{wall_ms}");
+        let ahead_ms = wall_ms + 3_600_000;
+        let clock = Clock::start(ahead_ms);
+        std::thread::sleep(Duration::from_millis(20));
+        let now_ms = clock.now_ms();
+        assert!((ahead_ms + 20..ahead_ms + 60_000).contains(&now_ms), "{now_ms}");
+        assert_eq!(Clock::start(i64::MAX).now_ms(), i64::MAX);
+    }
 }

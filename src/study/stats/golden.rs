@@ -1,8 +1,7 @@
 //! Compares statistics with scipy, statsmodels and krippendorff (`fixtures/reference/study_stats.py`).
 
-use super::equivalence::Equivalence;
 use super::estimate::{StudentEstimate, holm};
-use super::proportion::BinomialCount;
+use super::proportion::{BinomialCount, Equivalence};
 use super::rank::{MeasurementScale, alpha, friedman, median_interval, signed_rank};
 use serde::de::DeserializeOwned;
 use serde_json::Value;

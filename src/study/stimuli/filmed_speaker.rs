@@ -1,8 +1,7 @@
 //! Speakers with their clips, the performance of each condition for each clip, and the clips' sounds at equal loudness:
 //! everything that is rendered into films.
 
-use super::common_motion::{CommonBody, CommonVisibility};
-use super::condition_motion::{ConditionModels, ShownMotion, motions, sound_of};
+use super::condition_motion::{CommonBody, CommonVisibility, ConditionModels, ShownMotion, motions, sound_of};
 use super::cut::{CutSpeech, MAX_HIDDEN, StudyClip, cut};
 use super::film::{self, FilmScene};
 use super::speaker_source::SpeakerSource;

@@ -2,7 +2,7 @@
 //! (realistic, but unrelated to the sound), and the ground truth itself, which bounds every metric.
 
 use super::constant_pose::ConstantPoses;
-use super::neighbour::{self, Library, Query};
+use super::predictor::{self, Library, Query};
 use crate::evaluate::clips::clips::{EvalClip, EvalClips};
 use crate::evaluate::clips::motion_store::{MotionStore, StoredMotion};
 use anyhow::Result;
@@ -251,7 +251,7 @@ fn neighbours(clips: &EvalClips, fallback: &Predictor, store: &MotionStore) -> R
         },
         joints: &|entry, frames| Ok(clips.clips[entry].ground_truth.view().slice_move(s![frames, .., ..]).to_owned()),
     };
-    let Some(predicted) = neighbour::motions(&query, &library, clips.fps, store)? else { return Ok(None) };
+    let Some(predicted) = predictor::motions(&query, &library, clips.fps, store)? else { return Ok(None) };
     let description = "for each 4 s of audio the motion of the most similar audio in another clip".to_owned();
     let motions = predicted.into_iter().map(ClipMotion::Motion).collect();
     Ok(Some(Predictor::new(PredictorKind::NearestNeighbour, description, motions).filled(fallback, store)?))

@@ -1,18 +1,16 @@
 //! Clips and baselines for checkpoints on a split of a dataset. The ground truth is the dataset's motion, the
 //! predictions are generated from sound and words only, and the baselines are derived from the training split only.
 
-use super::checkpoint::EvaluatedCheckpoint;
+use super::checkpoint::{self, EvaluatedCheckpoint};
 use super::clips::{ClipAudio, EvalClip, EvalClips, compared};
 use super::held_out::{self, HeldOutInterval};
 use super::motion_store::{MotionStore, StoredMotion};
-use super::notes;
 use super::sound_features::{self, SoundFeatureExtractor};
 use crate::evaluate::baseline::baselines::{self, ClipMotion, NumberedCheckpoint, Predictor, PredictorKind};
 use crate::evaluate::baseline::constant_pose::ConstantPoses;
-use crate::evaluate::baseline::neighbour::{self, Library, Query};
-use crate::evaluate::baseline::predictor;
+use crate::evaluate::baseline::predictor::{self, Library, Query};
 use crate::generate::normalisation::{N_FEATURES, Normalisation};
-use crate::train::gan::speaker_metadata::normalisation;
+use crate::train::gan::speakers::normalisation;
 use anyhow::{Context, Result, ensure};
 use ndarray::{Array2, Array3, Axis, s};
 use orator_base::motion::bones;
@@ -59,7 +57,7 @@ pub fn prepare(
         .map(|of| held_out.generate(of, store).with_context(|| of.name.clone()))
         .collect::<Result<Vec<GeneratedIntervals>>>()?;
     task.detail("computing audio features");
-    let notes = notes::of_checkpoints(dataset, checkpoints, &held_out.words.concat(), split);
+    let notes = checkpoint::of_checkpoints(dataset, checkpoints, &held_out.words.concat(), split);
     let first = std::mem::take(&mut generated.first_mut().context("no checkpoint to evaluate")?.matched);
     let clips = first
         .into_iter()
@@ -72,7 +70,7 @@ pub fn prepare(
         let is_known = |joint: usize| generated.iter().all(|intervals| intervals.joints[joint]);
         let common: Vec<usize> = (0..N_JOINTS).filter(|joint| is_known(*joint)).collect();
         restrict(&mut clips, &common, store)?;
-        clips.notes.push(notes::of_joints(&clips, &common));
+        clips.notes.push(checkpoint::of_joints(&clips, &common));
     }
     task.detail("computing baselines");
     let numbered = |at: usize| {
@@ -310,6 +308,6 @@ pub fn nearest_neighbours(
         },
         joints: &|entry, frames| held_out::joints(dataset, &samples[entry], normal, frames, !clips.channels.is_empty()),
     };
-    let predicted = neighbour::motions(&query, &library, clips.fps, store)?;
+    let predicted = predictor::motions(&query, &library, clips.fps, store)?;
     Ok(predicted.map(|predicted| predicted.into_iter().map(ClipMotion::Motion).collect()))
 }

@@ -1,7 +1,7 @@
 //! Sound features for evaluation, computed on a stream of samples that are not stored: onsets for the beat metrics,
 //! and a pooled spectrogram for the nearest neighbour.
 
-use crate::generate::mel_stream::mel_frames;
+use crate::generate::generator::mel_frames;
 use anyhow::{Context, Result};
 use orator_base::audio::mel;
 use orator_base::audio::onset::{Loudest, Onsets};

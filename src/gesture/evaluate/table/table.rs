@@ -1,9 +1,8 @@
 //! Table of all metrics of all predictors with confidence intervals, computed on the same clips and the same draws.
 
-use super::block_length::BlockLength;
-use super::jackknife::BlockGroups;
+use super::blocks::{self, BlockLength};
+use super::bootstrap::{self, BlockGroups};
 use super::sign_flips::{self, TestedDifference};
-use super::{blocks, bootstrap};
 use crate::evaluate::baseline::baselines::{NumberedCheckpoint, Predictor, PredictorKind};
 use crate::evaluate::clips::clips::EvalClips;
 use crate::metrics::catalogue::{Better, Catalogue, Definition, IntervalSums};

@@ -1,10 +1,9 @@
 //! Generates poses for a sound of any length segment by segment; each segment starts from the last poses of the
 //! previous one.
 
-use super::architecture::{self, Architecture};
+use super::architecture::{self, Architecture, NumberedWord, UNKNOWN};
 use super::metadata::{self, SequenceMetadata};
 use super::poses::PoseFormat;
-use super::vocabulary::{NumberedWord, UNKNOWN};
 use crate::generate::model::checkpoint_file;
 use anyhow::{Result, ensure};
 use candle_core::{DType, Device, Tensor};

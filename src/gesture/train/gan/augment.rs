@@ -2,7 +2,7 @@
 //! depend on. Time shift and speed, gain and pitch, background noise, masked bands and frames (SpecAugment, Park et al.
 //! 2019), and mirrored poses.
 
-use crate::generate::mel_stream::mel_frames;
+use crate::generate::generator::mel_frames;
 use crate::generate::normalisation::Normalisation;
 use crate::train::resume;
 use ndarray::{Array2, Axis, s};

@@ -3,7 +3,7 @@
 use super::score::{ChannelError, ErrorReduction, ValidationMetrics};
 use super::windows::WindowBatch;
 use crate::metrics::distribution::frechet::{self, GaussianFit, frechet};
-use crate::metrics::movement::energy::MotionEnergy;
+use crate::metrics::movement::derivatives::MotionEnergy;
 use crate::metrics::position::pck::{CorrectKeypoints, PckAxes};
 use anyhow::Result;
 use candle_core::Tensor;

@@ -1,7 +1,7 @@
 //! Features and spectrograms of the intervals of a split. Small splits are cached in memory; large ones are read from
 //! the shards for every window, so that memory does not grow with the dataset. Both ways return the same values.
 
-use crate::generate::mel_stream::mel_frames;
+use crate::generate::generator::mel_frames;
 use crate::generate::normalisation::Normalisation;
 use anyhow::Result;
 use ndarray::Array2;

@@ -10,7 +10,6 @@ pub mod losses;
 pub mod pretrained;
 pub mod recipe;
 pub mod score;
-pub mod speaker_metadata;
 pub mod speakers;
 pub mod step;
 pub mod train;

@@ -1,11 +1,10 @@
 //! A generator and its discriminator in training: one optimiser step, and saving to and loading from checkpoints.
 
-use super::augment;
-use super::average;
 use super::losses::{self, number};
 use super::score::Validation;
 use super::speakers::SpeakerSet;
 use super::windows::WindowBatch;
+use super::{augment, average};
 use crate::generate::model::{BEST, GENERATOR, SpeakerMetadata};
 use crate::train::optim::adam::{self, Adam};
 use crate::train::resume;

@@ -2,15 +2,14 @@
 //! same checkpoints, even if the training was interrupted: the windows of a step depend only on the seed and the step,
 //! and everything else is stored in the checkpoint.
 
-use super::augment;
 use super::batches::{self, BatchPrefetcher};
 use super::pretrained::PretrainedModel;
 use super::recipe::{self, InitialWeights, TrainingMaterial};
 use super::score::Validation;
-use super::speaker_metadata;
 use super::step::{GanTrainer, Losses, TrainerState};
 use super::validate::ValidationIntervals;
 use super::windows::{JoinedWindows, WindowLoader, needed};
+use super::{augment, speakers};
 pub use crate::generate::model::BEST;
 use crate::generate::model::SpeakerMetadata;
 use crate::generate::normalisation::Normalisation;
@@ -58,7 +57,7 @@ pub fn train_with_callback(
     validated: &mut dyn FnMut(ValidatedStep),
 ) -> Result<TrainingOutcome<Validation>> {
     check(requested)?;
-    speaker_metadata::check(datasets)?;
+    speakers::check(datasets)?;
     // Shared lock: `generate` may load the model during training; `forget` may not remove it.
     let _model = FolderLock::shared(folder)?;
     let _lock = workdir::lock(folder)?;
@@ -81,8 +80,7 @@ pub fn train_with_callback(
                 .as_ref()
                 .map_or(InitialWeights::Random, |pretrained_model| pretrained_model.kind(datasets.len()));
             let settings = recipe::settings(requested, &material, initial_weights)?;
-            let normal =
-                |dataset: &&Dataset| speaker_metadata::normalisation_with_channels(dataset, &requested.channels);
+            let normal = |dataset: &&Dataset| speakers::normalisation_with_channels(dataset, &requested.channels);
             (settings, datasets.iter().map(normal).collect::<Result<Vec<_>>>()?)
         }
     };
@@ -98,7 +96,7 @@ pub fn train_with_callback(
     progress.say(&format!("{} of {dirs}; writing checkpoints to {}", counted(n_windows, "window"), folder.display()));
     let held_out = ValidationIntervals::load(&normalised_datasets, &settings, progress)?;
     let metadata = |((dataset, normal), loader): (&(&Dataset, Normalisation), &WindowLoader)| {
-        speaker_metadata::metadata(dataset, normal, loader, &settings, datasets.len())
+        speakers::metadata(dataset, normal, loader, &settings, datasets.len())
     };
     let speakers: Vec<SpeakerMetadata> = match &resumed {
         Some((stored, _)) => stored.speakers(),
@@ -249,7 +247,7 @@ fn resume(
         );
         let speakers = std::iter::once(&mut stored.speaker).chain(&mut stored.other_speakers);
         for (metadata, dataset) in speakers.zip(datasets) {
-            speaker_metadata::resume(metadata, dataset, &mut differences)?;
+            speakers::resume(metadata, dataset, &mut differences)?;
         }
         Ok((stored, differences))
     })

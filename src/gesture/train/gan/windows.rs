@@ -2,7 +2,7 @@
 
 use super::augment::{self, WindowChange, WindowRows};
 use super::interval_rows::{IntervalRows, TrainingIntervals};
-use crate::generate::mel_stream::mel_frames;
+use crate::generate::generator::mel_frames;
 use crate::generate::normalisation::{N_FEATURES, Normalisation};
 use crate::train::no_window::NeededFrames;
 use anyhow::{Context, Result, ensure};

@@ -1,6 +1,6 @@
 //! A folder of motion captures: `NAME.bvh` with its sound `NAME.wav`, and optionally a transcript with the same stem.
 
-use super::sequence::{PoseSequence, SequenceSplits};
+use super::segments::{PoseSequence, SequenceSplits};
 use crate::generate::seq2seq::architecture;
 use anyhow::{Context, Result, bail, ensure};
 use ndarray::{Array2, s};

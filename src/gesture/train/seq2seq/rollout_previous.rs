@@ -45,11 +45,10 @@ mod tests {
     use super::*;
     use crate::generate::normalisation::Normalisation;
     use crate::generate::representation::Representation;
-    use crate::generate::seq2seq::architecture::{Architecture, network_config};
+    use crate::generate::seq2seq::architecture::{Architecture, Vocabulary, network_config};
     use crate::generate::seq2seq::metadata::SequenceMetadata;
     use crate::generate::seq2seq::poses::PoseFormat;
-    use crate::generate::seq2seq::vocabulary::Vocabulary;
-    use crate::train::seq2seq::sequence::PoseSequence;
+    use crate::train::seq2seq::segments::PoseSequence;
     use ndarray::Array2;
     use orator_base::types::time::FrameRate;
     use orator_nn::seq2seq::config::Segment;

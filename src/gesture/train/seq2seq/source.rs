@@ -2,11 +2,11 @@
 //! sequences.
 
 use super::captures::CaptureFolder;
-use super::sequence::{PoseSequence, SequenceSplits};
+use super::segments::{PoseSequence, SequenceSplits};
 use crate::generate::representation::Representation;
 use crate::generate::seq2seq::architecture;
 use crate::generate::seq2seq::poses::PoseFormat;
-use crate::train::gan::speaker_metadata::normalisation;
+use crate::train::gan::speakers::normalisation;
 use anyhow::{Result, bail, ensure};
 use orator_base::types::sound::SAMPLE_RATE;
 use orator_base::types::time::FrameRate;

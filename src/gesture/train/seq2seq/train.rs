@@ -4,15 +4,13 @@
 
 use super::reading;
 use super::rollout_previous::roll_out_previous;
-use super::segments::SegmentLoader;
-use super::sequence::{PoseSequence, SequenceSplits};
+use super::segments::{PoseSequence, SegmentLoader, SequenceSplits};
 use super::source::TrainingSource;
 use super::step::{SequenceLosses, SequenceState, SequenceTrainer};
 use super::validate::{SequenceValidation, ValidationSegments};
 pub use crate::generate::model::BEST;
-use crate::generate::seq2seq::architecture::{self, network_config};
+use crate::generate::seq2seq::architecture::{self, PADDING, UNKNOWN, Vocabulary, network_config};
 use crate::generate::seq2seq::metadata::SequenceMetadata;
-use crate::generate::seq2seq::vocabulary::{PADDING, UNKNOWN, Vocabulary};
 use crate::train::epochs::{self, EpochSchedule, StepReport, TrainingOutcome, ValidatedStep, ValidatedTraining};
 use crate::train::log;
 use crate::train::no_window::{self, NeededFrames};
