@@ -50,7 +50,6 @@ impl Claim {
         format!("{}/{unit:06}.{kind}.{epoch:04}", folder_name(unit / UNITS_PER_FOLDER))
     }
 
-    /// Reads which worker created the claim.
     pub fn read_owner(self, folder: &impl SharedFolder) -> Result<ClaimOwner> {
         let file = self.file("claim");
         let Some(bytes) = folder.read(&file)? else { return Ok(ClaimOwner::NotVisible) };
@@ -71,7 +70,6 @@ impl Claim {
     }
 }
 
-/// Owner that the file of a claim names.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum ClaimOwner {
     /// The file is not visible yet.
@@ -81,7 +79,6 @@ pub enum ClaimOwner {
     Unreadable(String),
 }
 
-/// Content of a claim file.
 #[derive(Serialize, Deserialize)]
 struct ClaimFile {
     worker: String,
@@ -105,7 +102,6 @@ pub struct UnitEnd {
 pub struct ClaimState {
     /// Epoch of the last claim; 0 if the unit is free.
     pub epoch: u32,
-    /// Whether the unit ended under that claim.
     pub has_ended: bool,
 }
 
@@ -153,7 +149,6 @@ pub enum NextUnit {
     Wait(Duration),
     /// Every remaining unit is in `Claims::blocked` or needs a unit that is.
     Blocked,
-    /// Every unit has ended.
     AllEnded,
 }
 
@@ -308,7 +303,6 @@ impl<'a, F: SharedFolder> Claims<'a, F> {
         Ok(())
     }
 
-    /// Claims one of the next free units.
     fn claim_free(&mut self) -> Result<Option<Claim>> {
         loop {
             let is_free = |unit: &usize| self.states[*unit].epoch == 0;

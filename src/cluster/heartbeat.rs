@@ -29,9 +29,7 @@ pub struct Heartbeat {
     pub started: u64,
     /// Whether the worker exited in order and holds no unit.
     pub ended: bool,
-    /// Number of units done.
     pub n_done: usize,
-    /// Number of units that failed.
     pub n_failed: usize,
     /// Duration of the video in the units done, seconds.
     pub media_secs: f64,
@@ -81,7 +79,6 @@ pub struct BeatWatch {
 }
 
 impl BeatWatch {
-    /// Creates a watcher that runs on `machine`.
     pub fn new(dead_after: Duration, machine: &str) -> Self {
         Self { dead_after, machine: machine.to_owned(), last_beats: BTreeMap::new() }
     }

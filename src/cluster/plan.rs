@@ -237,7 +237,6 @@ impl ClusterPlan {
         path.with_file_name(format!("{stem}-{}", &self.seal[..12]))
     }
 
-    /// One unit for each video.
     pub fn videos(&self) -> Vec<PlannedUnit> {
         self.units.iter().filter(|unit| unit.share == UnitShare::AllStages).cloned().collect()
     }

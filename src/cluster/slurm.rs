@@ -20,11 +20,9 @@ pub struct SlurmScripts {
     pub trainings: Vec<String>,
 }
 
-/// Settings shared by all scripts.
 pub struct SlurmSettings<'a> {
     /// The cluster's MaxArraySize.
     pub max_array: usize,
-    /// Folder of the log files.
     pub logs: &'a Path,
     /// Additional `#SBATCH` options (such as a partition or an account).
     pub options: &'a [String],

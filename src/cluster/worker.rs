@@ -23,7 +23,6 @@ use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 /// File that stops every worker of a plan; it contains the reason.
 pub const STOP: &str = "stop.txt";
 
-/// Settings of the workers of one process.
 #[derive(Clone, Debug, PartialEq)]
 pub struct WorkerOptions {
     /// Number of units in parallel, each under its own claim.
@@ -40,7 +39,6 @@ pub struct WorkerOptions {
     pub dead_after: Duration,
 }
 
-/// Results of the workers of one process.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct WorkReport {
     /// Number of units done, including those that were up to date.
@@ -147,7 +145,6 @@ fn resume_after_stop(folder: &DiskFolder) -> Result<()> {
     workdir::remove_file(&folder.0.join(STOP))
 }
 
-/// The workers of one process on one plan.
 struct Session<'a> {
     plan: &'a ClusterPlan,
     folder: DiskFolder,
@@ -163,7 +160,6 @@ struct Session<'a> {
 }
 
 impl Session<'_> {
-    /// Runs one worker with its heartbeat.
     fn run(&self, name: &str, first: Heartbeat) -> Result<()> {
         let heartbeat = HeartbeatFile { folder: &self.folder, name, content: Mutex::new(first), begun: self.begun };
         heartbeat.beat()?;
@@ -340,7 +336,6 @@ fn host_of(worker: &str) -> &str {
     worker.rsplitn(4, '-').last().unwrap_or(worker)
 }
 
-/// Heartbeat file of one worker.
 struct HeartbeatFile<'a> {
     folder: &'a DiskFolder,
     name: &'a str,

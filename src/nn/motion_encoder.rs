@@ -12,9 +12,7 @@ use candle_nn::Linear;
 use ndarray::{Array2, ArrayView2};
 use serde::{Deserialize, Serialize};
 
-/// Number of frames of a window.
 pub const WINDOW: usize = 34;
-/// Number of values of a code.
 pub const N_CODE: usize = 32;
 /// Windows that share convolutions start at multiples of this many frames.
 pub const STEP: usize = 2;
@@ -28,7 +26,6 @@ const POSITIONS: usize = 12;
 pub const SLOPE: f64 = 0.2;
 const MOMENTUM: f64 = 0.1;
 
-/// Configuration of the network.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Config {
     /// Number of values per frame.

@@ -63,7 +63,6 @@ impl Params {
         Self { device: device.clone(), ..self }
     }
 
-    /// Device of the tensors.
     pub fn device(&self) -> &Device {
         &self.device
     }

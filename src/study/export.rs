@@ -20,7 +20,6 @@ use std::path::{Path, PathBuf};
 const PARTICIPANT_COLUMNS: [&str; 8] =
     ["participant", "place", "language", "status", "answers", "failed_checks", "begun_ms", "code"];
 
-/// Format of the tables.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum TableForm {
     /// Comma-separated values; multiple conditions or scores are joined by `|`.

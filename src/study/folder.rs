@@ -23,7 +23,6 @@ pub fn write_json(path: &Path, value: &impl Serialize) -> Result<()> {
     workdir::write_file(path, &json)
 }
 
-/// Paths in the folder of a built study.
 #[derive(Clone, Debug)]
 pub struct StudyFolder(PathBuf);
 

@@ -27,7 +27,6 @@ const LEVEL: f64 = 0.05;
 /// Assumptions and requirements of a power analysis.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct PowerQuestion {
-    /// Votes per participant.
     pub n_trials: usize,
     pub n_clips: usize,
     pub sd_participants: f64,
@@ -53,7 +52,6 @@ pub struct PowerRow {
     pub ends: ConfidenceInterval,
 }
 
-/// Power curve of one test.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct PowerCurve {
     /// True proportion.

@@ -20,7 +20,6 @@ pub struct Preregistration {
     pub title: String,
     /// Target number of participants who complete the study and are not excluded; collection ends when it is reached.
     pub participants: usize,
-    /// Number of planned sessions.
     pub sessions: usize,
     pub tasks: Vec<RegisteredTask>,
     pub hypotheses: Vec<RegisteredHypothesis>,

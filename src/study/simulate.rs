@@ -13,7 +13,6 @@ use serde::Serialize;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 pub struct CrossedDesign {
     pub n_participants: usize,
-    /// Votes of each participant.
     pub n_trials: usize,
     pub n_clips: usize,
 }

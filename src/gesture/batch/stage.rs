@@ -59,7 +59,6 @@ impl<'a> BatchStage<'a> {
         Ok(stage)
     }
 
-    /// Unit of a sound.
     pub fn unit(sound: &BatchSound) -> Unit {
         Unit { speaker: String::new(), video: sound.name.clone(), source: sound.audio.clone() }
     }
@@ -181,7 +180,6 @@ pub struct SpeechBatch {
     pub sounds: Vec<BatchSound>,
     /// Files of the folder that are neither sounds nor transcripts.
     pub passed_over: Vec<String>,
-    /// Output folder.
     pub folder: PathBuf,
     /// File extensions of the output formats: npy, txt, json, bvh, fbx, glb, vrm, vrma, mp4.
     pub formats: Vec<String>,
@@ -197,33 +195,26 @@ pub struct SpeechBatch {
     pub again: bool,
 }
 
-/// Result of a batch.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct BatchReport {
     /// Number of sounds whose motion was generated.
     pub created: usize,
     /// Number of sounds whose motion was up to date.
     pub up_to_date: usize,
-    /// Number of sounds that failed.
     pub failed: usize,
     /// Files of the folder that are neither sounds nor transcripts.
     pub passed_over: Vec<String>,
-    /// Output folder.
     pub out_folder: PathBuf,
     /// Outcome of every sound, in the order of the batch.
     pub sounds: Vec<BatchOutcome>,
 }
 
-/// Outcome of a sound of a batch.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct BatchOutcome {
-    /// Sound file.
     pub audio: PathBuf,
     /// Path of the motion below the output folder, without an extension.
     pub out: String,
-    /// State after the run.
     pub ended: BatchState,
-    /// Error message of a failure.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub error: Option<String>,
     /// `secs` of sound, `n_frames` of motion, `speaker`, `note`, and `segments` of a sequence-to-sequence network;

@@ -22,7 +22,6 @@ pub const CHUNK: usize = 2048;
 
 /// A trained GAN generator of one speaker.
 pub struct GestureGenerator {
-    /// Metadata stored in the checkpoint.
     pub metadata: SpeakerMetadata,
     pub generator: Generator,
 }
@@ -40,12 +39,10 @@ impl GestureGenerator {
         Ok(Self { metadata, generator })
     }
 
-    /// Name of the speaker.
     pub fn name(&self) -> &str {
         &self.metadata.name
     }
 
-    /// Frame rate of the generated motion.
     pub fn fps(&self) -> FrameRate {
         self.metadata.fps
     }
@@ -141,7 +138,6 @@ impl GestureGenerator {
 pub struct MelStream<I> {
     pieces: I,
     n_samples: usize,
-    /// Buffered samples.
     samples: Vec<f32>,
     /// Index in the sound of the first buffered sample.
     first: usize,

@@ -32,7 +32,6 @@ const MAX_WIDTH: usize = 1024;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SpeakerMetadata {
     pub kind: String,
-    /// Name of the speaker.
     pub name: String,
     pub fps: FrameRate,
     pub skeleton: String,
@@ -55,7 +54,6 @@ pub struct TrainedVideo {
     pub content: String,
 }
 
-/// Parameters of the spectrogram.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SpectrogramSettings {
     pub rate: u32,
@@ -122,7 +120,6 @@ impl SpeakerMetadata {
     }
 }
 
-/// Choice of speaker and variant for generation.
 #[derive(Clone, Debug, Default)]
 pub struct GenerationChoice {
     /// Name of the speaker; required for networks of several speakers.

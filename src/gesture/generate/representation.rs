@@ -65,7 +65,6 @@ impl Representation {
         Ok(Self::Bones { mean, std })
     }
 
-    /// Name in the configuration.
     pub fn name(&self) -> &'static str {
         match self {
             Self::Positions => "positions",

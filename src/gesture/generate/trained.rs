@@ -68,7 +68,6 @@ impl TrainedSpeaker {
         Self::open_as(&file, &GenerationChoice { speaker, seed: None })
     }
 
-    /// Name of the speaker.
     pub fn name(&self) -> &str {
         match self {
             Self::Gan(speaker) => speaker.name(),
@@ -81,7 +80,6 @@ impl TrainedSpeaker {
         matches!(self, Self::Sequence(speaker) if speaker.is_captured())
     }
 
-    /// Frame rate of the generated motion.
     pub fn fps(&self) -> FrameRate {
         match self {
             Self::Gan(speaker) => speaker.fps(),
@@ -126,7 +124,6 @@ impl TrainedSpeaker {
         matches!(self, Self::Sequence(speaker) if speaker.has_state())
     }
 
-    /// Whether the model reads words.
     pub fn reads_words(&self) -> bool {
         self.architecture().is_some_and(|of| architecture::word_encoder(of).is_some())
     }

@@ -2,7 +2,6 @@
 
 use orator_base::types::skeleton::{L_HAND, L_WRIST, N_JOINTS, NECK, R_HAND, R_SHOULDER, R_WRIST, is_duplicate};
 
-/// A part of the body.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum BodyPart {
     /// The 48 joints without the neck, including the two hand roots, which duplicate the wrists.
@@ -38,7 +37,6 @@ impl BodyPart {
         }
     }
 
-    /// Joints of the part.
     pub fn joints(self) -> Vec<usize> {
         match self {
             Self::All => (NECK + 1..N_JOINTS).collect(),

@@ -35,7 +35,6 @@ pub struct Definition {
     pub formula: &'static str,
     /// Condition under which there is no value (NaN).
     pub undefined: &'static str,
-    /// Values of all parameters.
     pub parameters: Value,
 }
 
@@ -97,7 +96,6 @@ type SumValues = Box<dyn Fn(&[f64]) -> Vec<f64> + Send + Sync>;
 pub(crate) struct MetricFamily {
     /// Definitions of `values`, in the same order.
     pub definitions: Vec<Definition>,
-    /// Number of sums.
     pub n_sums: usize,
     pub measure: IntervalMeasure,
     pub values: SumValues,

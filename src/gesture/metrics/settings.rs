@@ -13,14 +13,12 @@ use orator_base::types::posture::PostureChannel;
 use orator_base::types::time::FrameRate;
 use serde::{Deserialize, Serialize};
 
-/// Settings of the metrics.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct MetricSettings {
     /// Convention whose definitions apply.
     pub convention: Convention,
     /// Tolerances of PCK as shares of the largest extent of the pose, each > 0.
     pub alphas: Vec<f64>,
-    /// Frame rate of all motion.
     pub fps: FrameRate,
     /// Whether errors and speeds are also measured over all 49 joints, including the neck.
     pub with_neck: bool,
@@ -63,7 +61,6 @@ pub enum Convention {
     Aist,
 }
 
-/// Metrics of the convention in the settings.
 pub(crate) fn metrics(settings: &MetricSettings) -> Vec<MetricFamily> {
     let fps = settings.fps.per_sec();
     match settings.convention {

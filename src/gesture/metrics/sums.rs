@@ -84,7 +84,6 @@ impl BlockSums {
         Self { n_frames, width, rows: vec![start; n * width] }
     }
 
-    /// Number of blocks.
     pub(crate) fn n(&self) -> usize {
         self.rows.len().checked_div(self.width).unwrap_or(0)
     }
@@ -94,7 +93,6 @@ impl BlockSums {
         (t * self.n() / self.n_frames.max(1)).min(self.n().saturating_sub(1))
     }
 
-    /// Sums of the block of frame `t`.
     pub(crate) fn at(&mut self, t: usize) -> &mut [f64] {
         let block = self.of(t);
         self.row(block)

@@ -32,7 +32,6 @@ pub struct StepReport {
 
 /// A network in training with its data and its validation.
 pub trait ValidatedTraining {
-    /// Metrics of a validation.
     type Validation: Serialize;
 
     /// Name of the speaker, and section of the configuration.
@@ -85,7 +84,6 @@ pub struct TrainingOutcome<V> {
     pub n_words: usize,
     /// Share of the step time spent waiting for the batch, 0..1; validation and checkpoints do not count.
     pub waiting: f64,
-    /// Validation of the newest checkpoint.
     pub validation: V,
     pub newest: PathBuf,
     /// Checkpoint with the best score.

@@ -84,7 +84,6 @@ fn step_of(line: &Value) -> u64 {
     line["step"].as_u64().unwrap_or(u64::MAX)
 }
 
-/// A file opened for appending.
 struct AppendedFile {
     path: PathBuf,
     file: File,

@@ -88,7 +88,6 @@ fn forward_pass(s: &ConvSizes) -> ConvPass {
     }
 }
 
-/// Computes the gradient of the input.
 pub fn gradient_of_input<T: Scalar>(s: &ConvSizes, weight: &[T], grad: &[T]) -> Vec<T> {
     assert!(grad.len() == s.len_out() && weight.len() == s.len_weight());
     let zeros = vec![T::zero(); s.n_in];
@@ -127,7 +126,6 @@ struct ConvPass {
 }
 
 impl ConvPass {
-    /// Memory order of the weights for this pass.
     fn order(&self, per_column: usize, per_channel: usize) -> WeightOrder {
         let [rows, columns] = &self.windows;
         let kernel_offsets = rows

@@ -84,7 +84,6 @@ pub struct PackedWeights<T> {
     pub panels: Vec<WeightPanel>,
 }
 
-/// A panel of columns of the weights.
 pub struct WeightPanel {
     /// Start of its data, its first column, and its number of columns; the rest of its width is zero.
     start: usize,

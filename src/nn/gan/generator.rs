@@ -38,7 +38,6 @@ impl std::str::FromStr for Preset {
     }
 }
 
-/// Configuration of the network.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Config {
     pub preset: Preset,

@@ -15,7 +15,6 @@ pub const NAME: &str = "hand";
 /// Kind of a weights file.
 pub const KIND: &str = "hand-lifter";
 
-/// Configuration of the network.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Config {
     /// Number of inputs of a hand: 21 x (x, y, visible).

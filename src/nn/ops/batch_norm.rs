@@ -82,7 +82,6 @@ impl BatchNorm {
         Ok(y)
     }
 
-    /// Returns the running statistics.
     pub fn running(&self) -> Result<Statistics> {
         let values = |var: &Var| var.to_dtype(candle_core::DType::F64)?.to_vec1();
         Ok(Statistics { mean: values(&self.running_mean)?, variance: values(&self.running_var)? })

@@ -26,7 +26,6 @@ pub trait CpuOperator: Send + Sync {
     /// The shapes of the operands do not match.
     fn forward<T: Scalar>(&self, operands: [Operand<T>; 3]) -> Result<(Vec<T>, Shape)>;
 
-    /// Computes the gradients of the operands from `grad`, the gradient of the result `y`.
     fn backward<T: Scalar>(&self, operands: [Operand<T>; 3], y: &[T], grad: &[T]) -> Gradients<T>;
 }
 

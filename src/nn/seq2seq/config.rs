@@ -10,7 +10,6 @@ pub const SCORE_BLOCKS: RangeInclusive<usize> = 2..=6;
 /// Sizes and dropout rates. The defaults are those of the authors' code.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Config {
-    /// Number of values per pose.
     pub pose: usize,
     /// Number of audio features per frame.
     pub audio: usize,

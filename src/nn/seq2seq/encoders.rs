@@ -140,7 +140,6 @@ impl WordEncoder {
     }
 }
 
-/// Name of the word vectors of a word encoder.
 pub fn table_name(encoder: &str) -> String {
     format!("{encoder}.embedding.weight")
 }

@@ -16,7 +16,6 @@ use orator_gesture::evaluate::table::table::{N_COSTLY_DRAWS, N_DRAWS, PredictorR
 use orator_gesture::metrics::catalogue::Definition;
 use serde_json::json;
 
-/// HTML of the page.
 pub fn html(table: &Table, clips: &EvalClips, title: &str) -> Result<String> {
     let excerpts = player::choose(clips)?;
     let section = |id, title, body| Section { id, title, body };

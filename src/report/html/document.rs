@@ -11,7 +11,6 @@ const SCRIPT: &str = include_str!("page.js");
 const POLICY: &str =
     "default-src 'none'; img-src data:; media-src data:; style-src 'unsafe-inline'; script-src 'unsafe-inline'";
 
-/// HTML page.
 pub struct Page {
     pub title: String,
     /// Sentence under the title.
@@ -25,7 +24,6 @@ pub struct Page {
     pub data: Value,
 }
 
-/// Section of a page.
 pub struct Section {
     /// Anchor: letters and dashes only.
     pub id: &'static str,

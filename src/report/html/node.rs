@@ -69,7 +69,6 @@ impl Node {
         self.attr("id", name)
     }
 
-    /// Appends text.
     pub fn text(mut self, content: impl Display) -> Self {
         self.inner.push_str(&escape(&content.to_string()));
         self

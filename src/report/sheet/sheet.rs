@@ -25,11 +25,9 @@ const GAP_PX: usize = 16;
 const MOMENT_HEIGHT_PX: usize = TEXT_PX + CELL_PX + 6;
 const TITLE_PX: usize = 36;
 
-/// Content of a contact sheet.
 pub struct SheetClip<'a> {
     pub title: &'a str,
     pub video: &'a Path,
-    /// Options for reading the frames.
     pub pictures: PictureOptions,
     pub keypoints: &'a Keypoints,
     pub motion: &'a Motion,

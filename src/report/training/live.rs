@@ -33,7 +33,6 @@ impl<'a> LivePage<'a> {
         Self { folder, speaker, poses, of_best: None, written: None }
     }
 
-    /// Path of the page.
     pub fn path(&self) -> PathBuf {
         self.folder.join(PAGE)
     }

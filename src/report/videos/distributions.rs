@@ -81,7 +81,6 @@ impl Measure {
     }
 }
 
-/// Histograms of all measures.
 pub struct MeasureCounts(Vec<Counts>);
 
 impl MeasureCounts {
@@ -89,7 +88,6 @@ impl MeasureCounts {
         Self(ROWS.iter().map(|row| Counts::new(row.ends[0], row.ends[1], row.n_bins)).collect())
     }
 
-    /// All measures with their counts.
     pub fn all(&self) -> impl Iterator<Item = (&'static Measure, &Counts)> {
         ROWS.iter().zip(&self.0)
     }
@@ -100,7 +98,6 @@ impl MeasureCounts {
         }
     }
 
-    /// Counts the frames of a video.
     pub fn add_frames(&mut self, measures: &Measures) {
         for (name, values) in measures.arrays() {
             self.add(name, values.iter().map(|value| f64::from(*value)));
@@ -112,13 +109,11 @@ impl MeasureCounts {
         self.add(BONES, bone_change.iter().map(|value| f64::from(*value)));
     }
 
-    /// Counts the accepted intervals of a video.
     pub fn add_intervals(&mut self, ledger: &Ledger) {
         self.add(LENGTHS, ledger.accepted.iter().map(|accepted| accepted.end_secs - accepted.start_secs));
     }
 }
 
-/// Section with a card for each measure.
 pub fn distributions(measures: &MeasureCounts, settings: &Settings, per_sec: f64) -> Vec<Node> {
     let about = "All frames of all videos, including rejected ones. Values below a minimum or above a maximum have \
                  another colour. Bar heights are proportional to the square root of the share, so that rare values stay \

@@ -23,7 +23,6 @@ use orator_formats::{joints_npz, sound_offset_json};
 use orator_pipeline::segment::Measures;
 use std::path::Path;
 
-/// Data of a report.
 pub struct ReportData {
     pub videos: Vec<VideoSummary>,
     /// Accepted seconds by threshold (`sliders`) of each video; `None`: the video has no measures.
@@ -151,7 +150,6 @@ fn motion(work: &Path, unit: &Unit) -> Result<(orator_base::types::pose3d::Motio
     Ok((joints_npz::read(&Artifact::Joints.path(work, unit))?, intervals))
 }
 
-/// Summary of a video in the report.
 #[derive(Clone, Debug)]
 pub struct VideoSummary {
     pub unit: Unit,
@@ -161,7 +159,6 @@ pub struct VideoSummary {
     pub ledger: Ledger,
     /// Whether the lift stage has finished.
     pub is_lifted: bool,
-    /// Whether a stage failed.
     pub has_failed: bool,
     /// Notes on missing data and on properties of the file, a sentence each.
     pub notes: Vec<String>,

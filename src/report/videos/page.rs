@@ -15,7 +15,6 @@ use orator_dataset::config::videos::Videos;
 use serde_json::json;
 use std::collections::BTreeMap;
 
-/// Request for a report.
 pub struct ReportRequest<'a> {
     pub settings: &'a Settings,
     pub videos: &'a [Videos],
@@ -23,11 +22,9 @@ pub struct ReportRequest<'a> {
     pub n_pictures: usize,
 }
 
-/// Report as a page and as data.
 pub struct ReportPage {
     pub html: String,
     pub sums: ReportTotals,
-    /// Totals as JSON.
     pub facts: serde_json::Value,
 }
 

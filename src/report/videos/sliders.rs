@@ -52,7 +52,6 @@ pub fn data(accepted: &[Option<AcceptedByThreshold>], videos: &[VideoSummary], r
     json!({ "thresholds": thresholds, "videos": judged.collect::<Vec<_>>() })
 }
 
-/// Section with the sliders.
 pub fn sliders(accepted: &[Option<AcceptedByThreshold>], rules: &SegmentConfig) -> Vec<Node> {
     if accepted.iter().all(Option::is_none) {
         return vec![node("p").class("empty").text("No video has been processed yet: run `orator run`.")];

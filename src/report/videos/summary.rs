@@ -24,7 +24,6 @@ pub struct ReportTotals {
     pub waiting: f64,
     /// By reason.
     pub rejected: BTreeMap<String, f64>,
-    /// Number of accepted intervals.
     pub n_accepted: usize,
 }
 

@@ -5,14 +5,12 @@ use orator_dataset::config::SegmentConfig;
 /// Number of steps between the ends of a grid.
 const N_STEPS: u32 = 20;
 
-/// Threshold with its grid of values.
 pub struct ThresholdGrid {
     /// Key in `[segment]`.
     pub key: &'static str,
     pub description: &'static str,
     /// Unit; empty for a score or share in 0..1 and for a count that the description names.
     pub unit: &'static str,
-    /// Ends of the grid.
     pub low: f64,
     pub high: f64,
     pub get: fn(&SegmentConfig) -> f64,
@@ -47,7 +45,6 @@ macro_rules! row {
     };
 }
 
-/// All thresholds with sliders.
 pub const THRESHOLDS: [ThresholdGrid; 19] = [
     row!(min_sound_db, "minimum loudness of the second around a frame", "dBFS", -90.0, -10.0),
     row!(min_speech, "minimum share of speech in the 4 s around a frame", "", 0.0, 1.0),

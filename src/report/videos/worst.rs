@@ -25,7 +25,6 @@ use orator_pipeline::segment::table::{Bound, frame_rules, segment_rules};
 use std::collections::BTreeMap;
 use std::path::Path;
 
-/// Moment that is shown as a picture.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Moment {
     /// Index of the video in the report.
@@ -197,7 +196,6 @@ const GAP_PX: usize = 4;
 const GAP_RGB: [u8; 3] = [255; 3];
 const EMPTY_RGB: [u8; 3] = [70; 3];
 
-/// Thumbnail of a moment.
 #[derive(Clone, Debug)]
 pub struct MomentThumbnail {
     pub jpeg: Vec<u8>,

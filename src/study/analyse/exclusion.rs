@@ -111,7 +111,6 @@ fn tests_of_rules<'v>(rules: &ExclusionRules, votes: &'v [StudyVote]) -> Vec<Exc
 }
 
 impl ExclusionSummary {
-    /// Whether any vote was excluded.
     pub fn any_excluded(&self) -> bool {
         self.n_votes_analysed < self.n_votes
     }

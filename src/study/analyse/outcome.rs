@@ -53,7 +53,6 @@ pub fn name_pairs<S: AsRef<str>>(names: &[S]) -> impl Iterator<Item = [&str; 2]>
     names.iter().enumerate().flat_map(|(k, a)| names[k + 1..].iter().map(move |b| [a.as_ref(), b.as_ref()]))
 }
 
-/// Vote with a binary outcome.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BinaryVote<'v> {
     /// Score 1 for success, otherwise 0.
@@ -143,7 +142,6 @@ pub fn differences(votes: &[&StudyVote], numbering: &Numbering, [first, second]:
     votes.iter().filter_map(one).collect()
 }
 
-/// Scores of one condition.
 pub fn scores(votes: &[&StudyVote], numbering: &Numbering, condition: &str) -> Vec<ClipVote> {
     let one = |vote: &&StudyVote| {
         let index = vote.conditions.iter().position(|name| name == condition)?;

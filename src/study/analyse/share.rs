@@ -13,7 +13,6 @@ use std::collections::BTreeMap;
 /// Proportion of successes by guessing.
 pub const CHANCE: f64 = 0.5;
 
-/// Votes of one proportion.
 #[derive(Clone, Debug)]
 pub struct ShareCell<'v> {
     pub measure: ShareMeasure,

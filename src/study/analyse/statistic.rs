@@ -5,7 +5,6 @@ use crate::stats::estimate::{ConfidenceInterval, StatisticsError, StudentEstimat
 use crate::stats::proportion::Equivalence;
 use serde::Serialize;
 
-/// Method of a statistic.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum StatisticMethod {
@@ -41,7 +40,6 @@ impl StatisticMethod {
         matches!(self, Self::WilcoxonVotes | Self::Median | Self::Wilson | Self::Binomial)
     }
 
-    /// Display name.
     pub fn name(self) -> &'static str {
         match self {
             Self::Crossed => "participants and clips crossed",
@@ -77,7 +75,6 @@ impl StatisticOrigin {
     }
 }
 
-/// Confidence interval.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct IntervalEstimate {
     #[serde(flatten)]

@@ -12,9 +12,7 @@ pub struct ClipNeeds {
     /// Clips for the sound check and the practice trial.
     pub practice: usize,
     pub checks: usize,
-    /// Clips for training trials, by task.
     pub training: Vec<usize>,
-    /// Clips for main trials, by task.
     pub main: Vec<usize>,
 }
 
@@ -77,9 +75,7 @@ impl ClipNeeds {
 pub struct SharedClips {
     pub practice: Vec<String>,
     pub checks: Vec<String>,
-    /// Clips of training trials, by task.
     pub training: Vec<Vec<String>>,
-    /// Clips of main trials, by task.
     pub main: Vec<Vec<String>>,
 }
 

@@ -111,7 +111,6 @@ impl SquareRows {
         self.square.len()
     }
 
-    /// Index of the next row.
     pub fn next_row(&mut self) -> usize {
         let n_rows = self.square.len().max(1);
         if self.n_assigned.is_multiple_of(n_rows) {

@@ -82,7 +82,6 @@ impl Designer<'_> {
         Ok(PlannedSession { trials })
     }
 
-    /// Training trials of a task in a session.
     fn training(&mut self, at: usize, session: usize) -> Result<Vec<Trial>> {
         let assigned = self.tasks[at].training(session);
         let trial = |trial: AssignedTrial| {
@@ -172,7 +171,6 @@ impl Designer<'_> {
     }
 }
 
-/// Audio track of the films of a task.
 fn film_sound(task: &StudyTask) -> FilmSound {
     if task.sound { FilmSound::Speech } else { FilmSound::Silence }
 }

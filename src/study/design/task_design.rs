@@ -9,7 +9,6 @@ use crate::vote::{Response, ScreenSide};
 use std::collections::{BTreeMap, VecDeque};
 use std::fmt;
 
-/// Conditions compared in one trial.
 pub(super) type ComparedConditions<'a> = Vec<&'a StudyCondition>;
 
 /// Comparisons of a task, each of which gets an equal share of the trials. With single films the real condition is as
@@ -100,12 +99,10 @@ impl<'a> TaskDesigner<'a> {
         }
     }
 
-    /// Practice trial of a session.
     pub fn practice(&mut self, session: usize) -> Vec<AssignedTrial> {
         assign(&mut self.practice, 1, session)
     }
 
-    /// Training trials of a session.
     pub fn training(&mut self, session: usize) -> Vec<AssignedTrial> {
         assign(&mut self.training, self.task.training, session + self.number)
     }
@@ -154,7 +151,6 @@ pub struct TaskBalance {
 }
 
 impl TaskBalance {
-    /// Balance without votes.
     pub fn new(designer: &TaskDesigner, n_clips: &[usize]) -> Self {
         let of_speaker = |(speaker, n): (usize, &usize)| (0..*n).map(move |clip| (speaker, clip)).collect::<Vec<_>>();
         let clips = n_clips.iter().enumerate().flat_map(of_speaker);

@@ -26,7 +26,6 @@ pub const ASSETS: [(&str, &str, &str); 13] = [
 /// Number of tones in the film of the sound check; `sound.js` expects the same number.
 pub const SOUND_CHECK_TONES: usize = 3;
 
-/// Texts by key.
 pub type PageTexts = BTreeMap<String, String>;
 
 /// Built-in languages; the first is the fallback for missing texts.

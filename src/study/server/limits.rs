@@ -97,7 +97,6 @@ impl PeerLimit {
     }
 }
 
-/// A counted connection.
 #[derive(Debug)]
 pub struct PeerConnection {
     limit: Arc<PeerLimit>,

@@ -18,14 +18,12 @@ const END_TOLERANCE_MS: f64 = 250.0;
 /// task's instructions and loading the films. Consent and the sound check precede the start of a session.
 const UNANSWERED_MS: i64 = 300_000;
 
-/// Path and duration of a served film.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ServedFilm {
     pub path: PathBuf,
     secs: f64,
 }
 
-/// Served study.
 #[derive(Debug)]
 pub struct ServedStudy {
     pub title: String,
@@ -40,7 +38,6 @@ pub struct ServedStudy {
     pub return_url: Option<String>,
     /// Texts and tasks in the form that the page reads.
     pub page: serde_json::Value,
-    /// Films by opaque name.
     films: HashMap<String, ServedFilm>,
 }
 
@@ -93,7 +90,6 @@ impl ServedStudy {
         self.films.get(name)
     }
 
-    /// Number of films.
     pub fn n_films(&self) -> usize {
         self.films.len()
     }

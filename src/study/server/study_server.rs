@@ -104,7 +104,6 @@ impl StudyServer {
     }
 }
 
-/// Routes of the server, restricted to the allowed `hosts`.
 fn router(app: App, hosts: AllowedHosts) -> Router {
     let mut router = Router::new()
         .route("/api/study", get(api::study))

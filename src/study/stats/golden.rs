@@ -6,7 +6,6 @@ use super::rank::{MeasurementScale, alpha, friedman, median_interval, signed_ran
 use serde::de::DeserializeOwned;
 use serde_json::Value;
 
-/// Golden cases of a statistic.
 fn cases(statistic: &str) -> Vec<Value> {
     let golden: Value =
         serde_json::from_str(include_str!("../../../fixtures/reference/study_stats_golden.json")).unwrap();

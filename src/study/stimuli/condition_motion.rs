@@ -37,7 +37,6 @@ pub struct ShownMotion {
     pub posture: Option<Posture>,
 }
 
-/// Models of a speaker by condition name.
 pub struct ConditionModels(BTreeMap<String, EvaluatedCheckpoint>);
 
 impl ConditionModels {

@@ -58,7 +58,6 @@ pub struct CutSpeech {
     pub rejected: Vec<RejectedSegment>,
 }
 
-/// Candidate for a clip.
 struct CutCandidate {
     start: usize,
     cut_db: f32,

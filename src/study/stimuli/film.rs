@@ -17,7 +17,6 @@ use std::path::Path;
 
 /// Camera of the films with one avatar.
 const CAMERA: FilmCamera = FilmCamera::Front;
-/// Frame rate of side-by-side films.
 const SIDE_BY_SIDE_FPS: FrameRate = FrameRate::new(30, 1);
 /// Key derivation context of the film names.
 const NAME_CONTEXT: &str = "orator study 2026 names of films";
@@ -46,7 +45,6 @@ pub fn stage(layout: FilmLayout, shown: &[&Performance], size: [usize; 2]) -> Op
     }
 }
 
-/// Content of a film.
 pub struct FilmScene<'a> {
     /// Performances of the avatars at the film's rate and of equal length, left to right.
     pub performances: &'a [Performance],

@@ -55,7 +55,6 @@ pub struct FilmedSpeaker {
     performances: BTreeMap<String, Vec<(usize, Performance)>>,
     /// By mismatched condition whose other clips the design draws, then by clip: the motions that it may show.
     drawn: BTreeMap<String, Vec<ShownMotion>>,
-    /// Visibility of the films of each clip.
     visibilities: Vec<CommonVisibility>,
     body: CommonBody,
     stage: AvatarStage,
@@ -213,7 +212,6 @@ impl FilmedSpeaker {
         std::iter::once(self.performance(content)).chain(right).collect()
     }
 
-    /// Scene of the film with this content and its performances.
     pub fn scene<'a>(&'a self, content: &FilmContent, performances: &'a [Performance]) -> FilmScene<'a> {
         let sound = match content.sound {
             FilmSound::Speech => self.find(&content.clip).and_then(|clip| self.sounds.get(clip)),

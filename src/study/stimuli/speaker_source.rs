@@ -14,10 +14,8 @@ use orator_formats::transcript::{Transcript, Word};
 use orator_media::ffmpeg::audio;
 use std::path::{Path, PathBuf};
 
-/// Source of the speech of one speaker.
 pub struct SpeakerSource {
     pub name: String,
-    /// Frame rate of the motion.
     pub fps: FrameRate,
     /// Bone lengths of the speaker, metres, 0 if unknown; empty without a dataset.
     pub bone_lengths: Vec<f32>,
@@ -36,7 +34,6 @@ enum SegmentLocation {
     File(PathBuf),
 }
 
-/// Segment of speech in memory.
 pub struct SpeechSegment {
     /// Name, unique for the speaker.
     pub name: String,

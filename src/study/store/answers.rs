@@ -32,13 +32,10 @@ pub struct TrialTerms {
     /// Minimum time from the first presentation of the trial to its answer, milliseconds: before, its films cannot have
     /// been watched.
     pub min_ms: i64,
-    /// Whether the trial is the last of its session.
     pub is_last: bool,
-    /// Whether the answer fails an attention check.
     pub fails_check: bool,
 }
 
-/// Result of recording an answer.
 #[derive(Clone, Debug, PartialEq)]
 pub enum RecordOutcome {
     /// The answer is stored, now or earlier; current state of the participant.
@@ -126,7 +123,6 @@ fn at(db: &Connection, id: &str, position: u32) -> rusqlite::Result<Option<Submi
     db.query_row(&sql, params![id, position], of_row).optional()
 }
 
-/// Answers of a participant by position.
 pub fn of(db: &Connection, id: &str) -> rusqlite::Result<Vec<SubmittedAnswer>> {
     let sql = format!("SELECT {COLUMNS} FROM answer WHERE participant = ?1 ORDER BY position");
     db.prepare(&sql)?.query_map([id], of_row)?.collect()
@@ -139,7 +135,6 @@ pub struct StallCount {
     pub secs: f64,
 }
 
-/// Counts the answers with stalled films.
 pub fn stalls(db: &Connection) -> rusqlite::Result<StallCount> {
     let sql = "SELECT COUNT(*), TOTAL(stalled_secs) FROM answer WHERE stalled_secs > 0";
     db.query_row(sql, [], |row| Ok(StallCount { trials: row.get(0)?, secs: row.get(1)? }))

@@ -107,7 +107,6 @@ pub fn increment(db: &Connection, name: &str) -> rusqlite::Result<()> {
     db.execute("UPDATE about SET value = value + 1 WHERE name = ?1", params![name]).map(drop)
 }
 
-/// Maximum number of jobs per commit.
 const MAX_JOBS_PER_COMMIT: usize = 256;
 /// Maximum number of queued jobs; further callers wait to enqueue.
 const MAX_QUEUED: usize = 1024;

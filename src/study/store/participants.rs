@@ -27,7 +27,6 @@ pub enum Status {
 impl Status {
     const ALL: [Self; 3] = [Self::Active, Self::Completed, Self::Replaced];
 
-    /// Name in the database and in exports.
     pub fn name(self) -> &'static str {
         match self {
             Self::Active => "active",
@@ -50,7 +49,6 @@ impl FromSql for Status {
     }
 }
 
-/// Participant as stored.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Participant {
     /// Random identifier, or the one derived from the page's attempt to begin.
@@ -68,7 +66,6 @@ pub struct Participant {
     pub position: u32,
     /// Time at which that trial was first presented, milliseconds since 1970.
     pub given_ms: i64,
-    /// Number of failed attention checks.
     pub failed_checks: u32,
 }
 
@@ -96,7 +93,6 @@ impl Participant {
 /// Rules for assigning sessions.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Quota {
-    /// Number of sessions of the plan.
     pub n_sessions: u32,
     /// Target number of participants who complete the study and are not excluded for failed checks.
     pub target: u32,
@@ -183,7 +179,6 @@ impl NewParticipant {
     }
 }
 
-/// Result of a request to begin.
 #[derive(Clone, Debug, PartialEq)]
 pub enum BeginOutcome {
     /// Session assigned now, or earlier to the same identifier.

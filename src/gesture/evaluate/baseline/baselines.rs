@@ -78,12 +78,9 @@ impl NumberedCheckpoint {
     }
 }
 
-/// Motion of one clip by a predictor.
 #[derive(Clone, Debug)]
 pub enum ClipMotion {
-    /// Prediction of the clip.
     Prediction,
-    /// Ground truth of the clip.
     GroundTruth,
     /// Constant pose [49, 3].
     Constant(Array2<f32>),
@@ -91,7 +88,6 @@ pub enum ClipMotion {
     Motion(StoredMotion),
 }
 
-/// Motion for every clip.
 #[derive(Clone, Debug)]
 pub struct Predictor {
     pub kind: PredictorKind,
@@ -99,7 +95,6 @@ pub struct Predictor {
     pub checkpoint: Option<NumberedCheckpoint>,
     /// Description in one sentence.
     pub description: String,
-    /// One motion per clip.
     pub motions: Vec<ClipMotion>,
 }
 

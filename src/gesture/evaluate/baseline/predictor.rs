@@ -105,7 +105,6 @@ pub struct Query<'a> {
 
 /// Entries among which neighbours are searched.
 pub struct Library<'a> {
-    /// Number of entries.
     pub n: usize,
     /// Whether the queries are the entries in the same order, so that an entry must not match itself.
     pub excludes_self: bool,
@@ -115,7 +114,6 @@ pub struct Library<'a> {
     pub joints: &'a dyn Fn(usize, Range<usize>) -> Result<Array3<f32>>,
 }
 
-/// Window of a query.
 struct QueryWindow<'a> {
     query: usize,
     frames: Range<usize>,

@@ -14,7 +14,6 @@ use orator_formats::transcript::Word;
 use rayon::prelude::*;
 use std::ops::Range;
 
-/// Interval of the dataset with its sound.
 pub struct HeldOutInterval {
     pub key: String,
     /// Motion with the speaker's bone lengths, as in training, instead of those of the video.

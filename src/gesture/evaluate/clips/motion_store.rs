@@ -11,7 +11,6 @@ use std::sync::{Mutex, PoisonError};
 /// Default limit of the bytes that are stored in memory.
 pub const MEMORY_BYTES: usize = 192 << 20;
 
-/// Storage for motions.
 pub struct MotionStore(Mutex<StoreState>);
 
 struct StoreState {
@@ -73,7 +72,6 @@ impl StoredMotion {
         }
     }
 
-    /// Number of frames T.
     pub fn n_frames(&self) -> usize {
         match self {
             Self::Held(joints) => joints.shape()[0],

@@ -19,7 +19,6 @@ pub enum Aspect {
     Position,
     /// Poses and their sequence.
     Poses,
-    /// Speed of movement.
     Movement,
     /// Alignment of movement with the beat of the sound.
     Beat,
@@ -34,7 +33,6 @@ pub enum Answer {
     Inconclusive,
 }
 
-/// Vote of a metric.
 #[derive(Clone, Debug, Serialize)]
 pub struct Vote {
     pub metric: String,
@@ -55,7 +53,6 @@ pub struct Conclusion {
     pub word: &'static str,
     /// Full sentence without the votes.
     pub sentence: String,
-    /// Votes of the metrics.
     pub votes: Vec<Vote>,
 }
 

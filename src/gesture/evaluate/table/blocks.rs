@@ -134,7 +134,6 @@ const BLOCK_SECS: [f64; 2] = [2.0, 4.0];
 /// Duration of motion, seconds, above which blocks become longer, which bounds their number.
 const MAX_SECS: f64 = 3600.0;
 
-/// Length of blocks.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BlockLength {
     /// Length in seconds.

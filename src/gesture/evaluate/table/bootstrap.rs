@@ -37,10 +37,8 @@ pub fn estimate(value: f64, drawn: &[f64]) -> Estimate {
 /// compute and makes the groups less dependent.
 const MAX_GROUPS: usize = 32;
 
-/// Groups of neighbouring blocks.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct BlockGroups {
-    /// Group index of each block.
     of_block: Vec<usize>,
     /// Share of the frames in each group, sum 1.
     shares: Vec<f64>,
@@ -62,7 +60,6 @@ impl BlockGroups {
         self.shares.len()
     }
 
-    /// Whether there are no blocks.
     pub fn is_empty(&self) -> bool {
         self.shares.is_empty()
     }

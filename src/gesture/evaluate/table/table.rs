@@ -19,7 +19,6 @@ pub const N_COSTLY_DRAWS: usize = 100;
 /// Number of blocks below which bootstrap intervals are unreliable.
 pub const FEW_BLOCKS: usize = 10;
 
-/// Metrics of one predictor.
 #[derive(Clone, Debug)]
 pub struct PredictorRow {
     pub kind: PredictorKind,
@@ -35,7 +34,6 @@ pub struct PredictorRow {
     without_group: Array2<f64>,
 }
 
-/// Metrics of all predictors.
 #[derive(Clone, Debug)]
 pub struct Table {
     pub settings: MetricSettings,

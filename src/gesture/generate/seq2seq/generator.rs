@@ -23,7 +23,6 @@ use std::sync::Arc;
 
 /// A trained sequence-to-sequence network.
 pub struct SequenceGenerator {
-    /// Metadata stored in the checkpoint.
     pub metadata: SequenceMetadata,
     network: Box<dyn GesturePredictor>,
     /// Tensors of the network.
@@ -42,7 +41,6 @@ pub struct SpeechInput {
     network: Option<Box<dyn GesturePredictor>>,
 }
 
-/// Generated poses for a sound.
 #[derive(Clone, Debug)]
 pub struct GeneratedPoses {
     /// Smoothed pose features [T, C].
@@ -97,7 +95,6 @@ impl SequenceGenerator {
         }
     }
 
-    /// Frame rate of the generated motion.
     pub fn fps(&self) -> FrameRate {
         self.metadata.fps
     }

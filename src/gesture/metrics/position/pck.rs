@@ -74,7 +74,6 @@ pub(crate) fn neck_in_box(alphas: &[f64]) -> MetricFamily {
     family(alphas.iter().map(|alpha| (PckAxes::Xyz, BodyPart::All, *alpha)).collect(), true, false)
 }
 
-/// Family with one PCK per variant.
 fn family(variants: Vec<(PckAxes, BodyPart, f64)>, neck_in_box: bool, by_frame: bool) -> MetricFamily {
     let definition = |(axes, part, alpha): &(PckAxes, BodyPart, f64)| {
         let (name, formula) = match axes {

@@ -6,7 +6,6 @@ use anyhow::{Context, Result};
 use rayon::ThreadPoolBuilder;
 use std::sync::mpsc::{self, Receiver, Sender};
 
-/// Function that reads the batch of a step.
 pub type BatchOfStep<'a> = &'a (dyn Fn(usize) -> Result<WindowBatch> + Sync);
 
 /// Batches of consecutive steps, prefetched by one step.

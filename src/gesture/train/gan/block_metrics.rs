@@ -151,7 +151,6 @@ impl AngleSums {
     }
 }
 
-/// Running mean.
 #[derive(Default)]
 pub struct RunningMean {
     sum: f64,

@@ -28,7 +28,6 @@ pub struct IntervalRows {
     pub first_mel: usize,
 }
 
-/// The intervals of a split.
 pub struct TrainingIntervals<'d> {
     dataset: &'d Dataset,
     samples: Vec<SampleRef>,
@@ -61,12 +60,10 @@ impl<'d> TrainingIntervals<'d> {
         Ok(intervals)
     }
 
-    /// Number of intervals.
     pub fn n_intervals(&self) -> usize {
         self.samples.len()
     }
 
-    /// Number of frames of an interval.
     pub fn n_frames(&self, interval: usize) -> usize {
         self.samples[interval].n_frames
     }

@@ -104,7 +104,6 @@ const CHOICES: [(&str, &str, &str); 4] = [
     ("bone_loss", "metres", "relative"),
 ];
 
-/// Source of a value of the recipe `rebol2021`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ValueSource {
     /// Stated in Rebol et al. 2021, with the section or equation.

@@ -62,12 +62,10 @@ impl SpeakerSet {
         })
     }
 
-    /// Metadata of all speakers.
     pub fn all(&self) -> &[SpeakerMetadata] {
         &self.of
     }
 
-    /// Configuration of the network.
     pub fn network(&self) -> &Config {
         &self.of[0].network
     }
@@ -77,7 +75,6 @@ impl SpeakerSet {
         self.of.iter().map(|of| of.name.as_str()).collect::<Vec<_>>().join(", ")
     }
 
-    /// Number of features of a pose.
     pub fn n_features(&self) -> usize {
         self.of[0].normalisation.n_features()
     }

@@ -52,7 +52,6 @@ pub struct Losses {
     pub gradient_norm: f64,
 }
 
-/// Metadata of a checkpoint.
 #[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
 pub struct TrainerState {
     pub speaker: SpeakerMetadata,

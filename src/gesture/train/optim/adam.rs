@@ -16,7 +16,6 @@ use std::sync::Mutex;
 /// Elements per task; fixed, so that results do not depend on the number of threads.
 const GRAIN: usize = 32 * 1024;
 
-/// Settings of the optimiser.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Config {
     pub beta1: f64,

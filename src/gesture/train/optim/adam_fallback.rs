@@ -58,7 +58,6 @@ pub fn sum_of_squares(grad: &Tensor) -> Result<f64> {
     grad.sqr()?.sum_all()?.to_scalar::<f32>().map(f64::from)
 }
 
-/// Scalars of one update.
 #[derive(Clone, Copy)]
 pub struct AdamScalars {
     pub beta1: f32,

@@ -74,13 +74,11 @@ impl CaptureFolder {
         Ok(Self { dir: dir.to_owned(), rate, mapping, captures })
     }
 
-    /// Name of the folder.
     pub fn name(&self) -> String {
         let dir = self.dir.canonicalize().unwrap_or_else(|_| self.dir.clone());
         dir.file_name().map_or_else(|| "captures".to_owned(), |name| name.to_string_lossy().into_owned())
     }
 
-    /// Path of the folder.
     pub fn dir(&self) -> &Path {
         &self.dir
     }

@@ -20,7 +20,6 @@ pub struct SegmentLoader {
     starts: Vec<(usize, usize)>,
 }
 
-/// Batch of segments, f32.
 pub struct SegmentBatch {
     pub segment: Segment,
     /// Target poses [B, predicted, C]; unknown values are interpolated.
@@ -53,7 +52,6 @@ impl SegmentLoader {
         Self { metadata: metadata.clone(), sequences, words, starts }
     }
 
-    /// Number of segments.
     pub fn len(&self) -> usize {
         self.starts.len()
     }

@@ -15,7 +15,6 @@ use orator_dataset::{Dataset, Split};
 use orator_formats::bvh::exponential_maps::FPS;
 use rayon::prelude::*;
 
-/// Training data.
 #[derive(Clone, Copy)]
 pub enum TrainingSource<'a> {
     Dataset(&'a Dataset),
@@ -39,7 +38,6 @@ impl TrainingSource<'_> {
         }
     }
 
-    /// Frame rate of the poses.
     pub fn fps(&self) -> FrameRate {
         match self {
             Self::Dataset(dataset) => dataset.info().fps,
@@ -55,7 +53,6 @@ impl TrainingSource<'_> {
         }
     }
 
-    /// Hash of the data.
     pub fn hash(&self) -> Result<String> {
         match self {
             Self::Dataset(dataset) => dataset.hash(),

@@ -43,7 +43,6 @@ pub struct SequenceLosses {
     pub gradient_norm: f64,
 }
 
-/// Metadata of a checkpoint.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct SequenceState {
     pub speaker: SequenceMetadata,
@@ -106,7 +105,6 @@ impl SequenceTrainer {
         })
     }
 
-    /// Parameters of the network.
     pub fn params(&self) -> &Params {
         &self.params
     }

@@ -19,10 +19,8 @@ pub struct ValidationSegments {
     batches: Vec<SegmentBatch>,
 }
 
-/// Metrics of a validation.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SequenceValidation {
-    /// Evaluated split.
     pub split: String,
     pub n_segments: usize,
     /// Mean absolute error of the known features.
@@ -59,7 +57,6 @@ impl ValidationSegments {
         Ok(Self { split, batches })
     }
 
-    /// Metrics of the network on the segments.
     pub fn validate(&self, network: &dyn GesturePredictor) -> Result<SequenceValidation> {
         let mut sums = Sums::default();
         for batch in &self.batches {

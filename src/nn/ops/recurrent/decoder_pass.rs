@@ -13,7 +13,6 @@ pub struct DecoderSizes {
     pub n_steps: usize,
     /// Sizes of pose and state.
     pub cell: GruSizes,
-    /// Number of keys of each sequence.
     pub n_keys: Vec<usize>,
     /// Number of rows per chunk.
     pub chunk: usize,
@@ -28,7 +27,6 @@ impl DecoderSizes {
         1 + self.n_keys.len()
     }
 
-    /// Number of keys of all sequences.
     pub fn all_keys(&self) -> usize {
         self.n_keys.iter().sum()
     }

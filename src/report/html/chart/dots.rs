@@ -3,7 +3,6 @@
 use super::scale::{circle, drawing, line, text_at};
 use crate::html::node::{Node, node};
 
-/// Dot of the drawing.
 #[derive(Clone, Debug)]
 pub struct ChartDot {
     pub at: [f64; 2],

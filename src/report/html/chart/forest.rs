@@ -5,11 +5,9 @@ use super::scale::{Scale, circle, drawing, line, rect, text_at};
 use crate::html::node::{Node, node};
 use orator_base::text::number;
 
-/// Row of the chart.
 #[derive(Clone, Debug)]
 pub struct ForestRow {
     pub name: String,
-    /// CSS class of its colour.
     pub class: &'static str,
     pub value: f64,
     pub interval: Option<[f64; 2]>,
@@ -17,7 +15,6 @@ pub struct ForestRow {
     pub value_text: String,
 }
 
-/// Scale of the chart.
 #[derive(Clone, Copy, Debug)]
 pub struct ForestScale {
     pub low: f64,
@@ -68,7 +65,6 @@ pub fn forest(label: &str, rows: &[ForestRow], scale: &ForestScale) -> Node {
     svg.child(line("axis", [LEFT, floor], [RIGHT, floor])).child(unit)
 }
 
-/// Row of the chart.
 pub struct ValueRange {
     pub name: String,
     pub class: &'static str,

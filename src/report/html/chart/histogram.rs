@@ -35,7 +35,6 @@ impl Counts {
         self.bins.iter().sum()
     }
 
-    /// Lower edge of bin `bin`.
     pub fn edge(&self, bin: usize) -> f64 {
         self.low + (self.high - self.low) * bin as f64 / self.bins.len() as f64
     }
@@ -56,7 +55,6 @@ impl Counts {
     }
 }
 
-/// Threshold drawn in a histogram.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ThresholdLine {
     pub value: f64,

@@ -12,7 +12,6 @@ const FLOOR: f64 = 160.0;
 const LEFT: f64 = 44.0;
 const RIGHT: f64 = 350.0;
 
-/// Line chart.
 #[derive(Clone, Debug, Default)]
 pub struct LineChart {
     pub title: String,
@@ -25,7 +24,6 @@ pub struct LineChart {
     pub marked: Option<f64>,
 }
 
-/// Line of a chart.
 #[derive(Clone, Debug)]
 pub struct ChartLine {
     pub name: String,
@@ -35,7 +33,6 @@ pub struct ChartLine {
     pub points: Vec<[f64; 2]>,
 }
 
-/// Horizontal line of a chart.
 #[derive(Clone, Debug)]
 pub struct ChartLevel {
     pub name: String,

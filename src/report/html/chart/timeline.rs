@@ -7,12 +7,10 @@ use super::scale::{Scale, drawing, line, path_data, px, text_at};
 use crate::html::node::{Node, node};
 use orator_base::text::number;
 
-/// Interval of a timeline.
 #[derive(Clone, Debug)]
 pub struct TimelineSpan {
     pub start_secs: f64,
     pub end_secs: f64,
-    /// CSS class of its colour.
     pub class: String,
     /// Label, shown if there is room.
     pub word: String,
@@ -70,7 +68,6 @@ const FOOT: f64 = 20.0;
 const LEFT: f64 = 4.0;
 const RIGHT: f64 = 716.0;
 
-/// Track of the chart.
 #[derive(Clone, Debug, Default)]
 pub struct Track {
     /// Name with unit.

@@ -13,7 +13,6 @@ use orator_report::html::{Node, legend, node, table};
 /// Names of the five preference steps, from the second condition to the first.
 const STEPS: [&str; 5] = ["second, clearly", "second, slightly", "no preference", "first, slightly", "first, clearly"];
 
-/// Charts of a task.
 pub(super) fn task(task: &TaskAnalysis, analysis: &StudyAnalysis) -> Vec<Node> {
     let parts = [
         (!task.shares.is_empty()).then(|| shares(task, analysis)),

@@ -9,7 +9,6 @@ use crate::stats::estimate::ConfidenceInterval;
 use orator_base::text::number;
 use orator_report::html::{Node, node, table};
 
-/// Columns of the table of statistics.
 const COLUMNS: [&str; 6] = ["Method", "Interval", "Statistic (df)", "p", "p after Holm", "Status"];
 
 /// Table of a task's statistics, grouped by quantity.
@@ -69,7 +68,6 @@ pub(super) fn task(task: &TaskAnalysis) -> Vec<Node> {
     body
 }
 
-/// Table of the shares per clip.
 fn clips(task: &TaskAnalysis) -> Node {
     let row = |of: &ClipShare| {
         let cell = |text: String| node("td").class("num").text(text);

@@ -45,7 +45,6 @@ impl ColumnNames {
         Ok(Self(names))
     }
 
-    /// Column name of a field in the file.
     fn of(&self, field: &'static str) -> &str {
         self.0.get(field).map_or(field, String::as_str)
     }

@@ -15,7 +15,6 @@ use std::path::Path;
 /// Maximum file size, bytes.
 const MAX_BYTES: u64 = 1 << 30;
 
-/// Votes read from a source.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct VotesRead {
     pub votes: Vec<StudyVote>,

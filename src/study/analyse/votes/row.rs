@@ -53,7 +53,6 @@ impl RowCells {
         }
     }
 
-    /// Integer from `low` to `high`.
     fn integer(&self, field: &str, [low, high]: [i64; 2]) -> RowResult<Option<i64>> {
         let Some(number) = self.number(field)? else { return Ok(None) };
         let is_right = number.fract() == 0.0 && number >= low as f64 && number <= high as f64;
@@ -119,7 +118,6 @@ pub fn vote(cells: &RowCells, design: Option<TaskDesign>) -> RowResult<StudyVote
     Ok(vote)
 }
 
-/// Default name of a task.
 fn title(design: TaskDesign) -> &'static str {
     match design {
         TaskDesign::Turing => "real-or-generated",

@@ -62,7 +62,6 @@ pub struct SideBlock {
 }
 
 impl SideBlock {
-    /// Adds a trial.
     pub fn push(&mut self, real_left: bool, chosen_left: bool) {
         self.trials += 1;
         self.real_left += u64::from(real_left);

@@ -14,7 +14,6 @@ const INITIAL_SD: f64 = 0.4;
 /// Standard deviation below which a variance component is set to 0, log odds.
 const MIN_SD: f64 = 1e-3;
 
-/// Fitted model.
 #[derive(Clone, Debug)]
 pub struct MixedLogit {
     /// Log odds of a participant and clip with effect 0. Its t distribution has min(participants, clips) - 1 degrees of
