@@ -297,9 +297,6 @@ impl ClusterPlan {
 
     /// Videos of the plan at `path` that the pipeline does not find; empty if `path` is not a plan with the pipeline's
     /// settings.
-    ///
-    /// # Errors
-    /// The settings cannot be hashed.
     pub fn missing_videos(path: &Path, pipeline: &Pipeline) -> Result<Vec<PlannedUnit>> {
         match Self::read(path) {
             Ok(plan) if plan.settings == settings_hash(pipeline.config())? => plan.missing(pipeline),

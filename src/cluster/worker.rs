@@ -248,9 +248,6 @@ impl Session<'_> {
     }
 
     /// Whether to stop after the current unit.
-    ///
-    /// # Errors
-    /// The reason why all workers must stop.
     fn should_stop(&self) -> Result<bool> {
         if let Some(reason) = read_stop(&self.folder)? {
             bail!("all workers stop: {reason}; free at least 64 MiB of disk space and start them again");

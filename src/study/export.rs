@@ -67,9 +67,6 @@ pub fn export(folder: &StudyFolder, form: TableForm, out: &Path) -> Result<Expor
 }
 
 /// Participants of a study in order of start time, and all votes.
-///
-/// # Errors
-/// The study has no responses, or one of its files cannot be read.
 pub fn responses(folder: &StudyFolder) -> Result<(Vec<Participant>, Vec<StudyVote>)> {
     let joined = JoinedPlan::read(folder)?;
     let db = database::open_for_reading(&folder.responses())?;

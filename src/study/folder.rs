@@ -7,9 +7,6 @@ use serde::de::DeserializeOwned;
 use std::path::{Path, PathBuf};
 
 /// Reads a JSON file of a built study.
-///
-/// # Errors
-/// The file cannot be read, or is not valid JSON for `T`.
 pub fn read_json<T: DeserializeOwned>(path: &Path) -> Result<T> {
     let bytes = std::fs::read(path).with_context(|| format!("cannot read {}", path.display()))?;
     serde_json::from_slice(&bytes)

@@ -78,9 +78,6 @@ impl Preregistration {
     }
 
     /// Reads a pre-registration.
-    ///
-    /// # Errors
-    /// The file is missing, damaged or of another version.
     pub fn read(path: &Path) -> Result<Self> {
         let bytes = std::fs::read(path).with_context(|| {
             format!("cannot read the pre-registration {}; `orator study build` creates it", path.display())

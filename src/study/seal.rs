@@ -51,9 +51,6 @@ impl fmt::Display for SealMismatch {
 
 impl StudySeal {
     /// Hashes the files of a finished study.
-    ///
-    /// # Errors
-    /// A file that is missing or cannot be read.
     pub fn of(folder: &StudyFolder) -> Result<Self> {
         let listed = sealed_files(folder)?;
         if let Some((name, _)) = listed.iter().find(|(_, path)| !path.is_file()) {
@@ -114,9 +111,6 @@ impl StudySeal {
     }
 
     /// Compares the study's files with the seal.
-    ///
-    /// # Errors
-    /// A file cannot be listed or read.
     pub fn compare(&self, folder: &StudyFolder) -> Result<SealMismatch> {
         let mut mismatch = SealMismatch::default();
         let listed = sealed_files(folder)?;

@@ -48,9 +48,6 @@ real!(f32, kernel::of_f32, exp_f32);
 real!(f64, kernel::of_f64, f64::exp);
 
 /// Returns the values of a contiguous tensor inside an operator.
-///
-/// # Errors
-/// The tensor is not contiguous; callers guarantee that it is.
 pub fn slice<'a, T: Scalar>(storage: &'a CpuStorage, layout: &Layout) -> Result<&'a [T]> {
     let Some((start, end)) = layout.contiguous_offsets() else {
         candle_core::bail!("expected a contiguous tensor, found strides {:?}", layout.stride());
@@ -69,9 +66,6 @@ pub fn read<T: Scalar, R>(tensor: &Tensor, f: impl FnOnce(&[T]) -> Result<R>) ->
 }
 
 /// Returns whether the number type is f64.
-///
-/// # Errors
-/// It is neither f32 nor f64.
 pub fn is_f64(dtype: DType) -> Result<bool> {
     match dtype {
         DType::F32 => Ok(false),

@@ -97,9 +97,6 @@ impl HeatmapLifter {
 
     /// Lifts hands of one side: wrist at 0, image axes, middle proximal phalanx about 1 long; `None` where too few
     /// points are visible. Left hands are mirrored for the networks.
-    ///
-    /// # Errors
-    /// An error of the tensor library.
     pub fn lift(&self, seen: &[HandPoints], side: Side) -> Result<Vec<Option<HandJoints>>> {
         let flip = if side == Side::Left { -1.0 } else { 1.0 };
         let mirrored: Vec<HandPoints> = seen.iter().map(|s| s.map(|p| p.map(|[x, y]| [flip * x, y]))).collect();

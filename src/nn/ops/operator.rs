@@ -21,9 +21,6 @@ pub trait CpuOperator: Send + Sync {
     const NAME: &'static str;
 
     /// Computes the result and its shape.
-    ///
-    /// # Errors
-    /// The shapes of the operands do not match.
     fn forward<T: Scalar>(&self, operands: [Operand<T>; 3]) -> Result<(Vec<T>, Shape)>;
 
     fn backward<T: Scalar>(&self, operands: [Operand<T>; 3], y: &[T], grad: &[T]) -> Gradients<T>;

@@ -38,9 +38,6 @@ impl<'a> LivePage<'a> {
     }
 
     /// Writes the page after the validation `at`, unless it has already been written for it.
-    ///
-    /// # Errors
-    /// Failed generation of poses, or a page that cannot be written.
     pub fn write(&mut self, at: ValidatedStep) -> Result<()> {
         if self.written == Some(at) {
             return Ok(());
@@ -70,9 +67,6 @@ const METRICS: [(&str, &str, bool); 6] = [
 
 /// Writes `training.html` into the folder of a training run from its log and poses of held-out intervals (may be
 /// empty). The bytes depend only on log and poses.
-///
-/// # Errors
-/// An unreadable log, or a page that cannot be written.
 pub fn write(folder: &Path, speaker: &str, pairs: &[HeldOutPair]) -> Result<()> {
     let lines = log::read(folder)?;
     let training_log = TrainingLog::parse(&lines);

@@ -203,9 +203,6 @@ pub struct MomentThumbnail {
 }
 
 /// Pictures of the video with index `video`, by the frames of their moments.
-///
-/// # Errors
-/// Unreadable keypoints or video, or one that ends before a chosen frame.
 pub fn thumbnails(
     work: &Path,
     unit: &Unit,

@@ -24,9 +24,6 @@ pub struct Registration {
 impl Registration {
     /// Reads the registration of a study folder. If the seal is broken, a note names the files that differ, and
     /// nothing counts as registered: the hypotheses may have been written after the data were seen.
-    ///
-    /// # Errors
-    /// The pre-registration is missing or damaged.
     pub fn of_folder(folder: &StudyFolder) -> Result<Self> {
         let registered = Preregistration::read(&folder.preregistration())?;
         let mismatch = match StudySeal::read(folder) {

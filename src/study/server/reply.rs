@@ -143,9 +143,6 @@ impl<T: DeserializeOwned, S: Send + Sync> FromRequest<S> for JsonBody<T> {
 }
 
 /// Token of the header `Authorization: Bearer TOKEN`.
-///
-/// # Errors
-/// The header is missing or malformed.
 pub fn bearer_token(headers: &HeaderMap) -> Result<&str, ApiError> {
     let token = header_text(headers, header::AUTHORIZATION).and_then(|text| text.strip_prefix("Bearer "));
     token.ok_or_else(unauthorized)

@@ -116,9 +116,6 @@ impl FilmScene<'_> {
     }
 
     /// Writes the mp4 directly to `path`, not atomically.
-    ///
-    /// # Errors
-    /// The film has no avatar or cannot be written.
     pub fn write(&self, path: &Path) -> Result<()> {
         let first = self.performances.first().context("the film has no avatar")?;
         let fps = first.clip.fps;

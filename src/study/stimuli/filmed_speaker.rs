@@ -66,9 +66,6 @@ impl CutSpeaker {
     }
 
     /// Cuts `n_clips` clips of a speaker, or fewer if there are no more; `rank` orders clips of equal grade.
-    ///
-    /// # Errors
-    /// A dataset, sound or checkpoint of the study file cannot be read.
     pub fn new(file: &StudyFile, speaker: &StudySpeaker, n_clips: usize, rank: impl Fn(&str) -> u64) -> Result<Self> {
         let name = &speaker.name;
         let models = ConditionModels::open(&file.condition, name)?;
@@ -173,9 +170,6 @@ impl FilmedSpeaker {
 
     /// Name `speaker/clip` of the clip whose motion the left avatar shows in the film with this content, unless the
     /// design draws it.
-    ///
-    /// # Errors
-    /// The speaker does not have the clip or the condition.
     pub fn motion_of(&self, content: &FilmContent) -> Result<String> {
         let (of, _) = self.shown(content)?;
         Ok(format!("{}/{}", content.speaker, self.clips[*of].name))
@@ -188,9 +182,6 @@ impl FilmedSpeaker {
     }
 
     /// Performance of the left avatar of the film with this content, at the film's rate.
-    ///
-    /// # Errors
-    /// The speaker does not have the clips or the condition.
     fn performance(&self, content: &FilmContent) -> Result<Performance> {
         if let Some(motions) = self.drawn.get(&content.condition) {
             let missing = || format!("no motion of the clip {} for the clip {}", content.motion_of, content.clip);
@@ -204,9 +195,6 @@ impl FilmedSpeaker {
     }
 
     /// Performances of the film with this content at the film's rate, left to right.
-    ///
-    /// # Errors
-    /// The speaker does not have the clip or a condition.
     pub fn performances(&self, content: &FilmContent) -> Result<Vec<Performance>> {
         let right = content.right_alone().map(|right| self.performance(&right));
         std::iter::once(self.performance(content)).chain(right).collect()

@@ -100,9 +100,6 @@ impl SpeakerSource {
     }
 
     /// Reads the segment with this index.
-    ///
-    /// # Errors
-    /// The segment's sound, motion or transcript cannot be read.
     pub fn read(&self, segment: usize) -> Result<SpeechSegment> {
         let SourceSegment { name, location } = &self.segments[segment];
         match (location, &self.dataset) {

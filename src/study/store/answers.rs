@@ -53,9 +53,6 @@ pub enum RecordOutcome {
 }
 
 /// Stores `answer` of the participant `id`.
-///
-/// # Errors
-/// The database fails; nothing is stored.
 pub fn record(
     db: &Connection,
     id: &str,
@@ -152,9 +149,6 @@ pub struct TrialStart {
 
 /// Counts the start unless the same load of the page has sent it already; returns whether the participant `id` is known
 /// in this session. Starts of other trials than the current one are ignored.
-///
-/// # Errors
-/// The database fails; nothing is stored.
 pub fn record_start(db: &Connection, id: &str, session: u32, start: &TrialStart) -> rusqlite::Result<bool> {
     let found = find(db, id)?.filter(|participant| participant.session == session);
     let Some(participant) = found else { return Ok(false) };

@@ -66,9 +66,6 @@ pub fn open(path: &Path, plan: &str) -> Result<Connection> {
 }
 
 /// Opens the database at `path` for reading, while a server may be writing it.
-///
-/// # Errors
-/// There is no database at `path`.
 pub fn open_for_reading(path: &Path) -> Result<Connection> {
     ensure!(path.is_file(), "{} does not exist: no participant has started yet", path.display());
     // Writable, because a reader also has to recover the write-ahead log of a killed server.
@@ -143,7 +140,7 @@ impl ResponseStore {
     /// handle is dropped.
     ///
     /// # Errors
-    /// The database cannot be opened (see [`database::open`]), or the thread cannot be started.
+    /// The database cannot be opened (see [`open`]), or the thread cannot be started.
     pub fn open(path: &Path, plan: &str) -> Result<(Self, JoinHandle<()>)> {
         let mut db = open(path, plan)?;
         db.busy_timeout(LOCK_TIMEOUT)?;
@@ -166,9 +163,6 @@ impl ResponseStore {
     }
 
     /// Runs `work`, which deletes data, and returns its value once no file contains a byte of the deleted data.
-    ///
-    /// # Errors
-    /// The work or the erasure failed or timed out.
     pub async fn erase<T: Send + 'static>(
         &self,
         work: impl FnOnce(&Connection) -> rusqlite::Result<T> + Send + 'static,

@@ -195,9 +195,6 @@ pub enum BeginOutcome {
 /// Assigns the first free session to `new_participant`, unless its identifier has a session already: the page repeats a
 /// request whose reply was lost. An abandoned participant of the assigned session is marked as replaced, or deleted if
 /// there are no answers; so is one with the same ID who has not given the first answer in time.
-///
-/// # Errors
-/// The database fails; nothing is stored.
 pub fn begin(
     db: &Connection,
     new_participant: &NewParticipant,

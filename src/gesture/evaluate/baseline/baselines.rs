@@ -116,9 +116,6 @@ impl Predictor {
     }
 
     /// Replaces missing values by the constant poses of `fallback`.
-    ///
-    /// # Errors
-    /// The temporary file cannot be written.
     pub fn filled(mut self, fallback: &Self, store: &MotionStore) -> Result<Self> {
         for (predicted, fallback) in self.motions.iter_mut().zip(&fallback.motions) {
             if let (ClipMotion::Motion(motion), ClipMotion::Constant(pose)) = (predicted, fallback)
@@ -256,9 +253,6 @@ fn neighbours(clips: &EvalClips, fallback: &Predictor, store: &MotionStore) -> R
 /// forth if it is shorter; for a single clip its own, shifted by half of it with wrap-around. `None` if a single clip
 /// is too short.
 /// `fallback` fills missing values.
-///
-/// # Errors
-/// The temporary file cannot be written.
 pub fn mismatched(
     clips: &EvalClips,
     kind: PredictorKind,

@@ -35,9 +35,6 @@ pub fn motion(speaker: &GestureGenerator, sound: &Sound, n_frames: usize) -> Res
 /// length with wrap-around, so that it mostly comes from another video.
 ///
 /// `lengths` are the numbers of samples of all sounds; `read` returns a range of samples of a sound.
-///
-/// # Errors
-/// Errors of `read`.
 pub fn mismatched_sound(
     lengths: &[usize],
     which: usize,

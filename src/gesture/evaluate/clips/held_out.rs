@@ -64,9 +64,6 @@ pub fn joints(
 }
 
 /// Reads a sample with the speaker's bone lengths.
-///
-/// # Errors
-/// A sample that cannot be read or is damaged.
 pub fn interval(dataset: &Dataset, sample: &SampleRef, normal: &Normalisation) -> Result<HeldOutInterval> {
     let mut sample = dataset.read(sample)?;
     bones::with_lengths(&mut sample.motion, &normal.lengths());

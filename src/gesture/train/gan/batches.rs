@@ -21,9 +21,6 @@ pub struct BatchPrefetcher<'a> {
 
 impl BatchPrefetcher<'_> {
     /// Returns the batch of `step`, and starts to prefetch that of the next step.
-    ///
-    /// # Errors
-    /// Errors of reading the batch.
     pub fn take(&mut self, step: usize) -> Result<WindowBatch> {
         let prefetched = match self.pending.take() {
             Some(pending) => Some(self.results.recv().context("the thread that loads batches has stopped")?)
@@ -40,9 +37,6 @@ impl BatchPrefetcher<'_> {
 }
 
 /// Calls `work` with prefetched batches, which `batch` reads, of a training of `n_steps`.
-///
-/// # Errors
-/// No thread can be started; errors of `work`.
 pub fn prefetch<R>(
     n_steps: usize,
     batch: BatchOfStep,

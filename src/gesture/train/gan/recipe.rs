@@ -208,9 +208,6 @@ fn auto(row: &RecipeRow, minutes: f64) -> f64 {
 }
 
 /// Three lines that describe the settings of a new training; `secs_a_step`: measured seconds per step on this machine.
-///
-/// # Errors
-/// Settings that cannot be serialised.
 pub fn lines(of: &GanSettings, material: &TrainingMaterial, secs_a_step: Option<f64>) -> Result<Vec<String>> {
     let values = serde_json::to_value(of)?;
     let (train, held_out) = (length(material.train_secs), length(material.validation_secs));

@@ -51,9 +51,6 @@ impl DecoderSizes {
     }
 
     /// Checks the shapes of starts, keys and weights.
-    ///
-    /// # Errors
-    /// They do not have these sizes.
     pub fn check(&self, start: &[usize], keys: &[usize], n_weights: usize) -> Result<()> {
         let fits = start == [self.batch, self.start_len()]
             && keys == [self.batch, self.all_keys(), self.cell.hidden]
