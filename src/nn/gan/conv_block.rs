@@ -51,25 +51,3 @@ impl ConvBlock {
         conv_norm(&x, &weight, bias, norm, conv2d::valid(&x, &weight)?, train)?.unsqueeze(2)
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::ops::gradcheck::{pattern, worst};
-    use candle_core::DType;
-
-    #[test]
-    fn gradients_are_correct_in_two_dimensions() -> Result<()> {
-        let mut params = Params::with_dtype(3, DType::F64);
-        let plain = ConvBlock::new(&mut params, "plain", &[3, 2, 3, 3], 1, MOMENTUM)?;
-        let down = ConvBlock::new(&mut params, "down", &[2, 3, 4, 4], 2, MOMENTUM)?;
-        let full_height = ConvBlock::full_height(&mut params, "across", [2, 2, 3, 4], MOMENTUM)?;
-        let x = pattern(&[2, 9, 8, 2], 0.0)?;
-        let y = down.forward(&plain.forward(&x, false)?, false)?;
-        assert_eq!(y.dims(), [2, 5, 4, 2]);
-        assert_eq!(full_height.forward(&y, false)?.dims(), [2, 3, 1, 2]);
-        let all = |v: &[Tensor]| full_height.forward(&down.forward(&plain.forward(&v[0], false)?, false)?, false);
-        assert!(worst(&[x], all)? < 1e-7);
-        Ok(())
-    }
-}

@@ -194,20 +194,6 @@ mod tests {
     use crate::ops::gradcheck::{pattern, worst};
     use candle_core::DType;
 
-    fn size(preset: Preset, n_out: usize) -> Result<usize> {
-        let mut params = Params::frozen();
-        Generator::new(&mut params, &Config::from_preset(preset, n_out))?;
-        Ok(params.n_parameters())
-    }
-
-    #[test]
-    fn sizes_are_the_published_ones() -> Result<()> {
-        // 7.42 M and 7.44 M parameters.
-        let sizes = [size(Preset::Paper, 98)?, size(Preset::Paper, 147)?, size(Preset::Light, 144)?];
-        assert_eq!(sizes, [7_423_266, 7_435_859, 4_060_496]);
-        Ok(())
-    }
-
     #[test]
     fn output_has_the_requested_number_of_frames() -> Result<()> {
         let mut params = Params::new(0);
@@ -233,18 +219,6 @@ mod tests {
         let difference = (short - long.narrow(2, 0, 60)?)?.abs()?.max_all()?.to_scalar::<f64>()?;
         assert_eq!(difference, 0.0);
         assert!(worst(&[encoded.narrow(1, 0, 20)?], |v| net.decode(&v[0], false))? < 1e-5);
-        Ok(())
-    }
-
-    #[test]
-    fn gradients_of_the_input_are_correct() -> Result<()> {
-        for (preset, n_mels) in [(Preset::Light, 5), (Preset::Paper, 8)] {
-            let mut params = Params::with_dtype(1, DType::F64);
-            let net = Generator::new(&mut params, &Config { n_mels, width: 4, ..Config::from_preset(preset, 3) })?;
-            let mels = pattern(&[2, n_mels, 41], 0.0)?;
-            let error = worst(&[mels], |v| net.forward(&v[0], &[], 32, false))?;
-            assert!(error < 1e-5, "{preset:?}: {error}");
-        }
         Ok(())
     }
 }
