@@ -229,15 +229,3 @@ fn notes(speaker: &SequenceGenerator, path: &Path, parsed: &Transcript, sound_se
     });
     parsed.notes.iter().cloned().chain(after_end(&parsed.words, sound_secs)).chain(unknown).collect()
 }
-
-#[cfg(test)]
-mod tests {
-
-    #[test]
-    fn narrow_band_sound_gives_a_note() {
-        assert_eq!(narrow_band_note(16_000), None);
-        assert_eq!(narrow_band_note(44_100), None);
-        let text = narrow_band_note(8000).unwrap();
-        assert!(text.contains("4000 Hz") && text.contains("of the 64 mel bands"), "{text}");
-    }
-}

@@ -363,24 +363,4 @@ mod tests {
         let terms = TrialTerms { session: 0, min_ms: 0, is_last: false, fails_check: false };
         assert_eq!(record(&db, "own-0", &given, terms, 29_700_002).unwrap(), RecordOutcome::Unknown);
     }
-
-    #[test]
-    fn a_session_without_answers_is_reassigned_after_minutes() {
-        let dir = tempfile::tempdir().unwrap();
-        let db = database::open(&dir.path().join("responses.sqlite"), "plan").unwrap();
-        assert_eq!(latest_ms(&db).unwrap(), 0);
-        for name in ["silent", "answers"] {
-            assert!(session(&begin_as(&db, name, "", 0)).is_some());
-        }
-        assert!(matches!(answer(&db, "answers", 10_000), RecordOutcome::Stored(_)));
-        assert_eq!(begin_as(&db, "early", "", 299_999), BeginOutcome::Full);
-        let counts = QUOTA.count(&all(&db).unwrap(), 0, 300_000);
-        assert_eq!((counts.active, counts.abandoned), (1, 1));
-        assert!(
-            matches!(answer(&db, "silent", 300_000), RecordOutcome::Stored(_)),
-            "late, but the session was not reassigned"
-        );
-        assert_eq!(begin_as(&db, "later", "", 3_609_999), BeginOutcome::Full, "an answer holds it for an hour");
-        assert_eq!(session(&begin_as(&db, "last", "", 3_610_000)), Some(1));
-    }
 }
