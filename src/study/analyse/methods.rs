@@ -1,9 +1,9 @@
 //! Generates a paragraph for the methods section of a paper from an analysis: plain text with citations in parentheses.
 
 use super::exclusion::{ExclusionCount, ExclusionSummary};
-use super::number_format::{counted, list, p_value, percent, percents, points};
 use super::result::{ShareMeasure, StudyAnalysis, TaskAnalysis};
 use super::statistic::StatisticMethod;
+use super::text::{counted, list, p_value, percent, percents, points};
 use crate::plan::TaskDesign;
 use orator_base::text::number;
 use std::fmt::Write as _;

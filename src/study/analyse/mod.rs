@@ -6,7 +6,6 @@ pub mod analysis;
 pub mod conclusions;
 pub mod exclusion;
 pub mod methods;
-pub mod number_format;
 pub mod outcome;
 pub mod page;
 pub mod pair;

@@ -131,7 +131,7 @@ fn mixed_model(votes: &[ClipVote], found: &mut StatisticSet, confidence: f64) ->
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::simulate::{CrossedDesign, CrossedEffects, crossed_votes};
+    use crate::power::{CrossedDesign, CrossedEffects, crossed_votes};
 
     #[test]
     fn the_share_of_a_simulated_study_is_found() {

@@ -1,7 +1,6 @@
 //! Designs a study from its file and its clips.
 
-use super::clip_needs::{ClipNeeds, SharedClips};
-use super::clip_scheduler::{ClipScheduler, SquareRows, stream};
+use super::clip_scheduler::{ClipNeeds, ClipScheduler, SharedClips, SquareRows, stream};
 use super::designer::{Designer, numbers};
 use super::task_design::{TaskBalance, TaskDesigner};
 use crate::file::StudyFile;

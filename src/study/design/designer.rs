@@ -1,8 +1,7 @@
 //! Builds sessions one after another: task blocks with practice, training and main trials, and attention checks among
 //! the main trials.
 
-use super::clip_needs::SharedClips;
-use super::clip_scheduler::{ClipScheduler, SquareRows, stream};
+use super::clip_scheduler::{ClipScheduler, SharedClips, SquareRows, stream};
 use super::task_design::{AssignedTrial, TaskBalance, TaskDesigner, assign, right_response};
 use crate::file::{FilmLayout, StudyCondition, StudyFile, StudyTask, TaskOrder};
 use crate::plan::{FilmContent, FilmSound, PlannedSession, Trial, TrialPhase};

@@ -1,8 +1,7 @@
 //! Design of one task over all sessions: the comparisons of its trials, their correct responses, its clip schedulers, the
 //! order of its trials, and the balance of votes over its cells.
 
-use super::clip_needs::SharedClips;
-use super::clip_scheduler::{AssignedClip, ClipScheduler, SquareRows, stream};
+use super::clip_scheduler::{AssignedClip, ClipScheduler, SharedClips, SquareRows, stream};
 use crate::file::{StudyCondition, StudyFile, StudyTask};
 use crate::plan::TaskDesign;
 use crate::vote::{Response, ScreenSide};

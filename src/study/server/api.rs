@@ -4,8 +4,7 @@
 use super::answer::{check, fails_check, feedback};
 use super::reply::{ApiError, JsonBody, bearer_token, header_text, json_reply, not_found, unauthorized};
 use super::secret::{completion_code, is_attempt, participant_id};
-use super::served_study::ServedStudy;
-use super::study_server::App;
+use super::study_server::{App, ServedStudy};
 use crate::plan::TrialPhase;
 use crate::store::answers::{self, RecordOutcome, SubmittedAnswer, TrialStart, TrialTerms, record};
 use crate::store::participants::{self, BeginOutcome, NewParticipant, PARAMETERS, Participant, Status};

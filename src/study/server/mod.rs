@@ -8,5 +8,4 @@ pub mod limits;
 pub mod listen;
 pub mod reply;
 pub mod secret;
-pub mod served_study;
 pub mod study_server;

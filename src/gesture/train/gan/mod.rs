@@ -1,9 +1,8 @@
 //! Training of the speech-to-gesture GAN: `windows` (data) -> `step` (networks, `losses`, optimiser) -> `validate` and
-//! `score` (selection of the best checkpoint). `train` sets up the loop, for which `batches` prefetches the data.
+//! `score` (selection of the best checkpoint). `train` sets up the loop and prefetches the data.
 
 pub mod augment;
 pub mod average;
-pub mod batches;
 pub mod block_metrics;
 pub mod interval_rows;
 pub mod losses;

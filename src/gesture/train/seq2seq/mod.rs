@@ -4,7 +4,6 @@
 pub mod captures;
 pub mod losses;
 pub mod reading;
-pub mod rollout_previous;
 pub mod segments;
 pub mod source;
 pub mod step;

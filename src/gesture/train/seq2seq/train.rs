@@ -3,8 +3,7 @@
 //! everything else is stored in the checkpoint.
 
 use super::reading;
-use super::rollout_previous::roll_out_previous;
-use super::segments::{PoseSequence, SegmentLoader, SequenceSplits};
+use super::segments::{PoseSequence, SegmentLoader, SequenceSplits, roll_out_previous};
 use super::source::TrainingSource;
 use super::step::{SequenceLosses, SequenceState, SequenceTrainer};
 use super::validate::{SequenceValidation, ValidationSegments};

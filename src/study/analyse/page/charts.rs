@@ -1,9 +1,9 @@
 //! Charts of a task: proportions and differences with intervals, scores, preference steps, strengths.
 
 use crate::analyse::conclusions::scope;
-use crate::analyse::number_format::{bare_p, counted};
 use crate::analyse::result::{PairAnalysis, ShareAnalysis, ShareMeasure, StudyAnalysis, TaskAnalysis};
 use crate::analyse::statistic::StatisticMethod;
+use crate::analyse::text::{bare_p, counted};
 use crate::plan::TaskDesign;
 use crate::stats::estimate::ConfidenceInterval;
 use orator_base::text::number;

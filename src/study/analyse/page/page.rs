@@ -1,8 +1,8 @@
 //! Assembles the page. The output depends on the analysis only.
 
 use super::{charts, tables};
-use crate::analyse::number_format::{counted, list};
 use crate::analyse::result::{StudyAnalysis, TaskAnalysis, TestOutcome};
+use crate::analyse::text::{counted, list};
 use orator_report::html::{Node, Page, Section, node};
 use serde_json::Value;
 

@@ -1,9 +1,9 @@
 //! Tables of all statistics of a task with their registration status, of the hypotheses and of the exclusions.
 
 use crate::analyse::conclusions::scope;
-use crate::analyse::number_format::{bare_p, count, counted, percent, points};
 use crate::analyse::result::{ClipShare, ShareAnalysis, ShareMeasure, StudyAnalysis, TaskAnalysis};
 use crate::analyse::statistic::{StatisticOrigin, StatisticRow, StatisticSet, TestResult};
+use crate::analyse::text::{bare_p, count, counted, percent, points};
 use crate::analyse::votes::read::RejectedRow;
 use crate::stats::estimate::ConfidenceInterval;
 use orator_base::text::number;

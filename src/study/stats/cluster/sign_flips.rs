@@ -103,7 +103,7 @@ pub fn side_p(blocks: &[SideBlock]) -> Result<f64, StatisticsError> {
 mod tests {
     use super::super::crossed::crossed_estimate;
     use super::*;
-    use crate::simulate::{CrossedDesign, CrossedEffects, crossed_votes};
+    use crate::power::{CrossedDesign, CrossedEffects, crossed_votes};
 
     fn votes(stream: u64, share: f64) -> Vec<ClipVote> {
         let design = CrossedDesign { n_participants: 30, n_trials: 20, n_clips: 20 };

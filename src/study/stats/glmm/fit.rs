@@ -237,7 +237,7 @@ pub(super) fn curvature(mut f: impl FnMut(&Array1<f64>) -> f64, at: &Array1<f64>
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::simulate::{CrossedDesign, CrossedEffects, crossed_votes};
+    use crate::power::{CrossedDesign, CrossedEffects, crossed_votes};
     use rayon::prelude::*;
     use serde_json::Value;
     use std::collections::BTreeMap;
