@@ -27,7 +27,6 @@ const FIRST_WAIT: Duration = Duration::from_secs(2);
 /// A unit that a worker has claimed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Claim {
-    /// Index of the unit in the plan.
     pub unit: usize,
     /// Epoch of the claim: 1 for the first, one more each time the unit is taken over or retried.
     pub epoch: u32,
@@ -89,7 +88,6 @@ struct ClaimFile {
 /// Result of the work on a unit, the content of an end file.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct UnitEnd {
-    /// Name of the worker that worked on the unit.
     pub worker: String,
     /// Error message; `None` if the unit succeeded.
     pub error: Option<String>,
@@ -123,7 +121,6 @@ fn parse_name(name: &str) -> Option<(usize, ClaimState)> {
     Some((unit.parse().ok()?, state)).filter(|_| is_known)
 }
 
-/// Updates the states of the units whose files are in folder `number`.
 fn update_states(states: &mut [ClaimState], folder: &impl SharedFolder, number: usize) -> Result<()> {
     let units = number * UNITS_PER_FOLDER..((number + 1) * UNITS_PER_FOLDER).min(states.len());
     let files = folder.list(&folder_name(number))?;
@@ -133,17 +130,14 @@ fn update_states(states: &mut [ClaimState], folder: &impl SharedFolder, number: 
     Ok(())
 }
 
-/// States of the `n_units` units of a plan.
 pub fn read_states(folder: &impl SharedFolder, n_units: usize) -> Result<Vec<ClaimState>> {
     let mut states = vec![ClaimState::default(); n_units];
     (0..n_units.div_ceil(UNITS_PER_FOLDER)).try_for_each(|number| update_states(&mut states, folder, number))?;
     Ok(states)
 }
 
-/// Answer of [`Claims::next`].
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum NextUnit {
-    /// This worker now owns the unit of the claim.
     Claimed(Claim),
     /// All remaining units are claimed by other workers or need units that have not ended. Ask again after this time.
     Wait(Duration),
@@ -179,9 +173,7 @@ pub struct Claims<'a, F> {
     orphaned: Vec<Claim>,
     /// Foreign files at the path of a claim or an end, by unit.
     blocked: BTreeMap<usize, String>,
-    /// Known owners of claims.
     owners: BTreeMap<Claim, String>,
-    /// Time of the next check for dead workers.
     next_check: Duration,
     /// Waiting time that `next` returned last; zero after a successful claim.
     last_wait: Duration,

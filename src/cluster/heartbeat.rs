@@ -19,7 +19,6 @@ pub const DEAD_AFTER: Duration = Duration::from_secs(180);
 pub struct Heartbeat {
     /// Counter, incremented at every beat.
     pub beat: u64,
-    /// Host name of the machine.
     pub host: String,
     /// Identifier of the machine or container; empty if unknown.
     pub machine: String,

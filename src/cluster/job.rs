@@ -22,7 +22,6 @@ impl TaskLimits {
     }
 }
 
-/// Inputs of the job scripts.
 #[derive(Clone, Debug, PartialEq)]
 pub struct JobRequest {
     /// Path of the program on the machines of the cluster.

@@ -76,7 +76,6 @@ pub enum UnitShare {
 }
 
 impl PlannedUnit {
-    /// The unit as the pipeline knows it.
     pub fn unit(&self) -> Unit {
         Unit { speaker: self.speaker.clone(), video: self.video.clone(), source: self.source.clone() }
     }

@@ -91,7 +91,6 @@ fn reason(error: &str) -> String {
     parts.filter(|part| part != "FILE").collect::<Vec<_>>().join(": ")
 }
 
-/// All workers that have published a heartbeat.
 fn workers(folder: &DiskFolder, dead_after: Duration) -> Result<Vec<WorkerProgress>> {
     let mut names = folder.list(WORKERS)?;
     names.sort();

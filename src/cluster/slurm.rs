@@ -8,7 +8,6 @@ use std::path::Path;
 /// Seconds before its time limit at which a task receives SIGTERM.
 const NOTICE_SECS: u64 = 120;
 
-/// The scripts of a plan.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SlurmScripts {
     /// Arrays of workers, each within the cluster's size limit.

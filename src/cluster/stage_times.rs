@@ -9,7 +9,6 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-/// Name of the file in the work folder.
 const FILE: &str = "stage_times.json";
 
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -130,7 +129,6 @@ impl StageTimes {
     }
 }
 
-/// Work on several videos.
 #[derive(Clone, Copy, Default)]
 struct Workload {
     /// Seconds of work on all videos.

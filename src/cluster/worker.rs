@@ -45,7 +45,6 @@ pub struct WorkReport {
     pub done: usize,
     /// Number of units done whose stages were all up to date before.
     pub up_to_date: usize,
-    /// Units that failed, each with its error.
     pub failed: Vec<(String, String)>,
     /// Units that had failed in an earlier session and were not processed again, once every unit has ended.
     pub failed_before: Vec<String>,
@@ -247,7 +246,6 @@ impl Session<'_> {
         (0..self.plan.units.len()).filter(is_in_shard).collect()
     }
 
-    /// Whether to stop after the current unit.
     fn should_stop(&self) -> Result<bool> {
         if let Some(reason) = read_stop(&self.folder)? {
             bail!("all workers stop: {reason}; free at least 64 MiB of disk space and start them again");

@@ -42,7 +42,6 @@ impl Default for Config {
     }
 }
 
-/// Network that encodes windows.
 pub struct MotionEncoder {
     /// Mean and standard deviation of each value of a frame, [1, n_in, 1]; the input is (x - mean) / std.
     mean: Var,

@@ -23,7 +23,6 @@ pub fn open_device(on_card: bool) -> anyhow::Result<Device> {
     )
 }
 
-/// Initial values of a tensor.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Init {
     Constant(f64),
@@ -165,7 +164,6 @@ impl Params {
     }
 }
 
-/// Returns `n` numbers in -bound..bound.
 fn uniform(seed: u64, name: &str, n: usize, bound: f64) -> Vec<f64> {
     let key = [&seed.to_le_bytes(), name.as_bytes()].concat();
     let mut rng = ChaCha8Rng::from_seed(*blake3::hash(&key).as_bytes());

@@ -52,7 +52,6 @@ impl MotionPreview {
     }
 }
 
-/// Data for the page's script.
 pub fn data(previews: &[MotionPreview]) -> Value {
     json!({ "bones": bones(), "motions": previews.iter().map(MotionPreview::data).collect::<Vec<_>>() })
 }

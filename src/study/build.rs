@@ -27,7 +27,6 @@ pub struct BuiltStudy {
     pub folder: PathBuf,
     /// Combined hash of the seal.
     pub seal: String,
-    /// Whether the study had been built before.
     pub up_to_date: bool,
     pub n_sessions: usize,
     pub n_trials: usize,
@@ -234,7 +233,6 @@ fn clips_dir(folder: &StudyFolder) -> PathBuf {
     folder.dir().join("clips")
 }
 
-/// Folder of the films until all are rendered.
 fn unpublished_films_dir(folder: &StudyFolder) -> PathBuf {
     folder.dir().join(".films")
 }

@@ -37,7 +37,6 @@ impl TableForm {
     }
 }
 
-/// Paths and sizes of the tables written.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ExportSummary {
     pub votes: PathBuf,

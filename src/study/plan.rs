@@ -47,7 +47,6 @@ pub struct StudyPlan {
     pub sessions: Vec<PlannedSession>,
 }
 
-/// Task of a study: a block of trials with one question.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PlannedTask {
     /// Name in the study file; the column `task` of exported responses.

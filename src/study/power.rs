@@ -22,13 +22,11 @@ use statrs::distribution::{ContinuousCDF, Normal};
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
-/// Range of the search for the number of participants.
 const MIN_PARTICIPANTS: usize = 5;
 const MAX_PARTICIPANTS: usize = 1280;
 /// Significance level of all tests.
 const LEVEL: f64 = 0.05;
 
-/// Assumptions and requirements of a power analysis.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct PowerQuestion {
     pub n_trials: usize,
@@ -45,7 +43,6 @@ pub struct PowerQuestion {
     pub seed: u64,
 }
 
-/// Simulated power for one number of participants.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct PowerRow {
     pub n_participants: usize,

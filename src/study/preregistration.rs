@@ -8,10 +8,8 @@ use orator_base::stage::workdir;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
-/// Version of the file format.
 const VERSION: u32 = 1;
 
-/// Pre-registration of a study.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Preregistration {
     pub version: u32,
@@ -27,7 +25,6 @@ pub struct Preregistration {
     pub analysis: AnalysisSettings,
 }
 
-/// Task with its expected number of votes.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RegisteredTask {
     pub name: String,
@@ -94,7 +91,6 @@ impl Preregistration {
     }
 }
 
-/// Description of the statistic that decides a hypothesis.
 fn statistic(claim: &StudyHypothesis, design: Option<TaskDesign>, alpha: f64) -> String {
     let error = "with a standard error for crossed participants and clips and a t distribution";
     let share = match design {

@@ -10,10 +10,8 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::{fmt, fs};
 
-/// Version of the file format.
 const VERSION: u32 = 1;
 
-/// Hashes of a study's files.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct StudySeal {
@@ -24,7 +22,6 @@ pub struct StudySeal {
     pub files: BTreeMap<String, String>,
 }
 
-/// Differences between the files of a study and its seal.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct SealMismatch {
     pub changed: Vec<String>,
@@ -50,7 +47,6 @@ impl fmt::Display for SealMismatch {
 }
 
 impl StudySeal {
-    /// Hashes the files of a finished study.
     pub fn of(folder: &StudyFolder) -> Result<Self> {
         let listed = sealed_files(folder)?;
         if let Some((name, _)) = listed.iter().find(|(_, path)| !path.is_file()) {

@@ -214,7 +214,6 @@ pub fn write_sequence(
     })
 }
 
-/// Notes about problems of a transcript.
 fn notes(speaker: &SequenceGenerator, path: &Path, parsed: &Transcript, sound_secs: f64) -> Vec<String> {
     if !speaker.reads_words() {
         return vec![format!("the network does not use words: {} was ignored", path.display())];

@@ -12,13 +12,11 @@ pub struct SpeechSource<'a> {
     pub transcript: Option<&'a Path>,
     /// Whether a sequence-to-sequence network is requested to carry its decoder state across segments.
     pub carry_state: bool,
-    /// Options of exported figures.
     pub figure: FigureOptions,
 }
 
 #[derive(Clone, Debug)]
 pub struct MotionReport {
-    /// Seconds of sound.
     pub secs: f64,
     pub n_frames: usize,
     /// Seconds of computation for the motion, without writing files.
@@ -29,7 +27,6 @@ pub struct MotionReport {
     pub segments: Option<SegmentFacts>,
 }
 
-/// Details of motion generated segment by segment.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct SegmentFacts {
     /// Initial decoder state of the segments.

@@ -27,11 +27,9 @@ use std::sync::{Arc, Mutex};
 pub struct BatchStage<'a> {
     batch: &'a SpeechBatch,
     sounds: BTreeMap<&'a str, &'a BatchSound>,
-    /// Formats with their file extensions.
     formats: Vec<(String, ExportFormat)>,
     /// Checkpoint file for sounds without their own.
     checkpoint: Option<PathBuf>,
-    /// Vectors of words outside the vocabularies.
     vectors: Option<Arc<WordVectors>>,
     /// Loaded models by checkpoint file, with the locks of their folders.
     speakers: Mutex<BTreeMap<PathBuf, (Arc<TrainedSpeaker>, FolderLock)>>,

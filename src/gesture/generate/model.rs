@@ -46,7 +46,6 @@ pub struct SpeakerMetadata {
     pub videos: Vec<TrainedVideo>,
 }
 
-/// A video that a model was trained on.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub struct TrainedVideo {
     pub speaker: String,
@@ -152,7 +151,6 @@ pub fn speakers(facts: &serde_json::Value) -> Result<Vec<SpeakerMetadata>> {
     Ok(all)
 }
 
-/// Reduces a network of several speakers to one speaker.
 fn select_speaker(contents: &mut Contents, name: Option<&str>) -> Result<()> {
     let all = speakers(&contents.facts)?;
     let names = || all.iter().map(|speaker| speaker.name.as_str()).collect::<Vec<_>>().join(", ");

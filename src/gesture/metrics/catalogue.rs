@@ -19,14 +19,12 @@ pub use super::sums::MetricSums;
 /// rate.
 const N_DIAGNOSTICS: usize = 2;
 
-/// All metrics of one convention.
 pub struct Catalogue {
     metrics: Vec<MetricFamily>,
     definitions: Vec<Definition>,
     fps: FrameRate,
 }
 
-/// Sums of one interval, in total and in blocks.
 #[derive(Clone, Debug, Default)]
 pub struct IntervalSums {
     pub total: MetricSums,

@@ -7,7 +7,6 @@ use super::sums::BlockSums;
 use serde::Serialize;
 use serde_json::{Map, Value};
 
-/// Direction in which a value is better.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Better {
@@ -19,7 +18,6 @@ pub enum Better {
     Neither,
 }
 
-/// Exact definition of a metric.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Definition {
     /// Name such as `pck_3d`, `mpjpe`, `frechet_pose`.

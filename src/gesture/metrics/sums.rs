@@ -88,7 +88,6 @@ impl BlockSums {
         self.rows.len().checked_div(self.width).unwrap_or(0)
     }
 
-    /// Index of the block of frame `t`.
     pub(crate) fn of(&self, t: usize) -> usize {
         (t * self.n() / self.n_frames.max(1)).min(self.n().saturating_sub(1))
     }

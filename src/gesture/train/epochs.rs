@@ -68,7 +68,6 @@ pub struct ValidatedStep {
     pub best_step: usize,
 }
 
-/// Result of a training.
 #[derive(Clone, Debug)]
 pub struct TrainingOutcome<V> {
     /// Completed steps over all runs of this training.
@@ -210,9 +209,7 @@ fn is_over(training: &mut impl ValidatedTraining) -> bool {
 #[derive(Clone, Debug, thiserror::Error)]
 #[error("stopped after step {step} of {steps}{}", self.checkpoint())]
 pub struct StoppedTraining {
-    /// Completed steps.
     pub step: usize,
-    /// Steps of the complete training.
     pub steps: usize,
     /// Checkpoint of this step; `None` if no step was completed.
     pub newest: Option<PathBuf>,

@@ -17,7 +17,6 @@ use std::time::{Duration, Instant};
 /// Name of the JSON lines file in the folder of a training.
 pub const FILE: &str = "metrics.jsonl";
 
-/// An open log, to which lines are appended.
 pub struct MetricsLog {
     lines: AppendedFile,
     events: Option<AppendedFile>,

@@ -111,7 +111,6 @@ const AT_ONCE: usize = 128;
 const CHANNELS: usize = 64;
 
 impl<T: Scalar> PackedWeights<T> {
-    /// Packs the weights of a pass.
     pub fn pack(weight: &[T], order: &WeightOrder) -> Self {
         let WeightOrder { n_columns, per_column, n_channels, per_channel, kernel_offsets } = order;
         let (kernel, mut start) = (T::kernel(), 0);

@@ -19,7 +19,6 @@ pub const GRAIN: usize = 16 * 1024;
 /// Number types of the operators: f32 for training, f64 for gradient checks.
 pub trait Scalar: WithDType {
     fn pool() -> &'static LocalKey<RefCell<Vec<Vec<Self>>>>;
-    /// Tile loop of the current processor.
     fn kernel() -> TileKernel<Self>;
     /// e^x; in f32 an approximation that allows vectorised loops.
     fn fast_exp(self) -> Self;

@@ -16,7 +16,6 @@ const N_ENTER: usize = 2;
 const N_LEVELS: usize = 5;
 const N_DECODER: usize = 4;
 
-/// Architecture of the audio encoder.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Preset {
@@ -162,7 +161,6 @@ impl Generator {
     }
 }
 
-/// Applies the blocks in sequence.
 fn through(blocks: &[ConvBlock], x: Tensor, train: bool) -> Result<Tensor> {
     blocks.iter().try_fold(x, |x, block| block.forward(&x, train))
 }

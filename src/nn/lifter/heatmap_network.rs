@@ -20,14 +20,12 @@ pub const NAME: &str = hand::NAME;
 pub const KIND: &str = "hand-heatmap-lifter";
 /// Number of parameters of both networks.
 pub const N_PARAMETERS: usize = 1_637_279 + 2_238_403;
-/// Number of score maps, one per point.
 const MAPS: usize = 21;
 /// Batch size when lifting.
 const BATCH: usize = 64;
 /// Enlargement of the crop when lifting; the mean of the training's range.
 const CROP_SCALE: f64 = 1.1;
 
-/// Both networks.
 pub struct HeatmapLifter {
     pose_prior: Tower,
     view_point: Tower,

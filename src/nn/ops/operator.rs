@@ -5,7 +5,6 @@ use crate::cpu::tensor::{Scalar, is_f64, read, slice};
 use candle_core::backend::BackendStorage;
 use candle_core::{CpuStorage, CustomOp3, Layout, Result, Shape, Tensor};
 
-/// An input tensor of an operator.
 pub struct Operand<'a, T> {
     pub values: &'a [T],
     pub dims: &'a [usize],
@@ -16,7 +15,6 @@ pub struct Operand<'a, T> {
 /// Gradients of the three operands; `None`: not required.
 pub type Gradients<T> = Result<[Option<Vec<T>>; 3]>;
 
-/// An operator on three tensors.
 pub trait CpuOperator: Send + Sync {
     const NAME: &'static str;
 

@@ -107,7 +107,6 @@ impl Config {
     }
 }
 
-/// Input batch of segments.
 #[derive(Clone, Debug)]
 pub struct Segment {
     /// Audio features [B, predicted + context - 1, audio], starting with the context of the first predicted pose.

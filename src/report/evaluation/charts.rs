@@ -152,7 +152,6 @@ fn derivative<'a>(
     })
 }
 
-/// Legend of ground truth and prediction colours.
 pub fn colour_legend() -> Node {
     legend([("line truth", "ground truth"), ("line predicted", "prediction")])
 }

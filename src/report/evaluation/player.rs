@@ -175,7 +175,6 @@ fn wrist_speed(clip: &EvalClip, joints: ArrayView3<f32>, frames: &Range<usize>, 
 }
 
 impl Excerpt {
-    /// Data for the page's script.
     pub fn data(&self) -> Value {
         json!({
             "secs": self.secs,

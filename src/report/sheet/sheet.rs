@@ -82,7 +82,6 @@ impl SheetClip<'_> {
         n_cells * CELL_PX + GAP_PX
     }
 
-    /// Indices of the frames to draw.
     fn moments(&self, every_secs: f64) -> Result<Vec<usize>> {
         let (n_frames, fps) = (self.motion.n_frames(), self.motion.fps);
         ensure!(n_frames > 0, "the motion has no frames: expected at least 1");

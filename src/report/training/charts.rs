@@ -7,7 +7,6 @@ use serde_json::Value;
 const MAX_POINTS: usize = 240;
 
 pub struct TrainingLog<'a> {
-    /// Log lines of training steps.
     steps: Vec<&'a Value>,
     pub epochs: Vec<&'a Value>,
     /// Log line of the validation with the best (smallest) score.

@@ -9,7 +9,6 @@ use orator_base::text::{counted, percent};
 use orator_dataset::config::Settings;
 use orator_pipeline::segment::Measures;
 
-/// Measure of a frame or of an accepted interval.
 pub struct Measure {
     /// Name of the array in `measures.npz`, or `BONES` or `LENGTHS`.
     name: &'static str,

@@ -108,10 +108,8 @@ fn page(request: &ReportRequest, gathered: &ReportData, pictures: &Pictures, sum
     page
 }
 
-/// Pictures by video index and frames of the moment.
 pub type Pictures = BTreeMap<(usize, Vec<usize>), MomentThumbnail>;
 
-/// Section with a row of pictures for each rule.
 pub fn gallery(worst: &Worst, pictures: &Pictures, videos: &[VideoSummary]) -> Vec<Node> {
     if worst.rules.is_empty() {
         return vec![

@@ -17,7 +17,6 @@ use orator_pipeline::segment::{self, Measures};
 use rayon::prelude::*;
 use serde_json::{Value, json};
 
-/// Accepted seconds of all videos, by threshold and value.
 fn sums(accepted: &[Option<AcceptedByThreshold>], rules: &SegmentConfig) -> AcceptedByThreshold {
     let zeros =
         || THRESHOLDS.iter().map(|threshold| vec![0.0; threshold.grid(rules).0.len()]).collect::<AcceptedByThreshold>();
@@ -121,7 +120,6 @@ fn card(i: usize, threshold: &ThresholdGrid, sums: &[f64], max: f64, rules: &Seg
 /// Accepted seconds of one video, by threshold and by value of its grid.
 pub type AcceptedByThreshold = Vec<Vec<f64>>;
 
-/// Data of a video that the rules depend on.
 pub struct JudgedVideo<'a> {
     pub measures: &'a Measures,
     pub video: &'a MediaInfo,
@@ -134,7 +132,6 @@ pub struct JudgedVideo<'a> {
 }
 
 impl JudgedVideo<'_> {
-    /// Ledger of the video under `rules`.
     pub fn ledger(&self, rules: &SegmentConfig) -> Ledger {
         let (mut intervals, mut ledger) = segment::judge(self.measures, self.video, rules);
         let bones = bone_rejections(self.bone_change, self.max_bone_change, max_gap_frames(rules, self.video.fps));
@@ -148,7 +145,6 @@ impl JudgedVideo<'_> {
         ledger
     }
 
-    /// Accepted seconds under `rules`.
     pub fn accepted_secs(&self, rules: &SegmentConfig) -> f64 {
         self.ledger(rules).accepted_secs()
     }

@@ -13,7 +13,6 @@ use orator_dataset::config::videos::Videos;
 use orator_dataset::info::{DatasetInfo, DatasetVideo};
 use std::collections::BTreeMap;
 
-/// Total seconds over all videos.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ReportTotals {
     /// All footage.
@@ -214,7 +213,6 @@ pub fn video_splits(settings: &Settings, videos: &[Videos]) -> VideoSplits {
     splits
 }
 
-/// Names of the splits of a video or of its time blocks.
 fn split_names(video: &DatasetVideo) -> String {
     let has =
         |split: &Split| video.split == Some(*split) || video.blocks.iter().any(|block| block.split == Some(*split));

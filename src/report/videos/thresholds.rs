@@ -92,7 +92,6 @@ impl ThresholdGrid {
         (grid, at)
     }
 
-    /// Copy of `rules` with this threshold at `value`.
     pub fn with(&self, rules: &SegmentConfig, value: f64) -> SegmentConfig {
         let mut other = rules.clone();
         (self.set)(&mut other, value);

@@ -105,7 +105,6 @@ fn spans(video: &VideoSummary) -> Vec<TimelineSpan> {
     all
 }
 
-/// Legend of the colours.
 fn legend(videos: &[VideoSummary]) -> Node {
     let ledgers = || videos.iter().map(|video| &video.ledger);
     let found: BTreeSet<(usize, &str)> = ledgers()
@@ -180,7 +179,6 @@ pub fn description(rejected: &RejectedInterval) -> String {
     }
 }
 
-/// CSS class of a reason.
 pub fn class(reason: &str) -> String {
     if find(reason).is_some() { format!("r-{}", reason.replace(' ', "-")) } else { "r-unknown".to_owned() }
 }

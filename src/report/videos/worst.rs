@@ -27,7 +27,6 @@ use std::path::Path;
 
 #[derive(Clone, Debug, PartialEq)]
 pub struct Moment {
-    /// Index of the video in the report.
     pub video: usize,
     /// Frame, preceded by the previous frame if the rule compares two.
     pub frames: Vec<usize>,
@@ -43,10 +42,8 @@ pub struct Moment {
 /// Rank of the reason, reason and unit; the unit distinguishes the two rules each of `turned` and `hands`.
 type Rule = (usize, String, String);
 
-/// Collection of the worst moments of every rule.
 pub struct Worst {
     pub rules: BTreeMap<Rule, Vec<Moment>>,
-    /// Maximum number of moments per rule.
     max_moments: usize,
 }
 
@@ -169,7 +166,6 @@ fn extreme(values: &[f32], frames: std::ops::Range<usize>, lowest: bool) -> (usi
     t.map_or((middle, f64::NAN), |t| (t, f64::from(values[t])))
 }
 
-/// Text with the value in a frame.
 fn value_text(rejection: Rejection, value: f64) -> String {
     let value = number(value);
     match rejection {

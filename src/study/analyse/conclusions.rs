@@ -51,7 +51,6 @@ fn share_sentence(share: &ShareAnalysis, settings: &StatisticSettings) -> String
     )
 }
 
-/// Sentence that explains a conclusion, with its p values.
 fn conclusion_sentence(share: &ShareAnalysis) -> String {
     let p = share.statistics.crossed_p().map(p_value).unwrap_or_default();
     let test = share.statistics.equivalence(StatisticMethod::Crossed);

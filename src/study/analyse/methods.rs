@@ -11,7 +11,6 @@ use std::fmt::Write as _;
 /// References, one per line: the citation as used in the text, and the full reference.
 const SOURCES: &str = include_str!("sources.txt");
 
-/// Methods paragraph with its list of references.
 pub fn methods(analysis: &StudyAnalysis) -> String {
     let mut text = participants(analysis);
     text += &exclusions(&analysis.exclusions);
@@ -164,7 +163,6 @@ fn registration_status(analysis: &StudyAnalysis) -> String {
     }
 }
 
-/// Sentences with the headline statistics.
 fn results(analysis: &StudyAnalysis) -> String {
     let mut text = String::new();
     for task in &analysis.tasks {

@@ -25,7 +25,6 @@ impl<'v> Numbering<'v> {
         numbering
     }
 
-    /// Numeric vote with this score.
     pub fn vote(&self, vote: &StudyVote, score: f64) -> ClipVote {
         let clip = (vote.speaker.as_str(), vote.clip.as_str());
         ClipVote {

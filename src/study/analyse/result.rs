@@ -175,7 +175,6 @@ impl ShareAnalysis {
     }
 }
 
-/// Proportion of the votes about one clip.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ClipShare {
     pub speaker: String,
@@ -199,7 +198,6 @@ pub struct ScoreAnalysis {
     pub statistics: StatisticSet,
 }
 
-/// Comparison of two conditions.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct PairAnalysis {
     pub first: String,
@@ -221,7 +219,6 @@ pub struct PairAnalysis {
     pub conclusion: TestOutcome,
 }
 
-/// Bradley-Terry strength of a condition.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct StrengthEstimate {
     pub condition: String,

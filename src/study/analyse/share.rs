@@ -55,7 +55,6 @@ pub fn share(cell: &ShareCell, settings: &StatisticSettings) -> ShareAnalysis {
     analysis
 }
 
-/// Adds the methods that account for participants and clips.
 fn add_clustered(found: &mut StatisticSet, cell: &ShareCell, votes: &[ClipVote], settings: &StatisticSettings) {
     let confidence = settings.confidence;
     if let Some(estimate) = found.ok_or_record(StatisticMethod::Crossed, crossed_estimate(votes)) {
@@ -75,7 +74,6 @@ fn add_clustered(found: &mut StatisticSet, cell: &ShareCell, votes: &[ClipVote],
     }
 }
 
-/// Adds the methods that treat votes as independent.
 fn add_naive(found: &mut StatisticSet, n_successes: u64, n_votes: u64, settings: &StatisticSettings) {
     let Some(count) = found.ok_or_record(StatisticMethod::Binomial, BinomialCount::new(n_successes, n_votes)) else {
         return;

@@ -105,7 +105,6 @@ impl TestResult {
         Self { origin: StatisticOrigin::new(method), statistic: None, degrees_of_freedom: None, p, adjusted_p: None }
     }
 
-    /// Test of an estimate against `expected`.
     pub fn of_estimate(method: StatisticMethod, estimate: &StudentEstimate, expected: f64) -> Self {
         Self {
             statistic: Some(estimate.statistic(expected)),
@@ -240,7 +239,6 @@ impl StatisticSet {
     }
 }
 
-/// Interval and test of one method.
 pub struct StatisticRow<'s> {
     pub origin: StatisticOrigin,
     pub interval: Option<ConfidenceInterval>,

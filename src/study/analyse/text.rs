@@ -69,7 +69,6 @@ pub fn text(analysis: &StudyAnalysis) -> String {
     text
 }
 
-/// Lines with the headline statistics of a task.
 fn rows(task: &TaskAnalysis) -> String {
     let mut text = String::new();
     let mark = |is_exploratory: bool| if is_exploratory { "*" } else { " " };

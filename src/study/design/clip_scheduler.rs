@@ -130,7 +130,6 @@ impl SquareRows {
     }
 }
 
-/// Number of clips needed of each speaker, by purpose.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ClipNeeds {
     pub reuse: ClipReuse,

@@ -9,10 +9,8 @@ use anyhow::Result;
 use rand::seq::SliceRandom;
 use std::collections::BTreeMap;
 
-/// Version of the plan file format.
 const VERSION: u32 = 1;
 
-/// Plan of a study and the balance of its votes.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DesignedStudy {
     pub plan: StudyPlan,
@@ -122,7 +120,6 @@ mod tests {
         StudyFile::read(Path::new(&path)).unwrap()
     }
 
-    /// Asserts the invariants of every design.
     fn check(file: &StudyFile, designed: &DesignedStudy, films: &Films) {
         let plan = &designed.plan;
         assert_eq!(plan.sessions.len(), file.n_sessions());

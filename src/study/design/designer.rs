@@ -11,7 +11,6 @@ use rand::Rng;
 use rand::seq::SliceRandom;
 use rand_chacha::ChaCha8Rng;
 
-/// State of a design between sessions.
 pub(super) struct Designer<'a> {
     pub file: &'a StudyFile,
     /// Allocated clips, by speaker.

@@ -52,7 +52,6 @@ pub struct AssignedTrial {
     pub assigned: AssignedClip,
 }
 
-/// State of a task between sessions.
 pub struct TaskDesigner<'a> {
     pub task: &'a StudyTask,
     pub comparisons: Vec<ComparedConditions<'a>>,

@@ -16,7 +16,6 @@ use std::path::{Path, PathBuf};
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-/// Documented example of a study file.
 pub const EXAMPLE: &str = include_str!("example.toml");
 
 impl StudyFile {

@@ -96,7 +96,6 @@ mod tests {
         assert_eq!(labels, sent.as_object().unwrap().keys().map(String::as_str).collect::<BTreeSet<_>>());
     }
 
-    /// Placeholder names in braces.
     fn placeholders(text: &str) -> BTreeSet<&str> {
         text.split('{').skip(1).filter_map(|rest| Some(rest.split_once('}')?.0)).collect()
     }

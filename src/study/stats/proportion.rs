@@ -92,7 +92,6 @@ impl BinomialCount {
     }
 }
 
-/// Probability of at least `outcome` successes.
 fn tail_from(distribution: &Binomial, outcome: u64) -> f64 {
     outcome.checked_sub(1).map_or(1.0, |before| distribution.sf(before))
 }

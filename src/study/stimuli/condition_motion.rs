@@ -28,7 +28,6 @@ use std::sync::Arc;
 /// Tolerance for the length of another system's motion file, frames.
 const LENGTH_TOLERANCE_FRAMES: usize = 2;
 
-/// Motion that a condition shows for a clip.
 #[derive(Clone, Debug)]
 pub struct ShownMotion {
     /// Index of the clip to which the motion belongs; another clip in mismatched conditions.
@@ -55,7 +54,6 @@ impl ConditionModels {
         Ok(Self(models))
     }
 
-    /// Frame rate of the first model's motion.
     pub fn fps(&self) -> Option<FrameRate> {
         self.0.values().next().map(|model| model.speaker.fps())
     }

@@ -133,7 +133,6 @@ impl FilmScene<'_> {
     }
 }
 
-/// Draws the number on a plate in the centre of the picture.
 fn draw_number(image: &mut Image, number: u16) -> Result<()> {
     let text = number.to_string();
     let digits = DIGIT_HEIGHT * image.height as f32;

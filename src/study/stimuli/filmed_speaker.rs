@@ -45,7 +45,6 @@ pub struct CutSpeaker {
     pub tones: Option<Sound>,
 }
 
-/// Speaker whose films can be rendered.
 pub struct FilmedSpeaker {
     clips: Vec<StudyClip>,
     sounds: Vec<Sound>,
@@ -162,7 +161,6 @@ pub fn normalise_loudness<'s>(sounds: impl Iterator<Item = &'s mut Sound>) -> f6
 }
 
 impl FilmedSpeaker {
-    /// Index of the clip `speaker/clip`.
     fn find(&self, clip: &str) -> Option<usize> {
         let name = clip.rsplit('/').next().unwrap_or(clip);
         self.clips.iter().position(|known| known.name == name)

@@ -23,7 +23,6 @@ pub struct SpeakerSource {
     segments: Vec<SourceSegment>,
 }
 
-/// Continuous segment of speech.
 struct SourceSegment {
     name: String,
     location: SegmentLocation,
@@ -99,7 +98,6 @@ impl SpeakerSource {
         self.segments.len()
     }
 
-    /// Reads the segment with this index.
     pub fn read(&self, segment: usize) -> Result<SpeechSegment> {
         let SourceSegment { name, location } = &self.segments[segment];
         match (location, &self.dataset) {

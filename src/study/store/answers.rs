@@ -7,11 +7,9 @@ use rusqlite::{Connection, OptionalExtension, Row, params};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// Answer to a trial as sent by a page.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SubmittedAnswer {
-    /// Index of the trial in its session.
     pub position: u32,
     pub response: Response,
     /// Number of times the films were played.
@@ -125,7 +123,6 @@ pub fn of(db: &Connection, id: &str) -> rusqlite::Result<Vec<SubmittedAnswer>> {
     db.prepare(&sql)?.query_map([id], of_row)?.collect()
 }
 
-/// Number and total duration of stalls.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct StallCount {
     pub trials: u32,

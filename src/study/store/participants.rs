@@ -12,7 +12,6 @@ pub const PARAMETERS: [&str; 6] = ["PROLIFIC_PID", "STUDY_ID", "SESSION_ID", "wo
 /// Parameters that identify a person.
 const PERSON_IDS: [&str; 2] = ["PROLIFIC_PID", "workerId"];
 
-/// Status of a participant's session.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Status {
@@ -90,7 +89,6 @@ impl Participant {
     }
 }
 
-/// Rules for assigning sessions.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Quota {
     pub n_sessions: u32,
@@ -105,7 +103,6 @@ pub struct Quota {
     pub unanswered_ms: i64,
 }
 
-/// Number of participants by status.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
 pub struct QuotaCounts {
     pub target: u32,
@@ -153,7 +150,6 @@ impl Quota {
     }
 }
 
-/// Participant who requests a session.
 #[derive(Clone, Debug)]
 pub struct NewParticipant {
     pub id: String,
@@ -168,12 +164,10 @@ impl NewParticipant {
         PERSON_IDS.into_iter().filter_map(|name| Some((name, self.parameters.get(name).filter(|id| !id.is_empty())?)))
     }
 
-    /// Whether the request has an ID from a recruiting site.
     pub fn has_id(&self) -> bool {
         self.ids().next().is_some()
     }
 
-    /// Whether `participant` has the same ID from a recruiting site.
     fn has_same_id(&self, participant: &Participant) -> bool {
         self.ids().any(|(name, id)| participant.parameters.get(name) == Some(id))
     }
@@ -253,7 +247,6 @@ pub fn find(db: &Connection, id: &str) -> rusqlite::Result<Option<Participant>> 
     db.query_row(&sql, [id], Participant::of_row).optional()
 }
 
-/// All participants in order of start time.
 pub fn all(db: &Connection) -> rusqlite::Result<Vec<Participant>> {
     select(db, "")
 }
@@ -307,7 +300,6 @@ mod tests {
         if let BeginOutcome::Begun(participant) = outcome { Some(participant.session) } else { None }
     }
 
-    /// Answers the first trial of the session `name`.
     fn answer(db: &Connection, name: &str, now_ms: i64) -> RecordOutcome {
         let response = Response::Number(42);
         let [stalled_secs, unfocused_secs, response_secs] = [0.0; 3];

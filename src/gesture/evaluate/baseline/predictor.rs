@@ -159,7 +159,6 @@ pub fn motions(
     Ok(Some(predicted))
 }
 
-/// Windows of a query, the last one shorter.
 fn query_windows<'a>(query: usize, sound: &Query<'a>, fps: FrameRate) -> Vec<QueryWindow<'a>> {
     let window = (((WINDOW_SECS * fps.per_sec()) as usize) / POOLED * POOLED).max(POOLED);
     let window_at = |first: usize| {

@@ -29,7 +29,6 @@ use std::sync::Arc;
 /// Frames of silence appended to the sound for a captured skeleton, so that the resampled motion covers the interval.
 const EXTRA_FRAMES: usize = 2;
 
-/// Checkpoint under evaluation.
 pub struct EvaluatedCheckpoint {
     /// Name in a table of several checkpoints.
     pub name: String,
@@ -169,7 +168,6 @@ impl EvaluatedCheckpoint {
     }
 }
 
-/// Motion with all finger joints set to missing.
 fn without_fingers(mut motion: Motion) -> Motion {
     for joint in (L_HAND..N_JOINTS).filter(|joint| !is_duplicate(*joint)) {
         motion.joints.slice_mut(s![.., joint, ..]).fill(f32::NAN);

@@ -72,7 +72,6 @@ pub fn interval(dataset: &Dataset, sample: &SampleRef, normal: &Normalisation) -
     Ok(HeldOutInterval { key, ground_truth, posture, sound, words })
 }
 
-/// Reads all samples in parallel.
 pub fn read(dataset: &Dataset, samples: &[SampleRef], normal: &Normalisation) -> Result<Vec<HeldOutInterval>> {
     samples.par_iter().map(|sample| interval(dataset, sample, normal)).collect()
 }

@@ -17,14 +17,12 @@ use serde::Serialize;
 pub enum Aspect {
     /// Position of the joints at each moment.
     Position,
-    /// Poses and their sequence.
     Poses,
     Movement,
     /// Alignment of movement with the beat of the sound.
     Beat,
 }
 
-/// Conclusion of a metric.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Answer {
@@ -37,7 +35,6 @@ pub enum Answer {
 pub struct Vote {
     pub metric: String,
     pub aspect: Aspect,
-    /// Predictor of the comparison.
     pub against: PredictorKind,
     pub answer: Answer,
     /// Gain in the unit of the metric with its simultaneous interval over all votes; below 0: worse.
@@ -106,7 +103,6 @@ pub fn better_than_constant_pose(table: &Table, own: &PredictorRow) -> Conclusio
     }
 }
 
-/// Better of the constant poses in a metric.
 fn better_constant_pose(table: &Table, index: usize) -> Option<&PredictorRow> {
     let better = |a: &PredictorRow, b: &PredictorRow| table.gain(a, b, index) >= 0.0;
     let constant_poses =

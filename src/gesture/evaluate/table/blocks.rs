@@ -115,7 +115,6 @@ pub fn halves(catalogue: &Catalogue, clips: &EvalClips) -> IntervalSums {
     total(all[..all.len() / 2 * 2].par_chunks(2 * n_merged).map(merged).collect())
 }
 
-/// Sum of measurements, with the blocks in order.
 fn total(all: Vec<IntervalSums>) -> IntervalSums {
     let mut sum = IntervalSums::default();
     for one in all {

@@ -45,7 +45,6 @@ pub struct BlockGroups {
 }
 
 impl BlockGroups {
-    /// Groups for blocks with these numbers of frames.
     pub fn new(frames: &[usize]) -> Self {
         let n = frames.len().min(MAX_GROUPS);
         let of_block: Vec<usize> = (0..frames.len()).map(|block| block * n / frames.len()).collect();

@@ -20,7 +20,6 @@ pub struct MetricPair {
     pub b: Option<Estimate>,
 }
 
-/// Outcome of a comparison.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Comparison {
     /// Warning if the results have different ground truth.

@@ -26,7 +26,6 @@ pub struct PredictorRow {
     pub checkpoint: Option<NumberedCheckpoint>,
     /// Description in one sentence.
     pub description: String,
-    /// One estimate per definition.
     pub values: Vec<Estimate>,
     /// Reasons for missing values; empty where there is a value.
     pub reasons: Vec<String>,

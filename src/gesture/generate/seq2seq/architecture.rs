@@ -143,7 +143,6 @@ pub struct NumberedWord {
 }
 
 impl Vocabulary {
-    /// Vocabulary of all words of a text.
     pub fn of<'w>(words: impl IntoIterator<Item = &'w Word>) -> Self {
         let words: BTreeSet<String> = words.into_iter().map(|word| canonical(&word.word)).collect();
         Self { words: words.into_iter().filter(|word| !word.is_empty()).collect() }

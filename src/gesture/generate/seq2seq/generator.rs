@@ -21,13 +21,10 @@ use std::collections::BTreeSet;
 use std::path::Path;
 use std::sync::Arc;
 
-/// A trained sequence-to-sequence network.
 pub struct SequenceGenerator {
     pub metadata: SequenceMetadata,
     network: Box<dyn GesturePredictor>,
-    /// Tensors of the network.
     params: Params,
-    /// Vectors of words that are not in the vocabulary.
     vectors: Option<Arc<WordVectors>>,
 }
 

@@ -21,7 +21,6 @@ const SEED_OF_CHANGES: u64 = 0x6368_616e_6765;
 /// Knots of the piecewise linear noise spectrum over the bands.
 const NOISE_KNOTS: usize = 5;
 
-/// Random augmentation of a window.
 #[derive(Clone, Debug, Default)]
 pub struct WindowChange {
     /// Offset of the start of the window, seconds; negative is earlier.

@@ -94,7 +94,6 @@ pub fn reduction(own: &[[f64; 2]], other: &[[f64; 2]]) -> ErrorReduction {
     ErrorReduction { value, low: bound(value - half_width), high: bound(value + half_width) }
 }
 
-/// Accumulated metrics of a predictor.
 #[derive(Default)]
 pub struct PredictorSums {
     correct: CorrectKeypoints,

@@ -46,7 +46,6 @@ impl TrainingMaterial {
     }
 }
 
-/// Values of a key in all recipes.
 struct RecipeRow {
     key: &'static str,
     rebol: f64,

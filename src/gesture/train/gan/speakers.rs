@@ -203,7 +203,6 @@ pub fn resume(metadata: &mut SpeakerMetadata, dataset: &Dataset, differences: &m
     Ok(())
 }
 
-/// Network preset for a preset of the configuration.
 pub const fn preset(preset: NetworkPreset) -> Preset {
     match preset {
         NetworkPreset::Auto | NetworkPreset::Light => Preset::Light,

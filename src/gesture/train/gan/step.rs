@@ -59,7 +59,6 @@ pub struct TrainerState {
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub other_speakers: Vec<SpeakerMetadata>,
     pub settings: GanSettings,
-    /// Number of completed steps.
     pub step: usize,
     /// Step and score of the best validation so far.
     pub best: Option<(usize, f32)>,
@@ -77,7 +76,6 @@ pub struct GanTrainer {
     discriminator_params: Params,
     adam_g: Adam,
     adam_d: Adam,
-    /// Number of completed steps.
     pub step: usize,
     /// Step and score of the best validation so far.
     pub best: Option<(usize, f32)>,
@@ -119,12 +117,10 @@ impl GanTrainer {
         })
     }
 
-    /// Number of trainable parameters of the generator.
     pub fn n_parameters(&self) -> usize {
         self.generator_params.n_parameters()
     }
 
-    /// Device of the tensors.
     pub fn device(&self) -> &Device {
         self.generator_params.device()
     }
@@ -246,7 +242,6 @@ impl GanTrainer {
         self.ema.as_ref().map_or(&self.generator, |(ema, _)| ema)
     }
 
-    /// Tensors of `ema_generator`.
     fn ema_tensors(&self) -> Result<BTreeMap<String, Tensor>> {
         Ok(self.ema.as_ref().map_or(&self.generator_params, |(_, params)| params).tensors()?)
     }

@@ -158,7 +158,6 @@ fn secs_a_step(trainer: &GanTrainer, loader: &JoinedWindows) -> Result<Option<f6
     })
 }
 
-/// A trainer with its training batches and validation intervals.
 struct GanTraining<'a, 'b> {
     names: String,
     /// Whether the training was initialised from another model in this run.
@@ -168,7 +167,6 @@ struct GanTraining<'a, 'b> {
     held_out: &'a ValidationIntervals,
     /// Total time of the steps, including the wait for their batches.
     stepping: Duration,
-    /// Time spent waiting for batches.
     waiting: Duration,
 }
 
@@ -274,7 +272,6 @@ fn check(settings: &GanConfig) -> Result<()> {
 
 pub type BatchOfStep<'a> = &'a (dyn Fn(usize) -> Result<WindowBatch> + Sync);
 
-/// Batches of consecutive steps, prefetched by one step.
 pub struct BatchPrefetcher<'a> {
     batch: BatchOfStep<'a>,
     /// Steps of the training; nothing is prefetched after the last.

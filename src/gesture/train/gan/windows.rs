@@ -136,7 +136,6 @@ impl<'d> WindowLoader<'d> {
         self.fps
     }
 
-    /// Number of windows.
     pub fn len(&self) -> usize {
         self.starts.len()
     }
@@ -260,7 +259,6 @@ impl<'d> JoinedWindows<'d> {
         Self(loaders)
     }
 
-    /// Number of windows.
     pub fn len(&self) -> usize {
         self.0.iter().map(WindowLoader::len).sum()
     }

@@ -120,7 +120,6 @@ impl CaptureFolder {
         Ok(SequenceSplits { train, held_out, notes })
     }
 
-    /// Sequence of a capture, and notes on its motion and its transcript.
     fn sequence(
         &self,
         capture: &Capture,

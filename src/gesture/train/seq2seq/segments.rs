@@ -21,7 +21,6 @@ use rand_chacha::ChaCha8Rng;
 pub struct SegmentLoader {
     metadata: SequenceMetadata,
     sequences: Vec<PoseSequence>,
-    /// Words of each sequence as vocabulary indices.
     words: Vec<Vec<NumberedWord>>,
     /// Sequence index and first frame of the previous poses of each segment.
     starts: Vec<(usize, usize)>,
@@ -142,7 +141,6 @@ pub struct PoseSequence {
     pub words: Vec<Word>,
 }
 
-/// Training and validation sequences.
 pub struct SequenceSplits {
     pub train: Vec<PoseSequence>,
     pub held_out: Vec<PoseSequence>,

@@ -47,7 +47,6 @@ pub struct SequenceLosses {
 pub struct SequenceState {
     pub speaker: SequenceMetadata,
     pub settings: Seq2seqSettings,
-    /// Number of completed steps.
     pub step: usize,
     /// Step and score of the best validation so far.
     pub best: Option<(usize, f32)>,
@@ -70,7 +69,6 @@ pub struct SequenceTrainer {
     adversary: Option<Adversary>,
     /// Settings of the loss, which differ from `settings` for the adversarial network.
     loss: Seq2seqSettings,
-    /// Number of completed steps.
     pub step: usize,
     /// Step and score of the best validation so far.
     pub best: Option<(usize, f32)>,

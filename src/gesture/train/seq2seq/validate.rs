@@ -10,10 +10,8 @@ use orator_nn::Mode;
 use orator_nn::seq2seq::predict::GesturePredictor;
 use serde::{Deserialize, Serialize};
 
-/// Largest number of segments in a validation.
 const MAX_SEGMENTS: usize = 256;
 
-/// Segments to validate on.
 pub struct ValidationSegments {
     split: &'static str,
     batches: Vec<SegmentBatch>,

@@ -6,7 +6,6 @@ use crate::cpu::tensor::{Matrix, Scalar, add_product};
 use crate::cpu::vectorised::{Attended, DropMask, attend, attend_backward, drop_out};
 use candle_core::Result;
 
-/// Sizes of a decoder and its batch.
 pub struct DecoderSizes {
     pub batch: usize,
     pub n_previous: usize,

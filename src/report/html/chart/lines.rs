@@ -20,7 +20,6 @@ pub struct LineChart {
     pub lines: Vec<ChartLine>,
     /// Horizontal lines across the whole width.
     pub levels: Vec<ChartLevel>,
-    /// Marked step.
     pub marked: Option<f64>,
 }
 

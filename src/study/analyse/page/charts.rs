@@ -40,7 +40,6 @@ fn ends(values: impl Iterator<Item = f64>) -> [f64; 2] {
     [low - room, high + room]
 }
 
-/// Ends of an interval, multiplied by `factor`.
 fn scaled(interval: Option<ConfidenceInterval>, factor: f64) -> Option<[f64; 2]> {
     interval.map(|ends| [factor * ends.low, factor * ends.high])
 }

@@ -101,7 +101,6 @@ fn share_title(share: &ShareAnalysis) -> String {
     format!("{scope}: {what} in {successes} of {votes}, {percent} ({sizes}{sd})")
 }
 
-/// Numbers of participants and of clips.
 fn sizes([participants, clips]: [usize; 2]) -> String {
     format!("{}, {}", counted(participants, "participant"), counted(clips, "clip"))
 }
@@ -151,7 +150,6 @@ fn statistic_row(
         .child(node("td").class("mark").child(mark))
 }
 
-/// Registered hypotheses with their outcomes.
 pub(super) fn hypotheses(analysis: &StudyAnalysis) -> Vec<Node> {
     let rows = analysis.hypotheses.iter().flat_map(|hypothesis| {
         let title = group(&format!("{}: {} ({}).", hypothesis.task, hypothesis.claim, hypothesis.statistic));

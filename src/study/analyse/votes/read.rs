@@ -23,7 +23,6 @@ pub struct VotesRead {
     pub absent: Vec<&'static str>,
 }
 
-/// Row of a table that is not a valid vote.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RejectedRow {
     /// Line in the file, from 1.
