@@ -4,7 +4,6 @@
 //! intervals, and computes values from their sums.
 
 pub mod beat;
-pub mod body_part;
 pub mod catalogue;
 pub mod definition;
 pub mod distribution;

@@ -2,8 +2,7 @@
 //! consecutive frames in which a point is visible, from which most metrics compute a value, and the mean of these
 //! values over all windows.
 
-use super::body_part::{BodyPart, MeasuredPoint};
-use super::definition::{Definition, MetricFamily};
+use super::definition::{BodyPart, Definition, MeasuredPoint, MetricFamily};
 use super::sums::BlockSums;
 use ndarray::{ArrayView2, ArrayView3};
 use orator_base::math::vec3::{self, Vec3};

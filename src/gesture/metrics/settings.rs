@@ -3,8 +3,7 @@
 //! definitions state both. Peculiarities of each convention are documented in the guide (`evaluation`).
 
 use super::beat::{aist, angles, consistency};
-use super::body_part::BodyPart;
-use super::definition::MetricFamily;
+use super::definition::{BodyPart, MetricFamily};
 use super::distribution::frechet_metrics;
 use super::movement::{angles as angles_of_posture, bone_change, cca, derivatives, hellinger};
 use super::position::errors;

@@ -1,7 +1,7 @@
 //! The motion discriminator: a patch network on the frame-to-frame differences of normalised poses that scores about
 //! every fourth frame as real or generated (Ginosar et al. 2019).
 
-use super::conv_block::{ConvBlock, MOMENTUM, SLOPE};
+use super::generator::{ConvBlock, MOMENTUM, SLOPE};
 use crate::ops::conv2d::Conv;
 use crate::ops::resize;
 use crate::params::Params;

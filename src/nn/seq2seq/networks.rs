@@ -1,8 +1,7 @@
 //! The networks with encoders and the common decoder: `WordsSeq2Seq` (network A) and `ContextSeq2Seq` (network B).
 
 use super::config::{Config, Segment};
-use super::decoder::Decoder;
-use super::encoders::{ContextEncoder, FrameEncoder, WordEncoder};
+use super::encoders::{ContextEncoder, Decoder, FrameEncoder, WordEncoder};
 use super::predict::{GesturePredictor, TruePoses};
 use crate::Mode;
 use crate::ops::affine::Affine;

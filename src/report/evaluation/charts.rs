@@ -1,8 +1,8 @@
 //! Charts of an evaluation: the share of correct keypoints of each joint, drawn on a body and two hands, and the
 //! distributions of speed and jerk of prediction and ground truth.
 
-use crate::html::chart::dots::{ChartDot, dots};
 use crate::html::chart::histogram::{self, Counts};
+use crate::html::chart::scale::{ChartDot, dots};
 use crate::html::{Node, legend, node};
 use ndarray::ArrayView3;
 use orator_base::text::number;

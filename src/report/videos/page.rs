@@ -6,7 +6,7 @@ use super::summary::{self, ReportTotals};
 use super::worst::{self, Moment, MomentThumbnail, Worst};
 use super::{movement, sliders, timelines};
 use crate::html::{Node, Page, Section, jpeg, node};
-use crate::{faces, preview};
+use crate::preview;
 use orator_base::stage::progress::Progress;
 use orator_base::stage::rejection::Rejection;
 use orator_base::text::{clock, counted};
@@ -78,7 +78,7 @@ fn page(request: &ReportRequest, gathered: &ReportData, pictures: &Pictures, sum
     if n_speech_model.1 > 0 {
         reasons.push(summary::speech(*n_speech_model));
     }
-    let persons = faces::section(request.settings, request.videos);
+    let persons = preview::faces(request.settings, request.videos);
     let persons = (!persons.is_empty()).then(|| section("persons", "Persons", persons));
     let mut page = Page {
         title: format!("Report on {}", names.join(", ")),

@@ -2,8 +2,7 @@
 //! of the motion are to those of the sound. A motion with a single aligned beat scores 1.
 
 use super::consistency::{beat_proximity, minima};
-use crate::metrics::body_part::BodyPart;
-use crate::metrics::definition::{Better, Definition, MetricFamily};
+use crate::metrics::definition::{Better, BodyPart, Definition, MetricFamily};
 use crate::metrics::pair::PairedFrames;
 use orator_base::math::vec3::{self, Vec3};
 use orator_base::types::skeleton::N_JOINTS;

@@ -1,8 +1,7 @@
 //! Beat consistency: whether motion has beats at the onsets of the sound. The metric of the emage convention (Liu et
 //! al. 2024), and a simpler one of this project.
 
-use crate::metrics::body_part::BodyPart;
-use crate::metrics::definition::{Better, Definition, MetricFamily};
+use crate::metrics::definition::{Better, BodyPart, Definition, MetricFamily};
 use crate::metrics::pair::PairedFrames;
 use orator_base::math::vec3::{self, Vec3};
 use orator_base::types::skeleton::{L_ELBOW, L_WRIST, N_JOINTS, R_ELBOW, R_WRIST};

@@ -4,8 +4,7 @@
 
 use super::frechet::between;
 use super::moments;
-use crate::metrics::body_part::BodyPart;
-use crate::metrics::definition::{Better, Definition, MetricFamily};
+use crate::metrics::definition::{Better, BodyPart, Definition, MetricFamily};
 use crate::metrics::pair::PairedFrames;
 use crate::metrics::space::fixed_rate::{self, Frames};
 use crate::metrics::space::{basis, embedding};

@@ -2,8 +2,7 @@
 //! reveal predictions that hardly move, which have a small position error; the ratio of predicted to real motion
 //! energy, the mean squared speed of the joints, detects those that collapse to the mean pose.
 
-use crate::metrics::body_part::BodyPart;
-use crate::metrics::definition::{Better, Definition, MetricFamily};
+use crate::metrics::definition::{Better, BodyPart, Definition, MetricFamily};
 use crate::metrics::pair::windows;
 use ndarray::{ArrayView2, ArrayView3};
 use orator_base::math::vec3::{self, Vec3};

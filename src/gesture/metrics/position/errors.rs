@@ -2,8 +2,7 @@
 //! trimodal convention (Yoon et al. 2020, `train.py` in their repository), and the error after Procrustes alignment
 //! (P-MPJPE), which measures the pose itself regardless of its orientation.
 
-use crate::metrics::body_part::BodyPart;
-use crate::metrics::definition::{Better, Definition, MetricFamily};
+use crate::metrics::definition::{Better, BodyPart, Definition, MetricFamily};
 use crate::metrics::pair::{self, PointWindow};
 use orator_base::math::procrustes::similarity;
 use orator_base::math::vec3::{self, Vec3};

@@ -2,8 +2,7 @@
 //! distance from the ground truth is at most alpha times the largest extent of the real pose. `CorrectKeypoints` uses
 //! an alpha of 0.2 for training; the metrics support any alpha, in the image plane and in 3D.
 
-use crate::metrics::body_part::BodyPart;
-use crate::metrics::definition::{Better, Definition, MetricFamily};
+use crate::metrics::definition::{Better, BodyPart, Definition, MetricFamily};
 use crate::metrics::pair::PairedFrames;
 use crate::metrics::sums::BlockSums;
 use ndarray::{ArrayView2, ArrayView3, NdFloat};

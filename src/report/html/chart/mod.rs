@@ -1,6 +1,5 @@
 //! SVG charts that need no script.
 
-pub mod dots;
 pub mod forest;
 pub mod histogram;
 pub mod lines;
