@@ -179,17 +179,12 @@ fn results(analysis: &StudyAnalysis) -> String {
             let equivalence = statistics.equivalence(StatisticMethod::Crossed).map(|test| {
                 format!("; equivalence within \u{b1}{} percentage points: {}", points(test.bound), p_value(test.p))
             });
-            let chosen = match share.measure {
-                ShareMeasure::GeneratedChosen => "generated motion chosen",
-                ShareMeasure::MatchedChosen => "matching motion chosen",
-                ShareMeasure::Correct => "correct",
-                ShareMeasure::JudgedReal => "judged real",
-            };
             let _ = write!(
                 text,
-                "{}, {}: {chosen} in {} of the votes [{}], {statistic}{}{adjusted}{}. ",
+                "{}, {}: {} in {} of the votes [{}], {statistic}{}{adjusted}{}. ",
                 task.task,
                 super::conclusions::scope(share),
+                share.measure.name(),
                 percent(share.share),
                 percents(interval),
                 p_value(test.p),

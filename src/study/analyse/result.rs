@@ -142,6 +142,17 @@ pub enum ShareMeasure {
     JudgedReal,
 }
 
+impl ShareMeasure {
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::GeneratedChosen => "generated motion chosen",
+            Self::MatchedChosen => "matching motion chosen",
+            Self::Correct => "correct",
+            Self::JudgedReal => "judged real",
+        }
+    }
+}
+
 /// Proportion of votes, compared with chance where chance is defined.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ShareAnalysis {

@@ -1,7 +1,7 @@
 //! Tables of all statistics of a task with their registration status, of the hypotheses and of the exclusions.
 
 use crate::analyse::conclusions::scope;
-use crate::analyse::result::{ClipShare, ShareAnalysis, ShareMeasure, StudyAnalysis, TaskAnalysis};
+use crate::analyse::result::{ClipShare, ShareAnalysis, StudyAnalysis, TaskAnalysis};
 use crate::analyse::statistic::{StatisticOrigin, StatisticRow, StatisticSet, TestResult};
 use crate::analyse::text::{bare_p, count, counted, percent, points};
 use crate::analyse::votes::read::RejectedRow;
@@ -76,24 +76,15 @@ fn clips(task: &TaskAnalysis) -> Node {
         let cells = [successes, votes, percent(of.share)].map(cell);
         node("tr").child(name).child(node("td").text(&of.speaker)).children(cells)
     };
-    let what = task.shares.first().map_or("", |share| measure_name(share.measure));
+    let what = task.shares.first().map_or("", |share| share.measure.name());
     let head = [("Clip", ""), ("Speaker", ""), (what, "num"), ("Votes", "num"), ("Share", "num")]
         .map(|(title, class)| node("th").attr("scope", "col").class(class).text(title));
     let rows = task.clips.iter().map(row);
     node("div").class("scroll").attr("tabindex", "0").child(table("figures clips", head, rows))
 }
 
-fn measure_name(measure: ShareMeasure) -> &'static str {
-    match measure {
-        ShareMeasure::GeneratedChosen => "generated motion chosen",
-        ShareMeasure::MatchedChosen => "matching motion chosen",
-        ShareMeasure::Correct => "correct",
-        ShareMeasure::JudgedReal => "judged real",
-    }
-}
-
 fn share_title(share: &ShareAnalysis) -> String {
-    let (what, scope, percent) = (measure_name(share.measure), scope(share), percent(share.share));
+    let (what, scope, percent) = (share.measure.name(), scope(share), percent(share.share));
     let sd = share.participant_sd.map(|sd| format!("; standard deviation over participants {:.1} points", 100.0 * sd));
     let sd = sd.unwrap_or_default();
     let (successes, votes) = (count(share.n_successes as usize), counted(share.n_votes as usize, "vote"));
