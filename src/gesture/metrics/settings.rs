@@ -2,7 +2,7 @@
 //! defines for its own frame rate are converted to seconds, and back to the nearest number of frames of the data; the
 //! definitions state both. Peculiarities of each convention are documented in the guide (`evaluation`).
 
-use super::beat::{aist, angles, consistency};
+use super::beat;
 use super::definition::{BodyPart, MetricFamily};
 use super::distribution::frechet_metrics;
 use super::movement::{angles as angles_of_posture, bone_change, cca, derivatives, hellinger};
@@ -71,11 +71,11 @@ pub(crate) fn metrics(settings: &MetricSettings) -> Vec<MetricFamily> {
             hellinger::genea(settings.has_fingers),
             cca::metric(if settings.has_fingers { BodyPart::WithNeck } else { BodyPart::Body }),
         ],
-        Convention::Emage => vec![frechet_metrics::l1div(BodyPart::All), consistency::emage(fps)],
+        Convention::Emage => vec![frechet_metrics::l1div(BodyPart::All), beat::emage(fps)],
         Convention::Trimodal => {
-            vec![errors::maje(fps), errors::acceleration_by_coordinate(), angles::metric(fps)]
+            vec![errors::maje(fps), errors::acceleration_by_coordinate(), beat::trimodal(fps)]
         }
-        Convention::Aist => vec![aist::metric(fps)],
+        Convention::Aist => vec![beat::aist(fps)],
     }
 }
 
@@ -101,7 +101,7 @@ fn own(settings: &MetricSettings) -> Vec<MetricFamily> {
     all.extend(parts.iter().map(|part| frechet_metrics::l1div(*part)));
     all.extend(parts.iter().map(|part| frechet_metrics::pairwise(*part)));
     all.push(bone_change::metric());
-    all.push(consistency::metric(settings.fps.per_sec()));
+    all.push(beat::metric(settings.fps.per_sec()));
     all.push(frechet_metrics::poses(BodyPart::All));
     all.push(frechet_metrics::poses(BodyPart::Body));
     all.push(frechet_metrics::basis());

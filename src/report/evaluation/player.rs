@@ -15,7 +15,7 @@ use orator_base::types::sound::{SAMPLE_RATE, Sound};
 use orator_formats::wav;
 use orator_gesture::evaluate::clips::clips::{EvalClip, EvalClips};
 use orator_gesture::evaluate::table::table::Table;
-use orator_gesture::metrics::beat::consistency;
+use orator_gesture::metrics::beat;
 use serde_json::{Value, json};
 use std::ops::Range;
 
@@ -142,7 +142,7 @@ fn tracks_of(clip: &EvalClip, frames: Range<usize>, fps: f64, samples: Option<&[
     let (mut lines, mut marks) = (Vec::new(), Vec::new());
     for (class, joints) in both {
         let speeds: Vec<f64> = frames.clone().map(|t| wrist_speed(clip, joints, &frames, t, fps)).collect();
-        marks.push((class, consistency::minima(&speeds, order).into_iter().map(|i| i as f64 / fps).collect()));
+        marks.push((class, beat::minima(&speeds, order).into_iter().map(|i| i as f64 / fps).collect()));
         lines.push((class, speeds.iter().enumerate().map(|(i, speed)| [i as f64 / fps, *speed]).collect()));
     }
     all.push(Track { name: "wrist speed".to_owned(), lines, marks: Vec::new() });
