@@ -56,7 +56,6 @@ impl SequenceGenerator {
 
     /// Words that are not in the vocabulary take their vectors from this table. Without a table, or without a vector in
     /// it, all have the vector of the unknown word.
-    ///
     /// # Errors
     /// A network that does not read words or was trained without a table, or whose word vectors have another dimension.
     pub fn set_word_vectors(&mut self, vectors: Arc<WordVectors>) -> Result<()> {
@@ -136,7 +135,6 @@ impl SequenceGenerator {
 
     /// Input features for a sound at `metadata.rate` and its words, of which there may be none. The sound is padded
     /// with silence to complete segments.
-    ///
     /// # Errors
     /// Sound of another rate, or shorter than a frame; a table of word vectors that cannot be read.
     pub fn prepare(&self, sound: &Sound, words: &[Word]) -> Result<SpeechInput> {
@@ -159,7 +157,6 @@ impl SequenceGenerator {
     }
 
     /// Generates poses for the input. The first segment starts from the mean pose.
-    ///
     /// # Errors
     /// Network output that is not finite.
     pub fn generate(&self, speech: &SpeechInput, seams: StateAtSeams) -> Result<GeneratedPoses> {

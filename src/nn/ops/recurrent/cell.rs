@@ -200,7 +200,6 @@ impl SavedChunks {
     }
 
     /// Returns the saved values.
-    ///
     /// # Errors
     /// No forward pass has saved values.
     pub fn get<T: 'static>(&self) -> Result<&[Vec<T>]> {
