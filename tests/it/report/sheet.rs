@@ -37,7 +37,7 @@ fn keypoints(motion: &Motion) -> Keypoints {
         hand
     });
     let image_size = SIZE.map(|px| px as u32);
-    Keypoints { fps: motion.fps, image_size, body, left_hand, right_hand }
+    Keypoints { fps: motion.fps, image_size, body, left_hand, right_hand, hand_depth: None }
 }
 
 fn pages(video: &Path, keypoints: &Keypoints, motion: &Motion, every_secs: f64) -> anyhow::Result<Vec<Image>> {
