@@ -308,15 +308,4 @@ mod tests {
         assert!(problems("extract = 3", &[])[0].contains("expected a table"));
         assert!(problems("speaker = 3", &[])[0].contains("[[speaker]]"));
     }
-
-    proptest::proptest! {
-        #![proptest_config(proptest::test_runner::Config::with_cases(128))]
-        #[test]
-        fn no_text_panics(
-            text in "(\\[?\\[?(gan|speaker|extract|work|shard|[a-z]{1,4})[\\].=]?[a-z_]{0,6} ?=? ?[\"0-9a-z.\\[\\]{}-]{0,8}\n){0,8}|.{0,60}",
-            set in "(gan|work|lift|speaker)\\.[a-z]{1,8}=.{0,8}|.{0,20}",
-        ) {
-            let _ = resolved(&text, &[&set]);
-        }
-    }
 }
