@@ -58,9 +58,6 @@ type Landmark = (u32, u32, u32);
 
 /// Finds shared sound of at least `min_secs`: the longest of each pair of videos, sorted by name. `names` must be
 /// sorted; `codes` reads the codes of the n-th video.
-///
-/// # Errors
-/// Those of `codes`.
 pub fn find(names: &[String], codes: impl Fn(usize) -> Result<Vec<u32>>, min_secs: f64) -> Result<Vec<SharedSound>> {
     let mut landmarks: Vec<Landmark> = Vec::new();
     for video in 0..names.len() {

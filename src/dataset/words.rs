@@ -97,9 +97,6 @@ pub fn choose(paths: &[PathBuf], speaker: &str, sound_secs: f64) -> TranscriptCh
 }
 
 /// Checks that a transcript does not belong to another sound.
-///
-/// # Errors
-/// Too many words after the end of the sound.
 fn check_end(words: &[Word], path: &Path, sound_secs: f64) -> Result<()> {
     let n_words = words.len();
     let n_outside = words.iter().filter(|word| midpoint_secs(word) >= sound_secs).count();

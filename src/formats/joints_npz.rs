@@ -10,10 +10,6 @@ use orator_base::types::skeleton::N_JOINTS;
 use std::path::Path;
 
 /// Reads the motion.
-///
-/// # Errors
-///
-/// The file is unreadable, or an array is missing, has a wrong shape or is out of range.
 pub fn read(path: &Path) -> Result<Motion> {
     let mut npz = Npz::open(path)?;
     let joints = npz.floats("pose3d", &[None, Some(N_JOINTS), Some(3)])?.into_dimensionality::<Ix3>()?;

@@ -67,10 +67,6 @@ impl Npz {
     }
 
     /// Numeric array of any float or integer type, converted to f64.
-    ///
-    /// # Errors
-    ///
-    /// The array is missing, or has another shape or an unsupported type.
     pub fn numbers(&mut self, name: &str, shape: &[AxisLength]) -> Result<ArrayD<f64>> {
         let found = npy::numbers(&self.bytes(name)?);
         let Some(array) = self.readable(name, found)? else {
@@ -81,10 +77,6 @@ impl Npz {
     }
 
     /// Float array as f32.
-    ///
-    /// # Errors
-    ///
-    /// Those of [`Npz::numbers`].
     pub fn floats(&mut self, name: &str, shape: &[AxisLength]) -> Result<ArrayD<f32>> {
         let bytes = self.bytes(name)?;
         if let Some(array) = self.readable(name, npy::typed(&bytes))? {
@@ -95,10 +87,6 @@ impl Npz {
     }
 
     /// Boolean array.
-    ///
-    /// # Errors
-    ///
-    /// The array is missing, or has another shape or type.
     pub fn bools(&mut self, name: &str, shape: &[AxisLength]) -> Result<ArrayD<bool>> {
         let found = npy::typed(&self.bytes(name)?);
         let Some(array) = self.readable(name, found)? else {

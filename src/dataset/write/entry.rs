@@ -86,9 +86,6 @@ pub struct EntryWriter {
 impl EntryWriter {
     /// Starts the entry of a video in the dataset in `dir`. All its samples are in `split`, or (`None`) in several
     /// splits. A shard is closed before it would exceed `max_shard_bytes`.
-    ///
-    /// # Errors
-    /// An invalid name, or one that another video of the dataset has.
     pub fn new(
         dir: &Path,
         source: VideoSource,

@@ -30,10 +30,6 @@ impl WordCollector {
     }
 
     /// Adds the words of `text`, spoken from `start` to `end` seconds; one time alone limits the estimated other one.
-    ///
-    /// # Errors
-    ///
-    /// Those of `word::push`.
     pub(super) fn push(
         &mut self,
         text: &str,
@@ -75,10 +71,6 @@ impl WordCollector {
     }
 
     /// All words.
-    ///
-    /// # Errors
-    ///
-    /// There are words, but no time was stated.
     pub(super) fn finish(mut self) -> Result<Vec<Word>> {
         ensure!(
             self.waiting.is_empty() || self.has_times,

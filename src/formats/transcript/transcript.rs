@@ -61,10 +61,6 @@ impl Transcript {
     }
 
     /// Reads a transcript of one speaker in the format of its file extension.
-    ///
-    /// # Errors
-    ///
-    /// Those of `of_speaker`.
     pub fn read(path: &Path) -> Result<Self> {
         Self::of_speaker(path, "")
     }

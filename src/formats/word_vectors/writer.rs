@@ -58,10 +58,6 @@ impl TableWriter {
     }
 
     /// Writes the words and the header, and returns the number of words.
-    ///
-    /// # Errors
-    ///
-    /// No word was added.
     pub fn finish(mut self) -> Result<usize> {
         let (n_words, dim) = (self.known.len(), self.dim);
         ensure!(n_words > 0, "it contains no words");
