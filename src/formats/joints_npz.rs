@@ -9,7 +9,6 @@ use orator_base::types::pose3d::Motion;
 use orator_base::types::skeleton::N_JOINTS;
 use std::path::Path;
 
-/// Reads the motion.
 pub fn read(path: &Path) -> Result<Motion> {
     let mut npz = Npz::open(path)?;
     let joints = npz.floats("pose3d", &[None, Some(N_JOINTS), Some(3)])?.into_dimensionality::<Ix3>()?;

@@ -76,7 +76,6 @@ impl Npz {
         Ok(array)
     }
 
-    /// Float array as f32.
     pub fn floats(&mut self, name: &str, shape: &[AxisLength]) -> Result<ArrayD<f32>> {
         let bytes = self.bytes(name)?;
         if let Some(array) = self.readable(name, npy::typed(&bytes))? {

@@ -39,7 +39,6 @@ pub fn to_bytes(sound: &Sound) -> Result<Vec<u8>> {
     Ok(bytes.into_inner())
 }
 
-/// Writes `sound` to the file `out`.
 pub fn write(out: &Path, sound: &Sound) -> Result<()> {
     let mut wav = WavWriter::create(out, sound.rate)?;
     wav.push(&sound.samples)?;

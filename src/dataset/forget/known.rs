@@ -116,7 +116,6 @@ fn speakers_on_record(work: &Path) -> Vec<String> {
         .collect()
 }
 
-/// All videos of the dataset in `dir`.
 pub fn dataset_videos(dir: &Path) -> Result<Vec<KnownVideo>> {
     ensure!(dir.join(entry::FOLDER).is_dir(), "{} is not a dataset: it has no folder {}", dir.display(), entry::FOLDER);
     let mut known = Vec::new();

@@ -43,7 +43,6 @@ pub struct Verified {
     pub n_samples: usize,
     /// Seconds of motion.
     pub secs: f64,
-    /// Bytes read.
     pub bytes: u64,
 }
 

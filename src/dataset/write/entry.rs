@@ -79,7 +79,6 @@ pub struct EntryWriter {
     dir: PathBuf,
     entry: VideoEntry,
     max_shard_bytes: u64,
-    /// Shards of each split.
     shards: BTreeMap<Split, ShardWriter>,
 }
 

@@ -121,7 +121,6 @@ fn from_bvh(
     Ok(CapturedMotion { motion, text: None, facts: facts.as_object().cloned().unwrap_or_else(Map::new) })
 }
 
-/// Joints of a file.
 struct JointMap {
     /// Index of the file's joint for each joint of `types::skeleton`.
     joints: [Option<usize>; N_JOINTS],

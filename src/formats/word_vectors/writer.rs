@@ -22,7 +22,6 @@ pub struct TableWriter {
 }
 
 impl TableWriter {
-    /// Creates the file `path`.
     pub fn new(path: &Path, dim: usize) -> Result<Self> {
         ensure!((1..=10_000).contains(&dim), "invalid vector length {dim}: expected 1 to 10000");
         let file = File::create(path).with_context(|| format!("cannot write {}", path.display()))?;

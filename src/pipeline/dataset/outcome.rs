@@ -50,7 +50,6 @@ impl SeveralPersons {
     }
 }
 
-/// Outcome of writing a dataset.
 pub struct DatasetOutcome<'a> {
     pub settings: &'a config::DatasetConfig,
     pub rule: &'a SplitRule,
