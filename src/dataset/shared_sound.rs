@@ -162,3 +162,14 @@ fn longest_at(a: &[u32], b: &[u32], offset: i64) -> Option<(i64, i64, usize)> {
 fn bit_errors(x: u32, y: u32) -> (u32, u32) {
     if x == 0 || y == 0 { (0, 0) } else { (32, (x ^ y).count_ones()) }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn silence_is_not_shared() {
+        assert_eq!(longest_at(&[5; 300], &[5; 300], 0), Some((0, 0, 300)));
+        assert_eq!(longest_at(&[0; 300], &[0; 300], 0), None);
+    }
+}

@@ -293,3 +293,25 @@ impl SplitFill {
         candidates.fold(None, larger).map_or(Split::Train, |(split, _)| split)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn few_videos_leave_no_split_empty() {
+        let filled = |n: usize| -> Vec<Split> {
+            let mut fill = SplitFill::new(0.15, 0.15, n as f64);
+            let next = |k: usize| {
+                let split = fill.furthest_below_share(n - k);
+                fill.add(split, 1.0);
+                split
+            };
+            (0..n).map(next).collect()
+        };
+        assert_eq!(filled(1), [Split::Train]);
+        assert_eq!(filled(2), [Split::Train, Split::Validation]);
+        assert_eq!(filled(3), [Split::Train, Split::Validation, Split::Test]);
+        assert_eq!(filled(4), [Split::Train, Split::Train, Split::Validation, Split::Test]);
+    }
+}

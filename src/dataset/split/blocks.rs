@@ -182,4 +182,20 @@ mod tests {
         assert!((raised[0].1 - 28.0).abs() < 1e-9 && raised[1].1 == 8.0 && raised[2].1 == 8.0, "{raised:?}");
         assert_eq!(lengths(30.0, &SHARES, 8.0, 8.0, true), None);
     }
+
+    #[test]
+    fn shared_audio_is_excluded_where_the_splits_differ() {
+        let block = |split, start_secs, end_secs| TimeBlock { split: Some(split), start_secs, end_secs };
+        let own = [block(Split::Train, 0.0, 60.0), block(Split::Test, 60.0, 100.0)];
+        let other = [block(Split::Train, 0.0, 40.0), block(Split::Validation, 40.0, 90.0)];
+        // 10 s in the own video correspond to 20 s in the other.
+        let found = conflicts(&own, (10.0, 70.0), &other, 10.0);
+        let expected =
+            [((30.0, 60.0), Split::Train, Split::Validation), ((60.0, 70.0), Split::Test, Split::Validation)];
+        assert_eq!(found, expected);
+        let holes: Vec<Span> = found.into_iter().map(|(span, ..)| span).collect();
+        let left = without(&own, &holes);
+        assert!(conflicts(&left, (10.0, 70.0), &other, 10.0).is_empty(), "{left:?}");
+        assert_eq!(left.first().unwrap().end_secs, 29.0);
+    }
 }
