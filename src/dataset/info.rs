@@ -49,7 +49,6 @@ pub struct DatasetInfo {
     pub videos: Vec<DatasetVideo>,
 }
 
-/// Video of the dataset.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct DatasetVideo {
     pub name: String,

@@ -19,9 +19,6 @@ const RULE: [u8; 3] = [170; 3];
 const INK: [u8; 3] = [30; 3];
 
 /// Writes the faces of groups of videos as PNG.
-///
-/// # Errors
-/// A picture that cannot be read or written.
 pub fn write(path: &Path, work: &Path, groups: &[Vec<&VideoPerson>]) -> Result<()> {
     let rows: Vec<(bool, &[&VideoPerson])> = groups
         .iter()

@@ -50,7 +50,6 @@ impl SeveralPersons {
     }
 }
 
-/// Outcome of writing a dataset.
 pub struct DatasetOutcome<'a> {
     pub settings: &'a config::DatasetConfig,
     pub rule: &'a SplitRule,
@@ -64,9 +63,6 @@ pub struct DatasetOutcome<'a> {
 
 impl DatasetOutcome<'_> {
     /// Report of the stage on the dataset in `out`.
-    ///
-    /// # Errors
-    /// Files of the dataset that cannot be read.
     pub fn report(&self, out: &Path) -> Result<Report> {
         let info: DatasetInfo = serde_json::from_slice(&std::fs::read(out.join(INFO))?).context(INFO)?;
         let leakage: Leakage = serde_json::from_slice(&std::fs::read(out.join(LEAKAGE))?).context(LEAKAGE)?;
