@@ -65,6 +65,13 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     Ok(train_one(&args, args.speaker.as_ref(), &config, ui)?.report(ui))
 }
 
+/// Trains the model of a configured speaker on its dataset, in `gan/SPEAKER` of the work folder.
+pub fn train_speaker(config: &Config, speaker: &str, ui: &Ui) -> Result<TrainedModel> {
+    let none = ConfigArgs { config: config.file.clone(), set: Vec::new() };
+    let args = Args { config: none, speaker: None, all: true, steps: None, from: None, out: None, dataset: Vec::new() };
+    train_one(&args, Some(&speaker.to_owned()), config, ui)
+}
+
 fn train_one(args: &Args, speaker: Option<&String>, config: &Config, ui: &Ui) -> Result<TrainedModel> {
     let out = &args.out;
     let folders = TrainingFolders { config, speaker, dataset: args.dataset.first(), out: out.as_ref() };
