@@ -139,39 +139,27 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
         "{} is a video: --input-fps and --size apply to keypoints only",
         args.keypoints.display()
     );
-    let read = match &video {
-        Some(_) => None,
-        None if is_ours(&args.keypoints) => Some(read_own(&args)?),
-        None => Some(read_foreign(&args)?),
-    };
     let settings = config::LiftConfig {
-        body_weights: args.body_weights.unwrap_or_default(),
-        hand_weights: args.hand_weights.unwrap_or_default(),
+        body_weights: args.body_weights.clone().unwrap_or_default(),
+        hand_weights: args.hand_weights.clone().unwrap_or_default(),
         smooth_arms: args.smooth_arms,
         smooth_hands: args.smooth_hands,
         level: args.level,
         ..config::LiftConfig::default()
     };
-    let lifter = Lifter::new(&settings)?;
-    let started = Instant::now();
-    let (keypoints, lifted, mut notes) = match (&video, read) {
-        (Some(video), _) => {
-            let (keypoints, lifted) = video.lift(&settings)?;
-            (keypoints, lifted, Vec::new())
-        }
-        (None, Some((keypoints, notes))) => {
-            ensure!(
-                keypoints.n_frames() > 0,
-                "{} has no frames: `body` is [0, 17, 3], expected [T, 17, 3] with T at least 1",
-                args.keypoints.display()
-            );
-            let lifted = lifter.lift_all(&keypoints);
-            let lifted = lifted.with_context(|| format!("cannot lift {}", args.keypoints.display()))?;
-            (keypoints, lifted, notes)
-        }
-        (None, None) => bail!("{} is neither a video nor keypoints", args.keypoints.display()),
+    let (keypoints, lifted, mut notes, secs) = if let Some(video) = &video {
+        let started = Instant::now();
+        let (keypoints, lifted) = video.lift(&settings)?;
+        (keypoints, lifted, Vec::new(), started.elapsed().as_secs_f64())
+    } else {
+        let (keypoints, notes) = if is_ours(&args.keypoints) { read_own(&args)? } else { read_foreign(&args)? };
+        let (file, lifter) = (args.keypoints.display(), Lifter::new(&settings)?);
+        let expected = "expected [T, 17, 3] with T at least 1";
+        ensure!(keypoints.n_frames() > 0, "{file} has no frames: `body` is [0, 17, 3], {expected}");
+        let started = Instant::now();
+        let lifted = lifter.lift_all(&keypoints).with_context(|| format!("cannot lift {file}"))?;
+        (keypoints, lifted, notes, started.elapsed().as_secs_f64())
     };
-    let secs = started.elapsed().as_secs_f64();
     notes.extend(orator_pipeline::lift::notes(&keypoints, &lifted));
     notes.iter().for_each(|note| ui.say(&format!("{}: {note}", args.keypoints.display())));
     let (motion, camera) = (&lifted.motion, lifted.cameras.first());

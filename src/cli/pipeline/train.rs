@@ -3,7 +3,7 @@
 
 use crate::cli::evaluate::speakers::{SpeakerFolders, measure};
 use crate::cli::train::gan::train_speaker;
-use crate::cli::train::training::{TrainedModel, TrainedModels, train_each};
+use crate::cli::train::training::{TrainedModel, TrainedModels, train_all};
 use crate::cli::ui::Ui;
 use anyhow::{Context as _, Result};
 use ndarray::s;
@@ -43,7 +43,7 @@ pub(super) fn train_speakers(pipeline: &Pipeline, datasets: &[PathBuf], ui: &Ui)
         .into_iter()
         .filter_map(|model| (model.state == UnitState::Stale).then_some(model.name))
         .collect();
-    train_each(&config, ui, |speaker| {
+    train_all(&config, ui, |speaker| {
         let folders = SpeakerFolders::new(&config.settings.work.dir, speaker);
         if stale.contains(&format!("gan/{speaker}")) {
             move_aside(&folders.model)?;

@@ -143,7 +143,9 @@ pub fn with_models<T>(settings: &Settings, ui: &Ui, work: impl Fn() -> Result<T>
     if !ui.confirm(&format!("{error:#}\n{terms}\ndownload the models under these licences?")) {
         return Err(error);
     }
-    download(&store, &wanted, None, ui)?;
+    for Fetched { entry, source } in store.fetch(&wanted, None, ui)? {
+        ui.say(&source.map_or_else(|error| format!("{}: {error:#}", entry.id), |from| format!("{}: {from}", entry.id)));
+    }
     work()
 }
 
@@ -164,11 +166,6 @@ fn fetch(store: &ModelStore, wanted: &[ModelRequest], mirror: Option<&Path>, ui:
     if !terms.is_empty() {
         ui.say(&terms);
     }
-    download(store, wanted, mirror, ui)
-}
-
-/// Fetches the models and prints the result.
-fn download(store: &ModelStore, wanted: &[ModelRequest], mirror: Option<&Path>, ui: &Ui) -> Result<Outcome> {
     let fetched = store.fetch(wanted, mirror, ui)?;
     let substitute = |one: &Fetched| {
         let is_fetched = |other: &&Fetched| other.source.is_ok() && other.entry.role == one.entry.role;

@@ -60,7 +60,8 @@ pub struct Args {
 pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     let config = if args.dataset.is_empty() { args.config.load()? } else { args.config.load_or_default()? };
     if args.all {
-        return train_all(&config, ui, |speaker| train_one(&args, Some(speaker), &config, ui));
+        let trained = train_all(&config, ui, |speaker| train_one(&args, Some(speaker), &config, ui))?;
+        return Ok(trained.report(ui));
     }
     Ok(train_one(&args, args.speaker.as_ref(), &config, ui)?.report(ui))
 }

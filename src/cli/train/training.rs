@@ -108,18 +108,12 @@ pub struct TrainedModels {
     pub outcome: Outcome,
 }
 
-/// Trains a model for each speaker of the configuration by `train_one`, and prints the results.
-///
-/// # Errors
-/// Those of `train_each`.
-pub(super) fn train_all(
-    config: &Config,
-    ui: &Ui,
-    train_one: impl Fn(&String) -> Result<TrainedModel>,
-) -> Result<Outcome> {
-    let TrainedModels { text, next, facts, outcome } = train_each(config, ui, train_one)?;
-    ui.summary(&text, next.as_deref(), json!({ "speakers": facts, "next": next }));
-    Ok(outcome)
+impl TrainedModels {
+    /// Prints the results.
+    pub(super) fn report(self, ui: &Ui) -> Outcome {
+        ui.summary(&self.text, self.next.as_deref(), json!({ "speakers": self.facts, "next": self.next }));
+        self.outcome
+    }
 }
 
 /// Trains a model for each speaker of the configuration by `train_one`. Speakers that another process trains are
@@ -127,7 +121,7 @@ pub(super) fn train_all(
 ///
 /// # Errors
 /// A training that was stopped on request.
-pub fn train_each(
+pub fn train_all(
     config: &Config,
     ui: &Ui,
     train_one: impl Fn(&String) -> Result<TrainedModel>,
