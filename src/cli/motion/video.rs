@@ -14,10 +14,15 @@ use orator_dataset::config::patterns::{VIDEO_EXTENSIONS, has_extension};
 use orator_dataset::config::{Config, LiftConfig, Settings, SpeakerConfig, videos};
 use orator_pipeline::lift::{LiftStage, Lifted};
 use orator_pipeline::{Pipeline, Selection};
+use std::os::unix::process::CommandExt as _;
 use std::path::{Path, PathBuf};
+use std::process::Command;
 
 /// Name, in the work folder, of the speaker of a video that the configuration does not list.
 const SPEAKER: &str = "video";
+
+/// Set in the environment once the keypoints are detected.
+const DETECTED: &str = "ORATOR_KEYPOINTS_DETECTED";
 
 /// A video with detected keypoints.
 pub struct VisibleVideo {
@@ -27,7 +32,8 @@ pub struct VisibleVideo {
 
 impl VisibleVideo {
     /// Detects the keypoints of `path` if it is a video, in the work folder of `pipeline.toml` in the current folder,
-    /// or else in `work`. Starts subprocesses, so it must be called before the process is restricted.
+    /// or else in `work`. The program is then started anew with the same arguments, since a process that has several
+    /// threads can no longer be restricted; this must be called first.
     ///
     /// # Errors
     /// A missing model; a video that cannot be processed.
@@ -38,10 +44,14 @@ impl VisibleVideo {
         let config = ConfigArgs { config: "pipeline.toml".into(), set: Vec::new() }.load_or_default()?;
         let pipeline = Pipeline::open(with_only(config, path)?)?.with_processes(this_program());
         let settings = pipeline.config().settings.clone();
-        let selection = Selection { to: StageName::Pose2d, ..Selection::default() };
-        let report = with_models(&settings, ui, || pipeline.run(&selection, ui))?;
-        if let Some(failure) = report.failures.first() {
-            bail!("{}: {}", path.display(), failure.error);
+        if std::env::var_os(DETECTED).is_none() {
+            let selection = Selection { to: StageName::Pose2d, ..Selection::default() };
+            let report = with_models(&settings, ui, || pipeline.run(&selection, ui))?;
+            if let Some(failure) = report.failures.first() {
+                bail!("{}: {}", path.display(), failure.error);
+            }
+            let error = Command::new(this_program()).args(std::env::args_os().skip(1)).env(DETECTED, "1").exec();
+            bail!("cannot start the program again: {error}");
         }
         let unit = pipeline.videos(&[])?.into_iter().flat_map(|videos| videos.units).next();
         let unit = unit.with_context(|| format!("{} is excluded in pipeline.toml", path.display()))?;
