@@ -90,10 +90,7 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
                     let entries = store.manifest().models.iter().filter(is_available);
                     entries.map(|entry| ModelRequest::Id(entry.id.clone())).collect()
                 }
-                (false, []) => models::required_models(pose2d)
-                    .into_iter()
-                    .chain(SpeechDetector::required_models(&settings))
-                    .collect(),
+                (false, []) => required(&settings),
                 (false, ids) => ids.iter().cloned().map(ModelRequest::Id).collect(),
             };
             if find_library(&folder.onnxruntime, &folder.dir).is_err() {
@@ -131,17 +128,44 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     }
 }
 
-/// Prints the licences of the models, fetches them, and prints the result.
-pub fn fetch(store: &ModelStore, wanted: &[ModelRequest], mirror: Option<&Path>, ui: &Ui) -> Result<Outcome> {
+/// Models that the settings require.
+fn required(settings: &Settings) -> Vec<ModelRequest> {
+    models::required_models(&settings.pose2d).into_iter().chain(SpeechDetector::required_models(settings)).collect()
+}
+
+/// Calls `work`; if a model is missing and the user accepts the licences, fetches the models and calls it again.
+pub fn with_models<T>(settings: &Settings, ui: &Ui, work: impl Fn() -> Result<T>) -> Result<T> {
+    let error = match work() {
+        Err(error) if matches!(error.downcast_ref(), Some(ModelError::Missing { .. })) => error,
+        ended => return ended,
+    };
+    let (store, wanted) = (ModelStore::open(&settings.models.dir)?, required(settings));
+    let terms = terms(&store, &wanted)?;
+    if !ui.confirm(&format!("{error:#}\n{terms}\ndownload the models under these licences?")) {
+        return Err(error);
+    }
+    for Fetched { entry, source } in store.fetch(&wanted, None, ui)? {
+        ui.say(&source.map_or_else(|error| format!("{}: {error:#}", entry.id), |from| format!("{}: {from}", entry.id)));
+    }
+    work()
+}
+
+/// Sizes and licences of the missing models; empty if none is missing.
+fn terms(store: &ModelStore, wanted: &[ModelRequest]) -> Result<String> {
     let mut terms = String::new();
     for entry in store.missing(wanted)? {
         let size = entry.bytes as f64 / 1e6;
         terms += &format!("\n  {:<24} {size:5.1} MB  licence {}", entry.id, entry.origin.licence);
     }
+    let about = "missing models (of those for one purpose, the first that can be downloaded is enough):";
+    Ok(if terms.is_empty() { terms } else { format!("{about}{terms}") })
+}
+
+/// Prints the licences of the models, fetches them, and prints the result.
+fn fetch(store: &ModelStore, wanted: &[ModelRequest], mirror: Option<&Path>, ui: &Ui) -> Result<Outcome> {
+    let terms = terms(store, wanted)?;
     if !terms.is_empty() {
-        ui.say(&format!(
-            "missing models (of those for one purpose, the first that can be downloaded is enough):{terms}"
-        ));
+        ui.say(&terms);
     }
     let fetched = store.fetch(wanted, mirror, ui)?;
     let substitute = |one: &Fetched| {

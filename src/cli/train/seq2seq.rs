@@ -76,7 +76,8 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     let config = if is_named { args.config.load_or_default()? } else { args.config.load()? };
     let vectors = args.words.as_deref().map(WordVectors::open).transpose()?;
     if args.all {
-        return train_all(&config, ui, |speaker| train_one(&args, Some(speaker), &config, vectors.as_ref(), ui));
+        let trained = train_all(&config, ui, |speaker| train_one(&args, Some(speaker), &config, vectors.as_ref(), ui))?;
+        return Ok(trained.report(ui));
     }
     Ok(train_one(&args, args.speaker.as_ref(), &config, vectors.as_ref(), ui)?.report(ui))
 }

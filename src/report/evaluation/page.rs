@@ -5,7 +5,7 @@ use super::charts::{joints, speeds};
 use super::player;
 use super::player::Excerpt;
 use super::table;
-use crate::html::{Node, Page, Section, node};
+use crate::html::{Node, Page, Section, node, video};
 use anyhow::Result;
 use orator_base::text::counted;
 use orator_base::text::length;
@@ -17,11 +17,11 @@ use orator_gesture::evaluate::conclusion::text;
 use orator_gesture::evaluate::table::table::{PredictorRow, Table};
 use serde_json::json;
 
-/// HTML of the page.
-pub fn html(table: &Table, clips: &EvalClips, title: &str) -> Result<String> {
+/// HTML of the page; `film`: MP4 of generated and true motion side by side, shown after the conclusions.
+pub fn html(table: &Table, clips: &EvalClips, title: &str, film: Option<&[u8]>) -> Result<String> {
     let excerpts = player::choose(clips)?;
     let section = |id, title, body| Section { id, title, body };
-    let page = Page {
+    let mut page = Page {
         title: title.to_owned(),
         lead: lead(table),
         sections: vec![
@@ -43,6 +43,9 @@ pub fn html(table: &Table, clips: &EvalClips, title: &str) -> Result<String> {
             "excerpts": excerpts.iter().map(Excerpt::data).collect::<Vec<_>>(),
         }),
     };
+    if let Some(film) = film {
+        page.sections.insert(1, section("film", "Film", vec![video(film, "Generated and true motion side by side")]));
+    }
     Ok(page.html())
 }
 
