@@ -145,7 +145,7 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     check_effect(&args, &outputs)?;
     let sound = args.audio.as_deref().map(audio::read_sound).transpose()?;
     let done = animate(&args, input, (sound, rig.as_ref()), &outputs, &options, ui)?;
-    let next = next_output(&outputs).map(|out| {
+    let next = next_output(&outputs, is_read).map(|out| {
         let sample = args.sample.as_ref().map(|key| format!(" --sample {key}")).unwrap_or_default();
         format!("orator animate {}{sample} --out {}", args.input.display(), out.display())
     });

@@ -116,6 +116,8 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
         Some(speaker) if report.datasets.len() == report.n_speakers => {
             format!("orator train gan{flags} --speaker {}", speaker.to_string_lossy())
         }
+        // The errors have been printed.
+        _ if n_failed > 0 => format!("orator report{flags}"),
         _ => format!("orator status{flags} --why"),
     };
     let mut facts = json!(report);

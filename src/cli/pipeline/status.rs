@@ -51,8 +51,14 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     for stale in &mut report.stale {
         stale.command = format!("orator {}{flags}", stale.command);
     }
-    let verb = if report.datasets_are_up_to_date() { "train gan" } else { "run" };
-    let next = format!("orator {verb}{flags}");
+    let is_new = |unit: &UnitStatus| matches!(unit.state, UnitState::Stale | UnitState::NeverDone);
+    let next = match (report.datasets_are_up_to_date(), report.units.iter().any(is_new)) {
+        (true, _) => format!("orator train gan{flags}"),
+        (false, true) => format!("orator run{flags}"),
+        // A run would only repeat the failures.
+        (false, false) if args.why => format!("orator report{flags}"),
+        (false, false) => format!("orator status{flags} --why"),
+    };
     let mut facts = json!(report);
     facts["next"] = json!(next);
     ui.summary(&text(&report, args.why), Some(&next), facts);

@@ -171,12 +171,14 @@ fn metrics(validation: &Validation) -> String {
 fn pairs(dataset: &Dataset, speaker: &GestureGenerator, n_speakers: usize) -> Result<Vec<HeldOutPair>> {
     let mut samples = page_samples(dataset);
     samples.truncate(samples.len().div_ceil(n_speakers));
+    let split = samples.first().map_or("", |sample| sample.split.name());
     let intervals = held_out::read(dataset, &samples, &speaker.metadata.normalisation)?;
     let pair = |interval: HeldOutInterval| {
         let frames = middle(interval.ground_truth.n_frames(), speaker.fps());
         let HeldOutInterval { key, ground_truth, sound, .. } = interval.cut(frames.clone());
         let (predicted, _) = predictor::motion(speaker, &sound, frames.len())?;
-        Ok(HeldOutPair { name: key, start_secs: speaker.fps().secs(frames.start), ground_truth, predicted })
+        let (name, start_secs) = (format!("{split} {key}"), speaker.fps().secs(frames.start));
+        Ok(HeldOutPair { name, start_secs, ground_truth, predicted })
     };
     intervals.into_iter().map(pair).collect()
 }

@@ -8,10 +8,10 @@ use super::{Lifted, Lifter, weights};
 use anyhow::{Context, Result, ensure};
 use ndarray::{Array1, s};
 use orator_base::stage::artifacts::{Artifact, StageName};
-use orator_base::stage::ledger::Ledger;
+use orator_base::stage::ledger::{Ledger, longest_first};
 use orator_base::stage::progress::Progress;
 use orator_base::stage::{Input, Report, Stage, Unit, write_json};
-use orator_base::text::counted;
+use orator_base::text::{counted, length};
 use orator_base::types::interval::Intervals;
 use orator_base::types::pose2d::Keypoints;
 use orator_dataset::config;
@@ -115,6 +115,7 @@ impl Stage for LiftStage {
             intervals.n_frames
         );
         let ledger = Ledger::read(&self.file(Artifact::SegmentLedger, unit))?;
+        let (accepted_secs, before) = (ledger.accepted_secs(), ledger.rejected_secs());
         let (lifted, intervals, ledger) = self.lift(&mut keypoints, intervals, ledger, out)?;
         joints_npz::write_lifted(&Artifact::Joints.within(out), &lifted.motion, &lifted.extra)?;
         let bones = json!({ "lengths_metres": lifted.lengths.to_vec(), "n_frames": lifted.n_frames });
@@ -126,11 +127,17 @@ impl Stage for LiftStage {
         let n_visible = lifted.motion.mask.iter().filter(|m| **m).count();
         let n_known = lifted.motion.joints.iter().filter(|v| v.is_finite()).count() / 3;
         let filled = 100.0 * (1.0 - n_visible as f64 / n_known.max(1) as f64);
+        let mut newly = ledger.rejected_secs();
+        newly.iter_mut().for_each(|(reason, secs)| *secs -= before.get(reason).copied().unwrap_or(0.0));
+        let rejected = match accepted_secs - ledger.accepted_secs() {
+            secs if secs < 0.05 => String::new(),
+            secs => format!("; {} of {} rejected: {}", length(secs), length(accepted_secs), longest_first(&newly)),
+        };
         let line = match lifted.n_frames {
-            0 => "no interval to lift".to_owned(),
+            0 => format!("no interval to lift{rejected}"),
             n => {
                 let intervals = counted(intervals.intervals.len(), "interval");
-                format!("{n} frames in {intervals}, {filled:.1} % of the joint positions interpolated")
+                format!("{n} frames in {intervals}, {filled:.1} % of the joint positions interpolated{rejected}")
             }
         };
         let facts = json!({ "n_frames": lifted.n_frames, "filled_percent": filled });

@@ -118,6 +118,8 @@ pub fn train_with_callback(
         let material = TrainingMaterial::measure(datasets, window_frames);
         let secs_a_step = secs_a_step(&trainer, &loader)?;
         recipe::lines(&trainer.settings, &material, secs_a_step)?.iter().for_each(|line| progress.say(line));
+        let few = no_window::motion_warning(material.train_secs).filter(|_| pretrained_model.is_none());
+        few.iter().for_each(|warning| progress.say(warning));
     }
     let settings = trainer.settings.clone();
     let batch = |step: usize| {
