@@ -3,7 +3,7 @@
 
 use super::charts::{joints, speeds};
 use super::player::{self, Excerpt};
-use crate::html::{Node, Page, Section, node};
+use crate::html::{Node, Page, Section, node, video};
 use anyhow::Result;
 use orator_base::text::{counted, length};
 use orator_gesture::evaluate::baseline::baselines::PredictorKind;
@@ -16,10 +16,11 @@ use orator_gesture::evaluate::table::table::{N_COSTLY_DRAWS, N_DRAWS, PredictorR
 use orator_gesture::metrics::catalogue::Definition;
 use serde_json::json;
 
-pub fn html(table: &Table, clips: &EvalClips, title: &str) -> Result<String> {
+/// HTML of the page; `film`: MP4 of generated and true motion side by side, shown after the conclusions.
+pub fn html(table: &Table, clips: &EvalClips, title: &str, film: Option<&[u8]>) -> Result<String> {
     let excerpts = player::choose(clips)?;
     let section = |id, title, body| Section { id, title, body };
-    let page = Page {
+    let mut page = Page {
         title: title.to_owned(),
         lead: lead(table),
         sections: vec![
@@ -41,6 +42,9 @@ pub fn html(table: &Table, clips: &EvalClips, title: &str) -> Result<String> {
             "excerpts": excerpts.iter().map(Excerpt::data).collect::<Vec<_>>(),
         }),
     };
+    if let Some(film) = film {
+        page.sections.insert(1, section("film", "Film", vec![video(film, "Generated and true motion side by side")]));
+    }
     Ok(page.html())
 }
 

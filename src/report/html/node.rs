@@ -173,6 +173,12 @@ pub fn jpeg(bytes: &[u8], [width, height]: [usize; 2], description: &str) -> Nod
         .attr("loading", "lazy")
 }
 
+/// Embedded MP4 video with controls and a description.
+pub fn video(bytes: &[u8], description: &str) -> Node {
+    let source = format!("data:video/mp4;base64,{}", STANDARD.encode(bytes));
+    node("video").flag("controls").attr("src", source).attr("aria-label", description).attr("style", "max-width: 100%")
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -150,7 +150,8 @@ mod tests {
         }
         let hand = Array3::zeros((10, 21, 3));
         let (fps, image_size) = (FrameRate::new(15, 1), [1280, 720]);
-        let keypoints = Keypoints { fps, image_size, body, left_hand: hand.clone(), right_hand: hand };
+        let keypoints =
+            Keypoints { fps, image_size, body, left_hand: hand.clone(), right_hand: hand, hand_depth: None };
         let ImageTransform { scale, shift } = SheetCrop::around(&keypoints, [1280, 720]).transform;
         let at = |x: f32, y: f32| [scale[0] * x + shift[0], scale[1] * y + shift[1]];
         assert!((at(700.0, 350.0)[0] - 170.0).abs() < 1.0 && (at(700.0, 350.0)[1] - 170.0).abs() < 1.0);

@@ -6,7 +6,9 @@ use super::cells::{CELL_PX, CellView, SheetCrop, pose_cell};
 use anyhow::{Context, Result, ensure};
 use ndarray::{Array3, Axis};
 use orator_avatar::animate::draw::figure::{INK, LEFT, PAPER, RIGHT, mix};
+use orator_base::stage::ledger::RejectedInterval;
 use orator_base::stage::progress::Progress;
+use orator_base::stage::rejection::Rejection;
 use orator_base::types::image::{Image, PictureOptions};
 use orator_base::types::pose2d::{Keypoints, coco};
 use orator_base::types::pose3d::Motion;
@@ -24,6 +26,8 @@ const GAP_PX: usize = 16;
 /// Height of a moment: a line of text, its cells, a gap.
 const MOMENT_HEIGHT_PX: usize = TEXT_PX + CELL_PX + 6;
 const TITLE_PX: usize = 36;
+/// Position of the reason in a cell without joints, px from the top.
+const NO_JOINTS_PX: f32 = 200.0;
 
 pub struct SheetClip<'a> {
     pub title: &'a str,
@@ -31,6 +35,8 @@ pub struct SheetClip<'a> {
     pub pictures: PictureOptions,
     pub keypoints: &'a Keypoints,
     pub motion: &'a Motion,
+    /// Rejected intervals of the video, whose reasons are drawn in the empty cells.
+    pub rejected: &'a [RejectedInterval],
     /// Motion of the animated rig in the same frames as `motion`; `None`: it is not shown.
     pub figure: Option<&'a Motion>,
 }
@@ -154,6 +160,12 @@ impl SheetClip<'_> {
             pose_cell(joints, CellView::Front)?,
             pose_cell(joints, CellView::Left)?,
         ];
+        if joints.iter().all(|value| !value.is_finite()) {
+            let reason = self.reason(frame_idx);
+            for cell in &mut cells[1..] {
+                draw::text(cell, &reason, [20.0, NO_JOINTS_PX], 10.0, INK)?;
+            }
+        }
         if let Some(figure) = self.figure.filter(|figure| frame_idx < figure.n_frames()) {
             let joints = figure.joints.index_axis(Axis(0), frame_idx);
             for from in [CellView::Front, CellView::Left] {
@@ -166,6 +178,15 @@ impl SheetClip<'_> {
             draw::paste(page, cell, [left + column * CELL_PX, top + TEXT_PX]);
         }
         draw::text(page, &self.caption(frame_idx), [left as f32 + 6.0, (top + TEXT_PX - 6) as f32], 10.0, INK)
+    }
+
+    /// Reason why a frame has no joints.
+    fn reason(&self, frame_idx: usize) -> String {
+        // The middle of the frame, since intervals may end at its beginning.
+        let secs = (frame_idx as f64 + 0.5) / self.motion.fps.per_sec();
+        let span = self.rejected.iter().find(|span| (span.start_secs..span.end_secs).contains(&secs));
+        let label = span.map_or("no joints in this frame", |span| Rejection::label(&span.reason));
+        format!("not lifted: {label}")
     }
 
     /// Text above a moment, as in `3.0 s   wrist jitter L 2.1 R 0.9 mm   rejected: left hand`. A part is rejected if

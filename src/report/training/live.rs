@@ -71,13 +71,17 @@ pub fn write(folder: &Path, speaker: &str, pairs: &[HeldOutPair]) -> Result<()> 
     let lines = log::read(folder)?;
     let training_log = TrainingLog::parse(&lines);
     let charts = training_log.charts();
+    let is_held_out = training_log.best.is_none_or(|best| best["validation"]["split"] != "train");
     let mut poses = vec![node("p").text(
-        "Validation intervals: the speaker's motion and, below it, the motion that the best checkpoint generates from \
-         the audio alone. The curves show the height of the wrists: the speaker's in grey, the generated one in \
-         colour.",
+        "The speaker's motion and, below it, the motion that the best checkpoint generates from the audio alone, in \
+         intervals of the named split; the model was trained on those of the split train. The curves show the height \
+         of the wrists: the speaker's in grey, the generated one in colour.",
     )];
+    let curves = node("div").class("grid").children(charts.iter().map(LineChart::card));
+    let note = "Without validation data, the curves named validation are measured on training data.";
+    let note = (!is_held_out).then(|| node("p").class("note").text(note));
     if pairs.is_empty() {
-        poses = vec![node("p").class("empty").text("No validation interval with the 49 joints to show.")];
+        poses = vec![node("p").class("empty").text("No interval with the 49 joints to show.")];
     } else {
         let strip = strip(pairs)?;
         let names: Vec<&str> = pairs.iter().map(|pair| pair.name.as_str()).collect();
@@ -91,7 +95,7 @@ pub fn write(folder: &Path, speaker: &str, pairs: &[HeldOutPair]) -> Result<()> 
         lead: lead(&training_log),
         sections: vec![
             section("best", "Best checkpoint", best(&training_log)),
-            section("curves", "Curves", vec![node("div").class("grid").children(charts.iter().map(LineChart::card))]),
+            section("curves", "Curves", note.into_iter().chain([curves]).collect()),
             section("poses", "Generated and ground-truth poses", poses),
         ],
         style: include_str!("page.css"),
@@ -160,4 +164,25 @@ fn best(training_log: &TrainingLog) -> Vec<Node> {
     let alarm = best["alarm"].as_str().map(|alarm| node("p").class("note").text(format!("Warning: {alarm}.")));
     let table = node("div").class("scroll metrics").child(table);
     below.into_iter().chain([table, node("p").class("small").text(about)]).chain(alarm).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde_json::json;
+
+    #[test]
+    fn metrics_of_training_data_are_not_called_held_out() {
+        let dir = tempfile::tempdir().unwrap();
+        let page = |split: &str| {
+            let validation = json!({ "split": split, "n_windows": 2, "score": 1.0 });
+            let line = json!({ "step": 9, "validation": validation });
+            std::fs::write(dir.path().join("metrics.jsonl"), format!("{line}\n")).unwrap();
+            write(dir.path(), "anna", &[]).unwrap();
+            std::fs::read_to_string(dir.path().join(PAGE)).unwrap()
+        };
+        assert!(!page("validation").contains("Without validation data"));
+        let page = page("train");
+        assert!(page.contains("Without validation data") && page.contains("of the training split"), "{page}");
+    }
 }

@@ -188,7 +188,7 @@ mod tests {
             sound: of(1.0),
             sound_db: of(-20.0),
             speech: of(0.9),
-            lip_sync: of(0.4),
+            lip_sync: of(0.9),
             frame_difference: of(5.0),
             person: of(0.9),
             shoulder_px: of(120.0),

@@ -3,7 +3,8 @@
 use super::gather::VideoSummary;
 use super::timelines::{self, WAITING};
 use crate::html::{self, Node, legend, node};
-use orator_base::stage::artifacts::{StageName, speaker_dir};
+use orator_base::stage::artifacts::{StageName, dir, speaker_dir};
+use orator_base::stage::record::Record;
 use orator_base::stage::rejection::Rejection;
 use orator_base::text::{counted, length, percent};
 use orator_base::types::split::Split;
@@ -190,31 +191,37 @@ pub fn table(videos: &[VideoSummary], splits: &VideoSplits) -> Vec<Node> {
 /// Names of the splits of each video, by `speaker/video`.
 pub type VideoSplits = BTreeMap<String, String>;
 
-/// Splits of all videos that are in a dataset; a speaker without a dataset has none.
+/// Splits of all videos in the datasets of their speakers.
 pub fn video_splits(settings: &Settings, videos: &[Videos]) -> VideoSplits {
     let mut splits = VideoSplits::new();
     for Videos { speaker, units, .. } in videos {
         // A single file is read, which is consistent even while a run replaces the dataset.
         let info = std::fs::read(speaker_dir(&settings.work.dir, StageName::Dataset, speaker).join(INFO));
         let info: Option<DatasetInfo> = info.ok().and_then(|bytes| serde_json::from_slice(&bytes).ok());
-        // The dataset names videos by their content, the work folder by their path; both have the file name.
-        let videos: Vec<&DatasetVideo> = info.iter().flat_map(|info| &info.videos).collect();
         for unit in units {
-            let is_of =
-                |video: &&&DatasetVideo| unit.source.file_name().is_some_and(|name| name == video.file.as_str());
-            let mut named = videos.iter().filter(is_of);
-            if let (Some(video), None) = (named.next(), named.next())
-                && video.samples > 0
-            {
-                splits.insert(unit.to_string(), split_names(video));
-            }
+            let extracted = Record::read(&dir(&settings.work.dir, StageName::Extract, unit));
+            let content = extracted.and_then(|record| record.fingerprint.inputs.get("video").cloned());
+            // The dataset names videos by their content, the work folder by their path.
+            let is_of = |video: &&DatasetVideo| match &content {
+                Some(content) => video.content == *content,
+                None => unit.source.file_name().is_some_and(|name| name == video.file.as_str()),
+            };
+            let split = match &info {
+                None => "no dataset yet".to_owned(),
+                Some(info) => info.videos.iter().find(is_of).map_or_else(String::new, split_names),
+            };
+            splits.insert(unit.to_string(), if split.is_empty() { "none".to_owned() } else { split });
         }
     }
     splits
 }
 
+/// Names of the splits of a video or of its time blocks; empty if it has no samples.
 fn split_names(video: &DatasetVideo) -> String {
     let has =
         |split: &Split| video.split == Some(*split) || video.blocks.iter().any(|block| block.split == Some(*split));
+    if video.samples == 0 {
+        return String::new();
+    }
     Split::ALL.into_iter().filter(has).map(Split::name).collect::<Vec<_>>().join(", ")
 }

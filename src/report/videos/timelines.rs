@@ -132,7 +132,7 @@ const fn quantity(rejection: Rejection) -> &'static str {
         Rejection::NoSound => "share of frames with audio",
         Rejection::Quiet => "loudness",
         Rejection::NoSpeech => "share of speech",
-        Rejection::OffScreenSpeaker => "correlation of mouth and voice",
+        Rejection::OffScreenSpeaker => "probability that the visible mouth speaks",
         Rejection::Static => "duration",
         Rejection::NoPerson => "highest score of face and arms",
         Rejection::Small => "distance between the shoulders",

@@ -171,7 +171,7 @@ fn value_text(rejection: Rejection, value: f64) -> String {
     match rejection {
         Rejection::Quiet => format!("{value} dB in this frame"),
         Rejection::NoSpeech => format!("share of speech {value} in this frame"),
-        Rejection::OffScreenSpeaker => format!("correlation {value} around this frame"),
+        Rejection::OffScreenSpeaker => format!("probability {value} in this frame"),
         Rejection::Static => format!("picture change {value} in this frame"),
         Rejection::Small => format!("{value} px in this frame"),
         Rejection::Turned => format!("{value} neck-nose distances in this frame"),

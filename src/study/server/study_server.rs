@@ -217,6 +217,7 @@ impl ServedStudy {
             "languages": file.languages,
             "texts": page_texts(&file.languages, &file.texts),
             "tasks": plan.tasks,
+            "has_checks": trials().any(|trial| trial.phase == TrialPhase::AttentionCheck),
             "n_trials": plan.sessions.first().map_or(0, |session| session.trials.len()),
             "sound_check": sound_check,
         });

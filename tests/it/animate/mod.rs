@@ -12,3 +12,4 @@ pub(crate) mod motion_files;
 pub(crate) mod posture;
 pub(crate) mod rates;
 pub(crate) mod skeleton;
+pub(crate) mod visibility;

@@ -106,6 +106,13 @@ impl ClampCounter {
         to
     }
 
+    /// Share of the angles of fingers and thumbs that exceeded their limits.
+    pub fn finger_share(&self) -> f64 {
+        let n: usize = self.kinds[FINGER..COHERENCE].iter().map(|(n, ..)| n).sum();
+        let n_angles: usize = KINDS[FINGER..COHERENCE].iter().map(|(_, n)| n).sum();
+        n as f64 / (n_angles * self.n_frames).max(1) as f64
+    }
+
     /// Statistics of every kind, including those without clamps.
     pub fn clamps(&self) -> Vec<Clamps> {
         let kinds = KINDS.into_iter().zip(self.kinds);

@@ -8,7 +8,7 @@ use crate::evaluate::table::sign_flips::{MIN_BLOCKS, TestedDifference};
 use crate::evaluate::table::table::{PredictorRow, Table};
 use crate::metrics::catalogue::Better;
 use orator_base::math::estimate::Estimate;
-use orator_base::text::counted;
+use orator_base::text::{counted, length};
 use serde::Serialize;
 
 /// Aspect of motion that a metric describes.
@@ -174,8 +174,11 @@ fn inconclusive_because(table: &Table, votes: &[Vote]) -> Option<String> {
     let (n_blocks, secs) = (table.n_blocks, table.block_length.secs);
     let (blocks, are) = (counted(n_blocks, "block"), if n_blocks == 1 { "is" } else { "are" });
     (n_blocks < MIN_BLOCKS).then(|| {
+        let missing_secs = (MIN_BLOCKS as f64 * secs - table.secs).max(secs);
         format!(
-            "{blocks} of about {secs:.1} s {are} too few for a conclusion (at least {MIN_BLOCKS} are needed); hold out more motion"
+            "{blocks} of about {secs:.1} s {are} too few for a conclusion (at least {MIN_BLOCKS} are needed); hold out \
+             about {} more motion",
+            length(missing_secs)
         )
     })
 }

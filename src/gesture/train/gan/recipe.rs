@@ -205,6 +205,20 @@ fn auto(row: &RecipeRow, minutes: f64) -> f64 {
     }
 }
 
+/// Warning before a new network is trained on so little speech that it learns no more than the mean pose.
+pub fn mean_pose_warning(material: &TrainingMaterial) -> Option<String> {
+    const MIN_SECS: f64 = 60.0;
+    (material.train_secs < MIN_SECS).then(|| {
+        let missing = length(60.0 * MINUTES[1] - material.train_secs);
+        format!(
+            "warning: {} of speech to train on, the result will be the mean pose: motion that follows the speech needs \
+             about {} minutes ({missing} more)",
+            length(material.train_secs),
+            MINUTES[1]
+        )
+    })
+}
+
 /// Three lines that describe the settings of a new training; `secs_a_step`: measured seconds per step on this machine.
 pub fn lines(of: &GanSettings, material: &TrainingMaterial, secs_a_step: Option<f64>) -> Result<Vec<String>> {
     let values = serde_json::to_value(of)?;
@@ -239,6 +253,16 @@ pub fn lines(of: &GanSettings, material: &TrainingMaterial, secs_a_step: Option<
 pub(super) mod tests {
     use super::*;
     use orator_dataset::config::{AdversarialLoss, BoneLoss, MotionRepresentation, NetworkPreset};
+
+    #[test]
+    fn short_speech_gives_a_warning_with_the_missing_minutes() {
+        let warning =
+            |train_secs: f64| mean_pose_warning(&TrainingMaterial { train_secs, validation_secs: 0.0, n_speakers: 1 });
+        let text = warning(28.0).unwrap();
+        assert!(text.contains("will be the mean pose") && text.contains("about 10 minutes"), "{text}");
+        assert!(text.contains(&length(572.0)), "{text}");
+        assert_eq!(warning(60.0), None);
+    }
 
     /// Settings of `recipe` for this many minutes of one speaker.
     pub(crate) fn of_minutes(recipe: GanRecipe, minutes: f64) -> GanSettings {

@@ -115,8 +115,13 @@ pub fn train_with_callback(
     }
     if resumed.is_none() {
         let material = TrainingMaterial::measure(datasets, window_frames);
+        if let Some(warning) = recipe::mean_pose_warning(&material).filter(|_| pretrained_model.is_none()) {
+            progress.say(&warning);
+        }
         let secs_a_step = secs_a_step(&trainer, &loader)?;
         recipe::lines(&trainer.settings, &material, secs_a_step)?.iter().for_each(|line| progress.say(line));
+        let few = no_window::motion_warning(material.train_secs).filter(|_| pretrained_model.is_none());
+        few.iter().for_each(|warning| progress.say(warning));
     }
     let settings = trainer.settings.clone();
     let batch = |step: usize| {

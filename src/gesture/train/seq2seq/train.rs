@@ -110,8 +110,8 @@ pub fn train_with_callback(
     };
     splits.notes.iter().for_each(|note| progress.say(note));
     let train = SegmentLoader::new(splits.train, &trainer.metadata, trainer.settings.stride_frames);
+    let Config { predicted, .. } = trainer.metadata.network;
     if resumed.is_none() {
-        let Config { predicted, .. } = trainer.metadata.network;
         reading::set_length(&mut trainer.settings, requested, train.len(), predicted, source.fps())?;
     } else {
         let per_epoch = reading::epoch_length(&trainer.settings, train.len());
@@ -135,6 +135,8 @@ pub fn train_with_callback(
         source.path(),
         folder.display()
     ));
+    let secs = reading::motion_secs(&trainer.settings, train.len(), predicted, source.fps());
+    no_window::motion_warning(secs).iter().for_each(|warning| progress.say(warning));
     let held_out = SegmentLoader::new(splits.held_out, &trainer.metadata, 0);
     if held_out.is_empty() {
         let cause = match source {
