@@ -40,7 +40,7 @@ const LENGTHS: &str = "interval_secs";
 const ROWS: [Measure; 18] = [
     row("sound_db", "Loudness", "dBFS", [-100.0, 0.0], 50, "min_sound_db"),
     row("speech", "Share of speech", "", UNIT_RANGE, 50, "min_speech"),
-    row("lip_sync", "Probability that the visible mouth speaks", "", UNIT_RANGE, 50, "min_lip_sync"),
+    row("lip_sync", "Probability that the visible mouth speaks", "", UNIT_RANGE, 50, "min_own_voice"),
     row("still", "Picture change", "levels (8-bit)", [0.0, 4.0], 80, "min_change"),
     row("person", "Highest score of face and arms", "", UNIT_RANGE, 40, "joint_score"),
     row("shoulder_px", "Distance between the shoulders", "px", [0.0, 600.0], 60, "min_shoulder_px"),

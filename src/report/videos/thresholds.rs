@@ -48,7 +48,7 @@ macro_rules! row {
 pub const THRESHOLDS: [ThresholdGrid; 19] = [
     row!(min_sound_db, "minimum loudness of the second around a frame", "dBFS", -90.0, -10.0),
     row!(min_speech, "minimum share of speech in the 4 s around a frame", "", 0.0, 1.0),
-    row!(min_lip_sync, "minimum probability that the voice is that of the visible mouth", "", 0.0, 1.0),
+    row!(min_own_voice, "minimum probability that the voice is that of the visible mouth", "", 0.0, 1.0),
     row!(max_quiet_secs, "longest accepted pause in speech", "s", 0.0, 10.0),
     row!(
         min_change,
