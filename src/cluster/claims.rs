@@ -24,7 +24,6 @@ const MAX_CHECKED: usize = 32;
 /// First waiting time of a worker. It grows by half each time, up to the interval between two checks for dead workers.
 const FIRST_WAIT: Duration = Duration::from_secs(2);
 
-/// A unit that a worker has claimed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Claim {
     pub unit: usize,
@@ -146,7 +145,6 @@ pub enum NextUnit {
     AllEnded,
 }
 
-/// Settings of a worker's claims.
 #[derive(Clone, Debug)]
 pub struct ClaimOptions {
     /// Name of the worker, unique in the plan.
@@ -159,7 +157,6 @@ pub struct ClaimOptions {
     pub retries: bool,
 }
 
-/// The claims of a plan as seen by one worker.
 pub struct Claims<'a, F> {
     folder: &'a F,
     options: ClaimOptions,

@@ -8,13 +8,11 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::time::Duration;
 
-/// Folder of the heartbeat files.
 pub const WORKERS: &str = "workers";
 
 /// Default time without a beat after which a worker counts as dead.
 pub const DEAD_AFTER: Duration = Duration::from_secs(180);
 
-/// Status that a worker publishes.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Heartbeat {
     /// Counter, incremented at every beat.

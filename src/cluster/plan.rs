@@ -322,7 +322,6 @@ pub fn settings_hash(config: &Config) -> Result<String> {
 
 #[cfg(test)]
 impl PlannedUnit {
-    /// A video of unknown length, for tests.
     pub fn example(speaker: &str, video: &str) -> Self {
         Self {
             speaker: speaker.to_owned(),

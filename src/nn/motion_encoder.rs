@@ -67,7 +67,6 @@ pub fn dense(params: &mut Params, prefix: &str, widths: &[usize], last: f64) -> 
     Ok(layers)
 }
 
-/// Applies layers to `x`, each followed by its norm.
 pub fn through<L: Module>(layers: &[(L, BatchNorm)], x: &Tensor, mode: &Mode) -> Result<Tensor> {
     layers.iter().try_fold(x.clone(), |x, (layer, norm)| norm.forward(&layer.forward(&x)?, mode.trains()))
 }

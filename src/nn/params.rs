@@ -134,7 +134,6 @@ impl Params {
         self.trainable.values().map(|var| var.elem_count()).sum()
     }
 
-    /// Copies all tensors to the CPU, for saving.
     pub fn tensors(&self) -> Result<BTreeMap<String, Tensor>> {
         let copy = |var: &Var| if var.device().is_cpu() { var.copy() } else { var.to_device(&Device::Cpu) };
         self.all().map(|(name, var)| Ok((name.to_owned(), copy(var)?))).collect()

@@ -64,7 +64,6 @@ pub fn export(folder: &StudyFolder, form: TableForm, out: &Path) -> Result<Expor
     })
 }
 
-/// Participants of a study in order of start time, and all votes.
 pub fn responses(folder: &StudyFolder) -> Result<(Vec<Participant>, Vec<StudyVote>)> {
     let joined = JoinedPlan::read(folder)?;
     let db = database::open_for_reading(&folder.responses())?;

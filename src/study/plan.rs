@@ -59,7 +59,6 @@ pub struct PlannedTask {
     pub scale: String,
 }
 
-/// Trials of one participant.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PlannedSession {
     pub trials: Vec<Trial>,

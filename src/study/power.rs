@@ -147,7 +147,6 @@ pub fn power(
     }
 }
 
-/// Simulates one study and analyses it.
 pub fn simulated(
     design: &CrossedDesign,
     effects: &CrossedEffects,
@@ -196,7 +195,6 @@ fn curve(
     }
 }
 
-/// Table for the terminal.
 pub fn text(plan: &PowerPlan) -> String {
     let question = &plan.question;
     let mut text = format!(

@@ -35,7 +35,6 @@ pub struct RegisteredTask {
     pub votes: usize,
 }
 
-/// Hypothesis with the statistic that decides it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RegisteredHypothesis {
     pub claim: StudyHypothesis,
@@ -74,7 +73,6 @@ impl Preregistration {
         workdir::write_file(path, &serde_json::to_vec_pretty(self)?)
     }
 
-    /// Reads a pre-registration.
     pub fn read(path: &Path) -> Result<Self> {
         let bytes = std::fs::read(path).with_context(|| {
             format!("cannot read the pre-registration {}; `orator study build` creates it", path.display())

@@ -104,7 +104,6 @@ impl StudySeal {
         Ok(seal)
     }
 
-    /// Compares the study's files with the seal.
     pub fn compare(&self, folder: &StudyFolder) -> Result<SealMismatch> {
         let mut mismatch = SealMismatch::default();
         let listed = sealed_files(folder)?;

@@ -155,7 +155,6 @@ impl Stage for BatchStage<'_> {
     }
 }
 
-/// Formats for file extensions.
 fn formats(endings: &[String]) -> Result<Vec<(String, ExportFormat)>> {
     let mut formats: Vec<(String, ExportFormat)> = Vec::new();
     for ending in endings {
@@ -220,7 +219,6 @@ pub struct BatchOutcome {
     pub facts: Map<String, Value>,
 }
 
-/// State of a sound after the run of a batch.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum BatchState {

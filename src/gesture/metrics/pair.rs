@@ -108,7 +108,6 @@ pub(crate) fn windows<'a, 'b>(
 }
 
 impl PointWindow<'_, '_> {
-    /// Frames per second.
     pub(crate) fn fps(&self) -> f64 {
         self.pair.fps
     }

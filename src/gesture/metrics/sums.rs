@@ -42,7 +42,6 @@ impl CostlySums {
         }
     }
 
-    /// All sums as f64.
     pub(crate) fn row(&self) -> Vec<f64> {
         (0..self.len()).map(|i| self.at(i)).collect()
     }

@@ -41,7 +41,6 @@ impl MetricsLog {
         Ok(Self { lines: AppendedFile::open(path, accepted.as_bytes())?, events: None })
     }
 
-    /// Appends a line to both files.
     pub fn write(&mut self, line: &Value) -> Result<()> {
         let text = line.to_string();
         self.lines.add(format!("{text}\n").as_bytes())?;

@@ -190,7 +190,6 @@ impl<T: Scalar> Norm<T> {
         y
     }
 
-    /// Gradient before the activation, from `grad` after it.
     #[inline(always)]
     fn before_activation<const N: usize>(&self, z: &[T; N], grad: &[T; N], scale: &[T; N], shift: &[T; N]) -> [T; N] {
         let mut before_activation = [T::zero(); N];

@@ -73,7 +73,6 @@ pub fn forward<T: Scalar>(
     }
 }
 
-/// Number of chunks of a forward pass.
 pub fn n_chunks(s: &ConvSizes) -> usize {
     forward_pass(s).chunks().len()
 }

@@ -64,7 +64,6 @@ pub fn read<T: Scalar, R>(tensor: &Tensor, f: impl FnOnce(&[T]) -> Result<R>) ->
     }
 }
 
-/// Returns whether the number type is f64.
 pub fn is_f64(dtype: DType) -> Result<bool> {
     match dtype {
         DType::F32 => Ok(false),
@@ -111,7 +110,6 @@ impl<'a, T> Matrix<'a, T> {
         Self { data: self.data, row_stride: self.column_stride, column_stride: self.row_stride }
     }
 
-    /// View of the part from this row and column on.
     fn at(self, row: usize, column: usize) -> Self {
         Self { data: &self.data[row * self.row_stride + column * self.column_stride..], ..self }
     }

@@ -12,7 +12,6 @@ use serde::{Deserialize, Serialize};
 
 /// Prefix of the network's tensors in a weights file.
 pub const NAME: &str = "hand";
-/// Kind of a weights file.
 pub const KIND: &str = "hand-lifter";
 
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

@@ -16,7 +16,6 @@ use orator_base::types::skeleton::Side;
 
 /// Prefix of the network's tensors in a weights file.
 pub const NAME: &str = hand::NAME;
-/// Kind of a weights file.
 pub const KIND: &str = "hand-heatmap-lifter";
 /// Number of parameters of both networks.
 pub const N_PARAMETERS: usize = 1_637_279 + 2_238_403;

@@ -11,7 +11,6 @@ use candle_core::{Device, Result, Shape, Tensor, Var};
 use rayon::prelude::*;
 use std::sync::{Arc, OnceLock};
 
-/// Mean and variance per channel.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Statistics {
     pub mean: Vec<f64>,

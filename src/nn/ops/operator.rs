@@ -18,7 +18,6 @@ pub type Gradients<T> = Result<[Option<Vec<T>>; 3]>;
 pub trait CpuOperator: Send + Sync {
     const NAME: &'static str;
 
-    /// Computes the result and its shape.
     fn forward<T: Scalar>(&self, operands: [Operand<T>; 3]) -> Result<(Vec<T>, Shape)>;
 
     fn backward<T: Scalar>(&self, operands: [Operand<T>; 3], y: &[T], grad: &[T]) -> Gradients<T>;

@@ -199,7 +199,6 @@ pub fn bones() -> Vec<[usize; 3]> {
     (0..N_JOINTS).filter(|joint| !is_duplicate(*joint)).filter_map(bone).collect()
 }
 
-/// Player, with the charts below it.
 pub fn body(excerpts: &[Excerpt], table: &Table) -> Vec<Node> {
     if excerpts.is_empty() {
         return vec![

@@ -131,7 +131,6 @@ pub struct Section {
 }
 
 impl Page {
-    /// Text of the file.
     pub fn html(&self) -> String {
         let links =
             self.sections.iter().map(|section| node("a").attr("href", format!("#{}", section.id)).text(section.title));

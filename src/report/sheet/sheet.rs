@@ -180,7 +180,6 @@ impl SheetClip<'_> {
         draw::text(page, &self.caption(frame_idx), [left as f32 + 6.0, (top + TEXT_PX - 6) as f32], 10.0, INK)
     }
 
-    /// Reason why a frame has no joints.
     fn reason(&self, frame_idx: usize) -> String {
         // The middle of the frame, since intervals may end at its beginning.
         let secs = (frame_idx as f64 + 0.5) / self.motion.fps.per_sec();

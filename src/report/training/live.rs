@@ -52,7 +52,6 @@ impl<'a> LivePage<'a> {
     }
 }
 
-/// File name of the page.
 pub const PAGE: &str = "training.html";
 
 /// Metrics of a validation: name, key, whether in percent.

@@ -126,7 +126,6 @@ fn legend(videos: &[VideoSummary]) -> Node {
 /// Label of a video that no stage has finished.
 pub const WAITING: &str = "not processed";
 
-/// Measured quantity of a reason.
 const fn quantity(rejection: Rejection) -> &'static str {
     match rejection {
         Rejection::NoSound => "share of frames with audio",

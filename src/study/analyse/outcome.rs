@@ -118,7 +118,6 @@ pub fn clip_shares(votes: &[BinaryVote], numbering: &Numbering) -> Vec<ClipShare
     numbering.clips.iter().filter_map(share).collect()
 }
 
-/// Conditions in alphabetical order.
 pub fn conditions(votes: &[&StudyVote]) -> Vec<String> {
     let names: BTreeSet<&str> = votes.iter().flat_map(|vote| &vote.conditions).map(String::as_str).collect();
     names.into_iter().map(str::to_owned).collect()

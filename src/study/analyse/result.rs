@@ -254,7 +254,6 @@ pub struct ModelEstimate {
     pub sd_clips: f64,
 }
 
-/// Outcome of a headline test and its equivalence test.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum TestOutcome {

@@ -10,7 +10,6 @@ use crate::stats::glmm::fit::MixedLogit;
 use crate::stats::proportion::{BinomialCount, Equivalence};
 use std::collections::BTreeMap;
 
-/// Proportion of successes by guessing.
 pub const CHANCE: f64 = 0.5;
 
 #[derive(Clone, Debug)]

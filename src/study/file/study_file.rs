@@ -97,7 +97,6 @@ pub enum TaskOrder {
     Written,
 }
 
-/// Settings for cutting and allocating clips.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct ClipSettings {

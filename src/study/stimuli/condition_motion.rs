@@ -58,7 +58,6 @@ impl ConditionModels {
     }
 }
 
-/// Opens the checkpoint `path` of a condition with the settings of the condition.
 fn open(condition: &StudyCondition, path: &Path, speaker: &str) -> Result<Vec<EvaluatedCheckpoint>> {
     let mut opened = EvaluatedCheckpoint::open_all(&[fill_pattern(path, speaker, "")], speaker)?;
     for EvaluatedCheckpoint { speaker, .. } in &opened {
@@ -264,7 +263,6 @@ impl CommonVisibility {
         Some(Self { joints, angles })
     }
 
-    /// Number of visible joints of all frames.
     pub fn n_visible(&self) -> usize {
         self.joints.iter().filter(|seen| **seen).count()
     }

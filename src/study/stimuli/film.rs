@@ -15,7 +15,6 @@ use orator_media::ffmpeg::write::encode::{VideoWriter, has_h264};
 use orator_media::opencv::draw;
 use std::path::Path;
 
-/// Camera of the films with one avatar.
 const CAMERA: FilmCamera = FilmCamera::Front;
 const SIDE_BY_SIDE_FPS: FrameRate = FrameRate::new(30, 1);
 /// Key derivation context of the film names.

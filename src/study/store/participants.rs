@@ -274,7 +274,6 @@ pub fn latest_ms(db: &Connection) -> rusqlite::Result<i64> {
     db.query_row(sql, [], |row| row.get(0))
 }
 
-/// Number of participants who withdrew.
 pub fn n_withdrawn(db: &Connection) -> rusqlite::Result<u32> {
     db.query_row("SELECT CAST(value AS INTEGER) FROM about WHERE name = 'withdrawn'", [], |row| row.get(0))
 }

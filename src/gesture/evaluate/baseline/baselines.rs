@@ -12,7 +12,6 @@ use serde::Serialize;
 /// Smallest time shift of a mismatched motion, seconds.
 const MIN_SHIFT_SECS: f64 = 3.0;
 
-/// Source of the predicted motion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum PredictorKind {
@@ -30,7 +29,6 @@ pub enum PredictorKind {
 }
 
 impl PredictorKind {
-    /// Human-readable name.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Prediction => "prediction",
@@ -45,7 +43,6 @@ impl PredictorKind {
         }
     }
 
-    /// Key in a result file.
     pub fn key(self) -> String {
         self.name().replace(' ', "_")
     }

@@ -170,7 +170,6 @@ fn query_windows<'a>(query: usize, sound: &Query<'a>, fps: FrameRate) -> Vec<Que
     (0..sound.n_frames).step_by(window).map(window_at).collect()
 }
 
-/// Best match of a window within one entry.
 fn nearest(rows: &[f32], n_frames: usize, window: &QueryWindow, entry: usize) -> Option<NearestMatch> {
     let rows_of_windows = (0..).step_by(STRIDE).take_while(|row| row * POOLED + window.frames.len() <= n_frames);
     let match_at = |row: usize| {

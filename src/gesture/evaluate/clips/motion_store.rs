@@ -29,7 +29,6 @@ pub enum StoredMotion {
 }
 
 impl MotionStore {
-    /// Store that holds everything in memory.
     pub fn in_memory() -> Self {
         Self(Mutex::new(StoreState { left: usize::MAX, file: None }))
     }

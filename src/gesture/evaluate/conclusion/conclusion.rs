@@ -53,7 +53,6 @@ pub struct Conclusion {
     pub votes: Vec<Vote>,
 }
 
-/// Compares the prediction with the better of the constant poses.
 pub fn better_than_constant_pose(table: &Table, own: &PredictorRow) -> Conclusion {
     let question = "Is the prediction better than a constant pose?";
     let aspects = [Aspect::Position, Aspect::Poses, Aspect::Movement];

@@ -54,7 +54,6 @@ impl BlockGroups {
         Self { of_block, shares }
     }
 
-    /// Number of groups.
     pub fn len(&self) -> usize {
         self.shares.len()
     }

@@ -196,12 +196,10 @@ fn row(catalogue: &Catalogue, kind: PredictorKind, description: &str, measured: 
 }
 
 impl PredictorRow {
-    /// Human-readable name.
     pub fn name(&self) -> String {
         NumberedCheckpoint::name_of(self.kind, self.checkpoint.as_ref())
     }
 
-    /// Key in a result file.
     pub fn key(&self) -> String {
         NumberedCheckpoint::key_of(self.kind, self.checkpoint.as_ref())
     }

@@ -51,7 +51,6 @@ impl KeypointCount {
     }
 }
 
-/// PCK for each combination of `axes`, `alphas` and `parts`.
 pub(crate) fn metric(axes: &[PckAxes], parts: &[BodyPart], alphas: &[f64]) -> MetricFamily {
     let mut variants = Vec::new();
     for axes in axes {

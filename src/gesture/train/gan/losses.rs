@@ -6,7 +6,6 @@ use orator_base::types::skeleton::{L_HAND, L_WRIST, N_JOINTS, NECK, R_HAND, R_WR
 use orator_dataset::config::{AdversarialLoss, BoneLoss};
 use orator_nn::gan::discriminator::motion;
 
-/// Value of a scalar f32 tensor.
 pub fn number(scalar: &Tensor) -> anyhow::Result<f64> {
     Ok(f64::from(scalar.to_scalar::<f32>()?))
 }

@@ -264,7 +264,6 @@ pub(super) mod tests {
         assert_eq!(warning(60.0), None);
     }
 
-    /// Settings of `recipe` for this many minutes of one speaker.
     pub(crate) fn of_minutes(recipe: GanRecipe, minutes: f64) -> GanSettings {
         let material = TrainingMaterial { train_secs: 60.0 * minutes, validation_secs: 60.0, n_speakers: 1 };
         settings(&GanConfig { recipe, ..GanConfig::default() }, &material, InitialWeights::Random).unwrap()

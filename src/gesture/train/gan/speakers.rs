@@ -208,7 +208,6 @@ pub const fn preset(preset: NetworkPreset) -> Preset {
     }
 }
 
-/// Normalisation of the posture channels that are to be trained.
 fn channels(dataset: &Dataset, wanted: &[PostureChannel]) -> Result<Vec<ChannelNormalisation>> {
     let posture = dataset.stats().posture.as_ref();
     let of = |channel: PostureChannel| -> Result<ChannelNormalisation> {

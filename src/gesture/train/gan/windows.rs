@@ -306,7 +306,6 @@ fn joined(parts: &[WindowBatch]) -> Result<WindowBatch> {
     })
 }
 
-/// Row of a feature in the mask of joints and angles.
 fn mask_row(feature: usize) -> usize {
     if feature < N_FEATURES { feature / 3 } else { feature - N_FEATURES + N_BONES }
 }

@@ -54,7 +54,6 @@ struct AdamSlot {
     moments: MomentStorage,
 }
 
-/// Moments of a tensor, on its device.
 enum MomentStorage {
     Cpu(RefCell<AdamMoments>),
     /// Tensors on another device, updated by the fallback.

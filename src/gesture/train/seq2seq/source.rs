@@ -30,7 +30,6 @@ impl TrainingSource<'_> {
         }
     }
 
-    /// Path of the folder, for messages.
     pub fn path(&self) -> String {
         match self {
             Self::Dataset(dataset) => dataset.dir().display().to_string(),

@@ -235,7 +235,6 @@ fn initialise_scales(trainer: &SequenceTrainer, train: &[PoseSequence]) -> Resul
     Ok(baseline.set_scale(&tensor(scales)?, &tensor(noise)?)?)
 }
 
-/// A trainer with its training and validation segments.
 struct SequenceTraining<'a> {
     trainer: &'a mut SequenceTrainer,
     loader: &'a SegmentLoader,

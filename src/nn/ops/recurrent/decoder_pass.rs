@@ -49,7 +49,6 @@ impl DecoderSizes {
         self.cell.n_weights() + self.cell.input * (self.n_read() * self.cell.hidden + 1)
     }
 
-    /// Checks the shapes of starts, keys and weights.
     pub fn check(&self, start: &[usize], keys: &[usize], n_weights: usize) -> Result<()> {
         let fits = start == [self.batch, self.start_len()]
             && keys == [self.batch, self.all_keys(), self.cell.hidden]

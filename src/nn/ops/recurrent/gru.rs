@@ -130,7 +130,6 @@ impl GruOp {
         if self.options.last && direction == 1 { 1 } else { s.n_steps }
     }
 
-    /// Time index of step `k` of a direction.
     fn time(direction: usize, k: usize, s: &PassSizes) -> usize {
         if direction == 1 { s.n_steps - 1 - k } else { k }
     }

@@ -32,7 +32,6 @@ const TOP: f64 = 8.0;
 const LEFT: f64 = 230.0;
 const RIGHT: f64 = 560.0;
 
-/// Forest plot of the rows from top to bottom.
 pub fn forest(label: &str, rows: &[ForestRow], scale: &ForestScale) -> Node {
     let x = Scale { low: scale.low, high: scale.high, from: LEFT, to: RIGHT };
     let floor = TOP + ROW * rows.len() as f64;

@@ -55,7 +55,6 @@ pub fn path_data(points: impl IntoIterator<Item = [f64; 2]>) -> String {
     format!("M{}", points.join(" L"))
 }
 
-/// Path element through the points.
 pub fn stroke(class: &str, points: impl IntoIterator<Item = [f64; 2]>) -> Node {
     node("path").class(format!("stroke {class}").trim_end()).attr("d", path_data(points))
 }

@@ -6,7 +6,6 @@ use serde::Deserialize;
 use serde::de::IntoDeserializer as _;
 use std::collections::BTreeMap;
 
-/// Maximum number of rows.
 pub const MAX_ROWS: usize = 2_000_000;
 
 /// Default condition names for tables that do not name them.
@@ -15,7 +14,6 @@ const GENERATED: &str = "generated";
 /// Maximum length of a name, characters.
 const MAX_NAME_CHARS: usize = 200;
 
-/// Cells of a row by field, trimmed.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RowCells {
     pub values: BTreeMap<&'static str, String>,

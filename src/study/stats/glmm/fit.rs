@@ -150,7 +150,6 @@ const CURVATURE_STEP: f64 = 0.02;
 /// Maximum gradient component at convergence.
 const GRADIENT_TOLERANCE: f64 = 1e-4;
 
-/// Result of the search.
 pub(super) struct Minimum {
     pub at: Array1<f64>,
     pub value: f64,
