@@ -81,6 +81,7 @@ impl PlannedUnit {
     }
 
     /// Checks the input files.
+    ///
     /// # Errors
     /// A file has changed since the plan was written, or cannot be read.
     pub fn check_inputs(&self, hashes: &HashCache) -> Result<()> {
@@ -149,6 +150,7 @@ pub fn split_and_sort(videos: Vec<PlannedUnit>, part_secs: f64) -> Vec<PlannedUn
 impl ClusterPlan {
     /// Creates the plan of all videos of a pipeline; videos whose hash is not cached are read completely. `secs`
     /// returns the duration of a video; long videos are split into parts of about `part_secs` seconds.
+    ///
     /// # Errors
     /// The pipeline has no video, or a video, weight file or the program cannot be read.
     pub fn new(
@@ -203,6 +205,7 @@ impl ClusterPlan {
     }
 
     /// Reads a plan.
+    ///
     /// # Errors
     /// The file is not a plan, has another version, or was changed after it was written.
     pub fn read(path: &Path) -> Result<Self> {
@@ -263,6 +266,7 @@ impl ClusterPlan {
     }
 
     /// Checks that the program, its configuration and its models are those of the plan.
+    ///
     /// # Errors
     /// What differs, and what to do.
     pub fn check(&self, pipeline: &Pipeline, program: &Path) -> Result<()> {

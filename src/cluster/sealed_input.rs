@@ -24,6 +24,7 @@ impl SealedInput {
     }
 
     /// Checks that the content is that of the plan; a new modification time alone is ignored.
+    ///
     /// # Errors
     /// The content differs or cannot be read.
     pub fn check(&self, hashes: &HashCache) -> Result<()> {

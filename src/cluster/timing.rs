@@ -68,6 +68,7 @@ pub fn fingerprint(pipeline: &Pipeline, program: &Path, jobs: usize) -> Result<S
 
 /// Times the stages on excerpts of the units of known length, `jobs` in parallel. The excerpts and their artifacts are
 /// removed afterwards.
+///
 /// # Errors
 /// No excerpt could be copied or processed, or the work folder cannot be written.
 pub fn measure(

@@ -68,6 +68,7 @@ pub(super) fn read_stop(folder: &DiskFolder) -> Result<Option<String>> {
 }
 
 /// Processes the plan at `path`.
+///
 /// # Errors
 /// The shared folder cannot be written, another process locks the work folder, or the disk is full (which stops every
 /// worker of the plan).

@@ -10,6 +10,7 @@ use rand_chacha::ChaCha8Rng;
 use std::collections::BTreeMap;
 
 /// Opens the CPU or the first NVIDIA GPU.
+///
 /// # Errors
 /// The program was built without CUDA, or there is no GPU.
 pub fn open_device(on_card: bool) -> anyhow::Result<Device> {
@@ -72,6 +73,7 @@ impl Params {
     }
 
     /// Creates a tensor that the optimiser updates.
+    ///
     /// # Errors
     /// The name is already used.
     pub fn trainable(&mut self, name: &str, shape: &[usize], init: Init) -> Result<Tensor> {
@@ -140,6 +142,7 @@ impl Params {
     }
 
     /// Overwrites every tensor with the one of the same name.
+    ///
     /// # Errors
     /// A tensor is missing, unknown or has another shape; the message names it.
     pub fn load(&self, tensors: &BTreeMap<String, Tensor>) -> anyhow::Result<()> {

@@ -68,6 +68,7 @@ impl Contents {
     }
 
     /// Reads a checkpoint, whose tensors must all be F32.
+    ///
     /// # Errors
     /// The file cannot be read, is malformed, or has a tensor of another type or with a non-finite value; the message
     /// names the file.

@@ -54,6 +54,7 @@ pub struct BuiltSpeaker {
 
 /// Builds the study of `file` in the folder `out`, with films of `size` px, width and height
 /// ([`super::file::FilmLayout::size`] except in tests).
+///
 /// # Errors
 /// No H.264 encoder; the folder holds another study or responses; speech or motion is missing or too short.
 pub fn build(file: &StudyFile, out: &Path, size: [usize; 2], progress: &dyn Progress) -> Result<BuiltStudy> {
@@ -121,6 +122,7 @@ pub fn build(file: &StudyFile, out: &Path, size: [usize; 2], progress: &dyn Prog
 }
 
 /// Summary of a study that is already built.
+///
 /// # Errors
 /// The folder holds a study built from a different file.
 fn existing_study(file: &StudyFile, folder: &StudyFolder) -> Result<BuiltStudy> {
@@ -247,6 +249,7 @@ pub fn common_bytes(lengths: impl IntoIterator<Item = usize>) -> usize {
 }
 
 /// Appends a `free` box of zeros to an mp4, so that its size is `n_bytes`.
+///
 /// # Errors
 /// The film is longer than `n_bytes` less a box header, or shorter by 4 GiB or more.
 pub fn padded(mut film: Vec<u8>, n_bytes: usize) -> Result<Vec<u8>> {

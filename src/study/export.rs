@@ -47,6 +47,7 @@ pub struct ExportSummary {
 
 /// Writes the responses of a study into the folder `out` as the tables `votes` and `participants`. Participants are
 /// ordered by start time, their answers by position in the session.
+///
 /// # Errors
 /// The study has no responses, one of its files cannot be read, or the folder cannot be written.
 pub fn export(folder: &StudyFolder, form: TableForm, out: &Path) -> Result<ExportSummary> {

@@ -76,6 +76,7 @@ pub struct PowerPlan {
 }
 
 /// Searches the number of participants for both tests; `on_row` is called with each number tried.
+///
 /// # Errors
 /// A quantity of `question` is out of its range.
 pub fn plan(question: &PowerQuestion, on_row: &(dyn Fn(&PowerRow) + Sync)) -> Result<PowerPlan> {

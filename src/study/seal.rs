@@ -63,6 +63,7 @@ impl StudySeal {
     }
 
     /// Reads the seal of a study.
+    ///
     /// # Errors
     /// The seal is missing, damaged, of another version, or does not match its own combined hash.
     pub fn read(folder: &StudyFolder) -> Result<Self> {
@@ -91,6 +92,7 @@ impl StudySeal {
     }
 
     /// Reads the seal and checks every file against it.
+    ///
     /// # Errors
     /// The seal cannot be read, or files were changed, added or removed; the error names them.
     pub fn verify(folder: &StudyFolder) -> Result<Self> {

@@ -87,6 +87,7 @@ pub(super) fn write_outputs(
 }
 
 /// Number of samples of the sound at 16 kHz, and a note about its quality, if any.
+///
 /// # Errors
 /// A path that is not a file, or a file without sound.
 pub(super) fn measure(path: &Path) -> Result<(usize, Option<String>)> {
@@ -147,6 +148,7 @@ pub fn write(
 }
 
 /// Generates motion for one sound and writes it to `outputs`. Motion of a captured skeleton can only be written as BVH.
+///
 /// # Errors
 /// A sound or transcript that cannot be read; a sound shorter than a frame; another format than BVH, or figure options,
 /// for a captured skeleton.

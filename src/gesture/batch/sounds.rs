@@ -25,6 +25,7 @@ pub struct BatchSound {
 /// All sounds below `folder`, named after their files, including the extension if two names would be equal. Files below
 /// the output folder `out` are skipped, since generated films contain sound too. Also returns the names of the files
 /// that are neither sounds nor transcripts.
+///
 /// # Errors
 /// A path that is not a folder, a folder without sounds, or `out` equal to `folder`.
 pub fn of_folder(folder: &Path, out: &Path) -> Result<(Vec<BatchSound>, Vec<String>)> {

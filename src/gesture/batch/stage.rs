@@ -37,6 +37,7 @@ pub struct BatchStage<'a> {
 
 impl<'a> BatchStage<'a> {
     /// Stage of a batch.
+    ///
     /// # Errors
     /// A format that is unknown or given twice, a sound without a checkpoint, a common checkpoint or a table of word
     /// vectors that cannot be read, a table that the common checkpoint does not read.
@@ -232,6 +233,7 @@ pub enum BatchState {
 
 impl SpeechBatch {
     /// Generates motions that are missing or out of date.
+    ///
     /// # Errors
     /// Errors that affect all sounds: an unknown format, a common checkpoint that cannot be read, another batch running
     /// in the same folder.

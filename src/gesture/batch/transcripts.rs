@@ -8,6 +8,7 @@ use std::path::{Path, PathBuf};
 
 /// Finds the transcript of every sound without one: in `folder`, with the name of the motion or of the sound, or else
 /// next to the sound with its name. A sound may have no transcript.
+///
 /// # Errors
 /// A `folder` that is not a folder, or that has no transcript for any of the sounds.
 pub fn find(sounds: &mut [BatchSound], folder: Option<&Path>) -> Result<()> {

@@ -52,6 +52,7 @@ impl Evaluation {
     /// ground truth: joints [T, 49, 3] in metres at the dataset's frame rate. If a checkpoint animates a captured
     /// skeleton, all predictors are measured on the joints that it has, which a note lists. The motions are saved in
     /// `store`.
+    ///
     /// # Errors
     /// No checkpoint; a split without samples; a dataset of another frame rate than a checkpoint (motion of a captured
     /// skeleton is resampled instead).
@@ -68,6 +69,7 @@ impl Evaluation {
     }
 
     /// Measures every predictor.
+    ///
     /// # Errors
     /// Settings that the metric catalogue rejects; no frame to measure.
     pub fn measure(&self, settings: &MetricSettings, progress: &dyn Progress) -> Result<Table> {

@@ -67,6 +67,7 @@ impl GestureGenerator {
     /// Motion and posture for a stream of sound pieces (16 kHz, `n_samples` in total), generated in chunks of `chunk`
     /// frames. Apart from the motion, memory does not grow with the sound. `on_chunk` is called with the number of
     /// frames of each chunk.
+    ///
     /// # Errors
     /// Errors of `motion`; fewer samples than `n_samples`; a `chunk` that is not a multiple of 32.
     pub fn motion_from_stream(

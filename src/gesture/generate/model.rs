@@ -211,6 +211,7 @@ fn build(contents: &Contents) -> Result<(SpeakerMetadata, Generator)> {
 pub const BEST: &str = "best.safetensors";
 
 /// Checkpoint file for a path: the file itself, or the best, else the newest checkpoint in the folder of a training.
+///
 /// # Errors
 /// A path that does not exist, or a folder without checkpoints.
 pub fn checkpoint_file(path: &Path) -> Result<PathBuf> {

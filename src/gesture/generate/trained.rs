@@ -138,6 +138,7 @@ impl TrainedSpeaker {
     }
 
     /// Motion for a sound and its words.
+    ///
     /// # Errors
     /// Sound that is too short or of another rate; a model of a captured skeleton.
     pub fn motion(&self, sound: &Sound, words: &[Word]) -> Result<Motion> {
@@ -160,6 +161,7 @@ const FIRST_LAYER: &str = "enter.0.conv.weight";
 
 /// Drops random channels of the encoded audio from a checkpoint of `orator train gan`, each with twice the dropout
 /// probability of its training; the seed determines which. `prefix` is the prefix of the generator's tensor names.
+///
 /// # Errors
 /// A checkpoint that was trained without dropout, whose variants would only be worse.
 pub fn vary(contents: &mut Contents, prefix: &str, seed: u64) -> Result<()> {

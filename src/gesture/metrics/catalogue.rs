@@ -38,6 +38,7 @@ pub fn n_blocks(n_frames: usize, length: usize) -> usize {
 
 impl Catalogue {
     /// Catalogue of the metrics for these settings.
+    ///
     /// # Errors
     /// An alpha that is not a positive number.
     pub fn new(settings: &MetricSettings) -> anyhow::Result<Self> {

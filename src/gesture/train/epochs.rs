@@ -47,6 +47,7 @@ pub trait ValidatedTraining {
     /// Step and score of the best validation so far.
     fn best(&mut self) -> &mut Option<(usize, f32)>;
     /// Runs one optimiser step.
+    ///
     /// # Errors
     /// A loss that is not finite or has exploded.
     fn step(&mut self) -> Result<StepReport>;
@@ -91,6 +92,7 @@ pub struct TrainingOutcome<V> {
 
 /// Trains to the last step, or until early stopping; `validated` is called after each validation. The caller fills in
 /// `n_examples`, `n_parameters`, `n_words` and `waiting` of the outcome.
+///
 /// # Errors
 /// Errors of a step, with the path of the last checkpoint; no step to run and no checkpoint; `StoppedTraining`.
 pub fn run<T: ValidatedTraining>(

@@ -67,6 +67,7 @@ impl ConvUnit {
 
 impl TemporalLifter {
     /// Creates the network's tensors under `<name>.`.
+    ///
     /// # Errors
     /// A width is even, or there is none.
     pub fn new(params: &mut Params, name: &str, config: &Config) -> Result<Self> {

@@ -21,6 +21,7 @@ pub struct SegmentDiscriminator {
 
 impl SegmentDiscriminator {
     /// Creates a discriminator for segments of `config.predicted` poses.
+    ///
     /// # Errors
     /// The number of blocks is outside [`SCORE_BLOCKS`], or there are too few poses for the first two.
     pub fn new(params: &mut Params, config: &Config) -> Result<Self> {

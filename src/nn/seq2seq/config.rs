@@ -89,6 +89,7 @@ impl Config {
     }
 
     /// Checks the shapes of a segment.
+    ///
     /// # Errors
     /// The segment does not have these sizes, or the context is even.
     pub fn check(&self, segment: &Segment) -> Result<()> {

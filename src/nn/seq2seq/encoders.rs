@@ -146,6 +146,7 @@ pub fn table_name(encoder: &str) -> String {
 }
 
 /// Sets the word vectors [vocabulary, word] of the word encoder `name`.
+///
 /// # Errors
 /// There is no such encoder, or its vectors have another shape.
 pub fn set_word_vectors(params: &Params, name: &str, vectors: &Tensor) -> Result<()> {

@@ -17,6 +17,7 @@ pub trait GesturePredictor: Send + Sync {
 
     /// Predicts poses as `forward` does, with `truth` as input of the decoder steps for which it is taken. If it is
     /// taken for none, poses and gradients are bitwise those of `forward`.
+    ///
     /// # Errors
     /// The sizes do not fit, or the network has no decoder (the default).
     fn forward_with_truth(&self, _segment: &Segment, _truth: &TruePoses, _mode: &mut Mode) -> Result<Tensor> {
@@ -52,6 +53,7 @@ pub enum StateAtSeams {
 /// Generates poses [1, n predicted, pose] for a sound of n segments; each segment starts from the last poses of the
 /// one before. Inputs: `audio` [1, n predicted + context - 1, audio] and `start` [1, previous, pose]; `words` returns
 /// the words of a segment by its index.
+///
 /// # Errors
 /// The sound is shorter than one segment.
 pub fn generate(

@@ -43,6 +43,7 @@ pub struct SheetClip<'a> {
 
 impl SheetClip<'_> {
     /// Draws a moment every `every_secs` and passes each page to `page_done` (page index, number of pages, picture).
+    ///
     /// # Errors
     /// No frames; keypoints, motion and video of different lengths or rates; `every_secs` shorter than a frame.
     pub fn pages(

@@ -13,6 +13,7 @@ use crate::vote::StudyVote;
 use anyhow::{Result, ensure};
 
 /// Analyses the votes of the study `title`, read from `source`.
+///
 /// # Errors
 /// There is no vote of the main phase, the exclusion rules exclude all of them, or a task has votes of several designs.
 pub fn analyse(

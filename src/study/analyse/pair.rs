@@ -166,6 +166,7 @@ pub fn overall(
 const MAX_DRAWS: usize = 2000;
 
 /// Strengths of the conditions, highest first, with bootstrap intervals over participants.
+///
 /// # Errors
 /// There are fewer than two conditions, or chains of wins do not connect every condition to every other.
 pub fn strengths(

@@ -17,6 +17,7 @@ use anyhow::{Context, Result, bail};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Analyses the votes of a task, which must all have the same design.
+///
 /// # Errors
 /// There are no votes, or votes of two designs.
 pub fn task(name: &str, votes: &[&StudyVote], settings: &StatisticSettings) -> Result<TaskAnalysis> {

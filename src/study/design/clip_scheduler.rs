@@ -163,6 +163,7 @@ impl ClipNeeds {
     }
 
     /// Checks that each speaker has enough clips.
+    ///
     /// # Errors
     /// Speakers have too few clips; the error names them, the number needed and remedies.
     pub fn check(&self, file: &StudyFile, clips: &BTreeMap<String, Vec<String>>) -> Result<()> {

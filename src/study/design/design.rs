@@ -21,6 +21,7 @@ pub struct DesignedStudy {
 /// every condition; the same number is used of every speaker. `film` returns the opaque name of the film with the given
 /// content. Its `motion_of` is the clip itself, except in mismatched films whose other clip is drawn per participant; a
 /// fixed one is determined by `film`.
+///
 /// # Errors
 /// A speaker has too few clips, or `film` fails.
 pub fn design(

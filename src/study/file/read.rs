@@ -20,6 +20,7 @@ pub const EXAMPLE: &str = include_str!("example.toml");
 
 impl StudyFile {
     /// Reads `file` on top of its preset; paths in it are relative to its folder.
+    ///
     /// # Errors
     /// The file cannot be read, or [`ConfigError`] lists its problems.
     pub fn read(file: &Path) -> Result<Self> {

@@ -12,6 +12,7 @@ const MAX_SECS: f64 = 86_400.0;
 const MAX_PLAYS: u32 = 1000;
 
 /// Validates an answer to `trial`, which belongs to `task`.
+///
 /// # Errors
 /// The response does not fit the design, or a number is out of range.
 pub fn check(answer: &SubmittedAnswer, trial: &Trial, task: &PlannedTask) -> Result<(), ApiError> {

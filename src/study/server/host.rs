@@ -24,6 +24,7 @@ pub struct AllowedHosts {
 
 impl AllowedHosts {
     /// Hosts of a server that listens on `listened` and is known by `names`.
+    ///
     /// # Errors
     /// A name has a scheme, port or path, or non-ASCII characters.
     pub fn new(listened: IpAddr, names: &[String]) -> Result<Self> {

@@ -50,6 +50,7 @@ pub struct StudySecret {
 
 impl StudySecret {
     /// Reads the secret at `path`; creates it if it does not exist.
+    ///
     /// # Errors
     /// The file is readable by users other than its owner, or is not a valid secret.
     pub fn open(path: &Path) -> Result<Self> {

@@ -56,6 +56,7 @@ pub struct StudyServer {
 impl StudyServer {
     /// Opens the study in `folder`, its responses and its secret. `abandoned_secs`: time without an answer after which
     /// a session may be reassigned.
+    ///
     /// # Errors
     /// The study does not match its seal, or its secret or responses are unusable or belong to another plan.
     pub fn open(folder: &StudyFolder, abandoned_secs: f64) -> Result<Self> {
@@ -79,6 +80,7 @@ impl StudyServer {
     /// Serves on `address` until SIGINT or SIGTERM. `on_listening` is called with the actual address once the socket is
     /// bound. `host_names`: names under which a proxy serves the study; a proxy at a loopback or private address is
     /// then responsible for limiting the connections of each peer.
+    ///
     /// # Errors
     /// The address cannot be bound, or one of `host_names` is more than a host name.
     pub fn run(self, address: SocketAddr, host_names: &[String], on_listening: impl FnOnce(SocketAddr)) -> Result<()> {
@@ -188,6 +190,7 @@ pub struct ServedStudy {
 
 impl ServedStudy {
     /// Reads the study in `folder`. `abandoned_secs`: time without an answer after which a session may be reassigned.
+    ///
     /// # Errors
     /// A file is missing or unreadable, or the plan refers to a task or film that does not exist.
     pub fn open(folder: &StudyFolder, abandoned_secs: f64) -> Result<Self> {

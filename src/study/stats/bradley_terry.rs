@@ -27,6 +27,7 @@ pub struct PairedVote {
 }
 
 /// Validates votes.
+///
 /// # Errors
 /// Fewer than two conditions, no votes, a condition compared with itself, a condition index out of range, or a share
 /// outside 0 to 1.
@@ -44,6 +45,7 @@ fn check(votes: &[PairedVote], n_conditions: usize) -> Result<(), StatisticsErro
 }
 
 /// Maximum-likelihood strengths in log odds, with mean 0.
+///
 /// # Errors
 /// Invalid votes, or conditions that wins do not connect in both directions.
 pub fn strengths(votes: &[PairedVote], n_conditions: usize) -> Result<Vec<f64>, StatisticsError> {

@@ -64,6 +64,7 @@ pub struct StudentEstimate {
 
 impl StudentEstimate {
     /// Creates an estimate.
+    ///
     /// # Errors
     /// A value is not finite, or the standard error or the degrees of freedom are not positive.
     pub fn new(value: f64, standard_error: f64, degrees_of_freedom: f64) -> Result<Self, StatisticsError> {
@@ -126,6 +127,7 @@ impl StudentEstimate {
 
 /// Holm-adjusted p values in the given order: a hypothesis is rejected at a level if its adjusted p value is at most
 /// that level.
+///
 /// # Errors
 /// A p value is outside 0 to 1.
 pub fn holm(p_values: &[f64]) -> Result<Vec<f64>, StatisticsError> {

@@ -18,6 +18,7 @@ pub struct BinomialCount {
 
 impl BinomialCount {
     /// Creates a count.
+    ///
     /// # Errors
     /// No trials, or more successes than trials.
     pub fn new(successes: u64, trials: u64) -> Result<Self, StatisticsError> {
@@ -122,6 +123,7 @@ pub struct Equivalence {
 
 impl Equivalence {
     /// Tests at 5 % whether the true value of `estimate` is less than `bound` away from `expected`.
+    ///
     /// # Errors
     /// `bound` is not positive.
     pub fn of_estimate(estimate: &StudentEstimate, expected: f64, bound: f64) -> Result<Self, StatisticsError> {
@@ -132,6 +134,7 @@ impl Equivalence {
     }
 
     /// Exact binomial version for independent trials; both bounds must lie between 0 and 1.
+    ///
     /// # Errors
     /// A bound is outside 0 to 1.
     pub fn of_count(count: &BinomialCount, expected: f64, bound: f64) -> Result<Self, StatisticsError> {
@@ -148,6 +151,7 @@ impl Equivalence {
 
 /// Number of independent votes for which two one-sided tests at 5 % pass with probability `power` if the true
 /// proportion is one half: (z(0.95) + z((1 + power) / 2))^2 / (4 bound^2), rounded up.
+///
 /// # Errors
 /// `bound` is outside 1e-6 to 0.5, or `power` is outside 0 to below 1.
 pub fn votes_needed(bound: f64, power: f64) -> Result<u64, StatisticsError> {

@@ -47,6 +47,7 @@ fn half_sums(sizes: &[usize]) -> Vec<f64> {
 /// Tests whether paired `differences` are symmetric about 0 (Wilcoxon 1945); zero differences are dropped. Exact for up
 /// to 50 differences without ties and zeros and for up to 13 with them, like scipy's `wilcoxon`; otherwise by the
 /// normal approximation with tie correction, without continuity correction.
+///
 /// # Errors
 /// A difference is not finite, or all differences are 0.
 pub fn signed_rank(differences: &[f64]) -> Result<RankTest, StatisticsError> {
@@ -74,6 +75,7 @@ pub fn signed_rank(differences: &[f64]) -> Result<RankTest, StatisticsError> {
 
 /// Tests whether conditions differ (Friedman 1937, with tie correction). Each block holds one participant's scores, one
 /// per condition. The p value is from the chi-squared approximation, valid for more than ten participants.
+///
 /// # Errors
 /// There are fewer than two participants or three conditions, a participant's number of scores differs, a score is not
 /// finite, or every participant gives equal scores to all conditions.
@@ -107,6 +109,7 @@ pub fn friedman(blocks: &[Vec<f64>]) -> Result<RankTest, StatisticsError> {
 /// true median with at least `confidence`, by the binomial distribution of the number of values below it (Hahn and
 /// Meeker 1991, section 5.2). Exact for continuous distributions, conservative with ties. 95 % confidence needs at
 /// least six values.
+///
 /// # Errors
 /// There are too few values for `confidence`, a value is not finite, or `confidence` is not between 0 and 1.
 pub fn median_interval(values: &[f64], confidence: f64) -> Result<ConfidenceInterval, StatisticsError> {
@@ -134,6 +137,7 @@ pub enum MeasurementScale {
 }
 
 /// Krippendorff's alpha of `units`, each with its ratings. Units with fewer than two ratings are ignored.
+///
 /// # Errors
 /// No unit has two ratings, a rating is not finite, or all ratings are equal.
 pub fn alpha(units: &[Vec<f64>], scale: MeasurementScale) -> Result<f64, StatisticsError> {

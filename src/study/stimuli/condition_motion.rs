@@ -40,6 +40,7 @@ pub struct ConditionModels(BTreeMap<String, EvaluatedCheckpoint>);
 
 impl ConditionModels {
     /// Opens the checkpoints of a speaker.
+    ///
     /// # Errors
     /// A checkpoint cannot be opened, or does not support a key of its condition; the error names the condition.
     pub fn open(conditions: &[StudyCondition], speaker: &str) -> Result<Self> {
@@ -77,6 +78,7 @@ fn open(condition: &StudyCondition, path: &Path, speaker: &str) -> Result<Vec<Ev
 }
 
 /// Motions by condition, then by clip. `tick` is called after each segment of speech.
+///
 /// # Errors
 /// A model fails, a file of another system is missing or has the wrong length, or there are too few clips for
 /// mismatching.

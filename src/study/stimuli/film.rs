@@ -75,6 +75,7 @@ pub fn film_name(seed: u64, content: &FilmContent) -> String {
 }
 
 /// Checks that H.264 films, which browsers play, can be written.
+///
 /// # Errors
 /// ffmpeg has no libx264.
 pub fn check_encoder() -> Result<()> {

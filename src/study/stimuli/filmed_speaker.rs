@@ -91,6 +91,7 @@ impl CutSpeaker {
     }
 
     /// Retargets the motion of every condition to the common rig, for films of `size` px.
+    ///
     /// # Errors
     /// A condition has no motion for a clip.
     pub fn filmed(self, file: &StudyFile, size: [usize; 2], progress: &dyn Progress) -> Result<FilmedSpeaker> {

@@ -45,6 +45,7 @@ pub struct SpeechSegment {
 
 impl SpeakerSource {
     /// Source with the intervals of a split of the dataset at `dir`.
+    ///
     /// # Errors
     /// There is no dataset, or it has no interval in that split.
     pub fn of_dataset(name: &str, dir: &Path, split: Split) -> Result<Self> {
@@ -69,6 +70,7 @@ impl SpeakerSource {
     }
 
     /// Source with the sound files that match `pattern` and the transcripts next to them, for motion at `fps`.
+    ///
     /// # Errors
     /// No file matches, or two have the same name.
     pub fn of_sounds(name: &str, pattern: &Path, fps: FrameRate) -> Result<Self> {

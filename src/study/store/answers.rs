@@ -88,6 +88,7 @@ pub fn record(
 }
 
 /// Inserts the row of an answer.
+///
 /// # Errors
 /// The database fails, or an answer exists at that position.
 pub fn insert(db: &Connection, id: &str, answer: &SubmittedAnswer) -> rusqlite::Result<()> {

@@ -35,6 +35,7 @@ const TABLES: &str = "
 
 /// Opens the database at `path` for writing and creates it if missing. `plan`: hash of the plan to which its sessions
 /// belong.
+///
 /// # Errors
 /// The file is not a database, cannot be written, or belongs to another plan.
 pub fn open(path: &Path, plan: &str) -> Result<Connection> {
@@ -85,6 +86,7 @@ pub fn open_for_reading(path: &Path) -> Result<Connection> {
 }
 
 /// Rebuilds the database and truncates its log, so that neither contains bytes of deleted rows.
+///
 /// # Errors
 /// The disk is full, or a reader blocks the checkpoint.
 pub fn erase_deleted(db: &Connection) -> rusqlite::Result<()> {
@@ -136,6 +138,7 @@ pub struct ResponseStore {
 impl ResponseStore {
     /// Opens the database at `path` for the plan with this hash and starts the writer thread, which ends after the last
     /// handle is dropped.
+    ///
     /// # Errors
     /// The database cannot be opened (see [`open`]), or the thread cannot be started.
     pub fn open(path: &Path, plan: &str) -> Result<(Self, JoinHandle<()>)> {
@@ -149,6 +152,7 @@ impl ResponseStore {
 
     /// Runs `work` in a transaction and returns its value after the commit. An error of `work` rolls back the entire
     /// batch, so `work` must report rejections in its value and fail only when the database fails.
+    ///
     /// # Errors
     /// The work was not committed, or not within the timeout.
     pub async fn write<T: Send + 'static>(

@@ -41,6 +41,7 @@ impl EvaluatedCheckpoint {
     /// Opens checkpoints of `orator train gan` and `orator train seq2seq`: files, or folders of trainings (the best
     /// checkpoint, else the newest). `speaker` selects the speaker of networks of several. Each checkpoint is named by
     /// its kind, extended by network, folder and file as far as needed for unique names.
+    ///
     /// # Errors
     /// A path that does not exist; a checkpoint of another kind; a checkpoint that is given twice.
     pub fn open_all(paths: &[PathBuf], speaker: &str) -> Result<Vec<Self>> {
@@ -71,6 +72,7 @@ impl EvaluatedCheckpoint {
 
     /// Options for sequence-to-sequence networks: a table with vectors of words that are not in the vocabulary, for
     /// those that read words, and whether the decoder state is carried across segments. Other networks are unaffected.
+    ///
     /// # Errors
     /// An option that applies to none of the checkpoints; word vectors of another dimension than those of a checkpoint.
     pub fn set_options(checkpoints: &mut [Self], words: Option<&Arc<WordVectors>>, carry_state: bool) -> Result<()> {
@@ -131,6 +133,7 @@ impl EvaluatedCheckpoint {
     /// Generates motion and, if the network was trained on it, posture for the sound of an interval: `n_frames` at
     /// `fps`, the network's own frame rate except for captured skeletons, which are resampled. Motion of a captured
     /// skeleton is converted like imported captures; its fingers, which are constant, are missing (NaN).
+    ///
     /// # Errors
     /// Network output that is not finite; a captured skeleton that cannot be imported.
     pub fn motion(

@@ -161,6 +161,7 @@ impl EvalClips {
 }
 
 /// Reads pairs of files, resampled to the frame rate of the first ground truth. `fps` is the rate of files without one.
+///
 /// # Errors
 /// A file without motion; a prediction much longer or shorter than its ground truth, or with many missing joints. The
 /// message names the clip and a remedy.

@@ -24,6 +24,7 @@ use orator_formats::transcript::Word;
 
 /// Clips and predictors for checkpoints on a split of `dataset`; the predictions of the checkpoints come first. Bone
 /// lengths are those of the first checkpoint that was trained on a dataset, or else of this dataset.
+///
 /// # Errors
 /// No checkpoint; a dataset of another frame rate than a checkpoint, except for captured skeletons; a split without
 /// intervals.

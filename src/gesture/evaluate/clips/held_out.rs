@@ -44,6 +44,7 @@ pub fn samples(dataset: &Dataset, split: Split) -> Result<Vec<SampleRef>> {
 
 /// Joints [T, 49, 3] of some frames of a sample with the speaker's bone lengths, followed by the angles of head and
 /// trunk if `has_channels`.
+///
 /// # Errors
 /// A sample that cannot be read; its hash is not checked.
 pub fn joints(

@@ -44,6 +44,7 @@ impl MotionStore {
     }
 
     /// Saves joints [T, n, 3].
+    ///
     /// # Errors
     /// The temporary file cannot be written, for instance because the disk is full.
     pub fn keep(&self, joints: Array3<f32>) -> Result<StoredMotion> {

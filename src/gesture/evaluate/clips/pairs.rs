@@ -30,6 +30,7 @@ pub struct FilePairs {
 
 /// Pairs ground truth and predictions: two files, or two folders, which may be the same folder (`gt_interval_7.txt`
 /// matches `prediction_interval_7.txt`). `audio` is the sound of the only pair, or a folder of sounds.
+///
 /// # Errors
 /// A path that does not exist; a file given with a folder; two files for one clip; no pair.
 pub fn find(truth: &Path, prediction: &Path, audio: Option<&Path>) -> Result<FilePairs> {

@@ -107,6 +107,7 @@ pub struct StoredResult {
 
 impl StoredResult {
     /// Reads the output of `orator evaluate --json`.
+    ///
     /// # Errors
     /// A missing file, other JSON, another version, or a hash that does not match its definition.
     pub fn read(path: &Path) -> Result<Self> {

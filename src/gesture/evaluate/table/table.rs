@@ -58,6 +58,7 @@ pub struct Table {
 
 /// Measures the predictions, the baselines and the ground truth itself, one predictor at a time to bound memory. The
 /// results do not depend on the number of threads.
+///
 /// # Errors
 /// Settings that the catalogue rejects; no frame to measure.
 pub fn measure(

@@ -56,6 +56,7 @@ impl SequenceGenerator {
 
     /// Words that are not in the vocabulary take their vectors from this table. Without a table, or without a vector in
     /// it, all have the vector of the unknown word.
+    ///
     /// # Errors
     /// A network that does not read words or was trained without a table, or whose word vectors have another dimension.
     pub fn set_word_vectors(&mut self, vectors: Arc<WordVectors>) -> Result<()> {
@@ -135,6 +136,7 @@ impl SequenceGenerator {
 
     /// Input features for a sound at `metadata.rate` and its words, of which there may be none. The sound is padded
     /// with silence to complete segments.
+    ///
     /// # Errors
     /// Sound of another rate, or shorter than a frame; a table of word vectors that cannot be read.
     pub fn prepare(&self, sound: &Sound, words: &[Word]) -> Result<SpeechInput> {
@@ -157,6 +159,7 @@ impl SequenceGenerator {
     }
 
     /// Generates poses for the input. The first segment starts from the mean pose.
+    ///
     /// # Errors
     /// Network output that is not finite.
     pub fn generate(&self, speech: &SpeechInput, seams: StateAtSeams) -> Result<GeneratedPoses> {

@@ -38,6 +38,7 @@ pub struct TrainingIntervals<'d> {
 
 impl<'d> TrainingIntervals<'d> {
     /// The intervals of these samples, cached in memory if they take at most `max_bytes`.
+    ///
     /// # Errors
     /// A damaged sample; if samples are not cached, it is only found when it is read.
     pub fn open(

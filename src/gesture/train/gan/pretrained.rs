@@ -54,6 +54,7 @@ impl PretrainedModel {
     /// Trainer of these speakers, initialised with the weights of this model, whose videos are added to the speakers'
     /// lists. A single speaker initialised from a model of several gets the speaker layer with the smallest initial
     /// error on `windows`, among those of all speakers and their mean.
+    ///
     /// # Errors
     /// A network of another shape.
     pub fn trainer(

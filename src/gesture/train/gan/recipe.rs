@@ -155,6 +155,7 @@ const FINE_TUNING_RATE: f64 = 0.2;
 
 /// Settings of a training: `requested`, with the recipe's values for this amount of speech and these initial weights
 /// filled in.
+///
 /// # Errors
 /// An `"auto"` key that is missing in the recipe.
 pub fn settings(requested: &GanConfig, material: &TrainingMaterial, initial: InitialWeights) -> Result<GanSettings> {

@@ -25,6 +25,7 @@ pub struct SpeakerSet {
 
 impl SpeakerSet {
     /// Set of the speakers of one network, with the form of the bone length loss.
+    ///
     /// # Errors
     /// No speaker, or another number than the network has; a speaker whose channels, frame rate or network differ from
     /// the first one's.
@@ -177,6 +178,7 @@ pub fn metadata(
 
 /// Updates the metadata of a speaker from a resumed checkpoint for the current dataset; adds a message to `differences`
 /// if the dataset has changed.
+///
 /// # Errors
 /// A dataset of another speaker or frame rate.
 pub fn resume(metadata: &mut SpeakerMetadata, dataset: &Dataset, differences: &mut Vec<String>) -> Result<()> {

@@ -34,6 +34,7 @@ use std::time::{Duration, Instant};
 
 /// Trains on `dataset` until `requested.steps`, resuming from the newest checkpoint in `folder` if there is one; then
 /// the settings of that checkpoint apply, and differences are reported.
+///
 /// # Errors
 /// No window to train on; a checkpoint of another speaker or version; another training running in `folder`; a loss that
 /// is not finite or explodes (the last good checkpoint is kept); `StoppedTraining` if `progress` requests a stop.

@@ -35,6 +35,7 @@ struct Capture {
 
 impl CaptureFolder {
     /// Lists a folder. `hold_out`: names (without extension) of the captures to validate on.
+    ///
     /// # Errors
     /// Motion without sound, sound without motion, no capture, none left to train on, a held-out name that does not
     /// exist.

@@ -95,6 +95,7 @@ const EFFECTIVE: [(&str, &[SequenceNetwork]); 14] = {
 };
 
 /// Checks that every key that differs from its default has an effect on the network.
+///
 /// # Errors
 /// A key without effect, with the networks that it applies to; both `steps` and `epochs`.
 pub fn check(requested: &Seq2seqConfig) -> Result<()> {
@@ -118,6 +119,7 @@ pub fn check(requested: &Seq2seqConfig) -> Result<()> {
 /// Settings of a training before its data are read: `requested`, with the values of its reading filled in. The length
 /// of the training ([`Seq2seqSettings::steps`], `epochs`, `epoch_steps`, `autoencoder_steps`) follows from the data; see
 /// [`set_length`].
+///
 /// # Errors
 /// An `"auto"` key without a value.
 pub fn settings(requested: &Seq2seqConfig) -> Result<Seq2seqSettings> {
@@ -165,6 +167,7 @@ pub fn motion_secs(settings: &Seq2seqSettings, n_segments: usize, predicted: usi
 
 /// Sets the length of a training with `n_segments` training segments of `predicted` poses at `fps`: an epoch is one
 /// pass over the segments; a validation follows the smallest number of epochs with at least 100 steps.
+///
 /// # Errors
 /// `autoencoder_steps` or `decay_start` of at least the number of steps.
 pub fn set_length(

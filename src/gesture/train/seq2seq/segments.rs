@@ -67,6 +67,7 @@ impl SegmentLoader {
     }
 
     /// Batch of the segments with these indices.
+    ///
     /// # Errors
     /// An index of `len` or more; no index.
     pub fn batch(&self, which: &[usize]) -> Result<SegmentBatch> {
@@ -84,6 +85,7 @@ impl SegmentLoader {
     }
 
     /// Batch of the segments that end where the predicted poses of these segments start.
+    ///
     /// # Errors
     /// A segment without a complete preceding one (`has_segment_before`).
     pub fn batch_before(&self, which: &[usize]) -> Result<SegmentBatch> {

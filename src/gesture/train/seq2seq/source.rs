@@ -81,6 +81,7 @@ impl TrainingSource<'_> {
     }
 
     /// All sequences in this format, with audio features for contexts of `context` frames.
+    ///
     /// # Errors
     /// A file that cannot be read, with its name; a format of the other kind of data.
     pub fn sequences(&self, format: &PoseFormat, context: usize) -> Result<SequenceSplits> {

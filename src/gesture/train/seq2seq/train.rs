@@ -35,6 +35,7 @@ const WORD_DIM: usize = 100;
 /// Trains to the last step of `requested`, resuming from the newest checkpoint in `folder` if there is one; then the settings
 /// of that checkpoint apply, and differences are reported. `vectors` initialise the word embeddings; without them they
 /// are random.
+///
 /// # Errors
 /// Data that cannot be read, with the name of the file; no segment to train on; a checkpoint of other data; another
 /// training running in `folder`; a loss that is not finite or explodes (the last good checkpoint is kept);

@@ -200,6 +200,7 @@ impl SavedChunks {
     }
 
     /// Returns the saved values.
+    ///
     /// # Errors
     /// No forward pass has saved values.
     pub fn get<T: 'static>(&self) -> Result<&[Vec<T>]> {

@@ -20,6 +20,7 @@ pub struct ColumnNames(BTreeMap<&'static str, String>);
 
 impl ColumnNames {
     /// Parses `participant=worker,clip=stimulus`.
+    ///
     /// # Errors
     /// A pair has no `=`, its field is unknown or repeated, or its name is empty.
     pub fn parse(text: &str) -> Result<Self> {
@@ -113,6 +114,7 @@ pub type NumberedRows = Vec<(u64, std::result::Result<RowCells, String>)>;
 
 /// Reads the rows of delimited text. Rows that are not UTF-8 or whose number of cells differs from the header are
 /// returned with the reason.
+///
 /// # Errors
 /// The text is UTF-16, binary or empty, required columns are missing, or there are too many rows.
 pub fn delimited_rows(bytes: &[u8], names: &ColumnNames) -> Result<NumberedRows> {
@@ -170,6 +172,7 @@ fn delimiter(bytes: &[u8]) -> u8 {
 }
 
 /// Reads the rows of JSON Lines. Lines that are not objects are returned with the reason.
+///
 /// # Errors
 /// The text is empty, the first object lacks required columns, or there are too many rows.
 pub fn json_rows(bytes: &[u8], names: &ColumnNames) -> Result<NumberedRows> {

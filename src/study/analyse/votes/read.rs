@@ -44,6 +44,7 @@ impl VotesRead {
     }
 
     /// Reads a file. `design` applies to rows without a design.
+    ///
     /// # Errors
     /// The file cannot be read, is not a table of votes, or contains no valid vote.
     pub fn of_file(path: &Path, names: &ColumnNames, design: Option<TaskDesign>) -> Result<Self> {

@@ -8,6 +8,7 @@ use super::votes::{CLIP, ClipVote, PAIR, PARTICIPANT, VoteGroups, scores};
 use std::ops::Range;
 
 /// Mean of all votes with equal weights.
+///
 /// # Errors
 /// There are fewer than two participants or clips, a score is not finite, or the estimated variance is 0.
 pub fn crossed_estimate(votes: &[ClipVote]) -> Result<StudentEstimate, StatisticsError> {
@@ -16,6 +17,7 @@ pub fn crossed_estimate(votes: &[ClipVote]) -> Result<StudentEstimate, Statistic
 
 /// Difference of the means of `first` and `second`. Participants and clips may occur in both; their common effects then
 /// cancel.
+///
 /// # Errors
 /// A cell has fewer than two participants or clips, a score is not finite, or the estimated variance is 0.
 pub fn crossed_difference(first: &[ClipVote], second: &[ClipVote]) -> Result<StudentEstimate, StatisticsError> {

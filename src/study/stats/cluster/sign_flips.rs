@@ -21,6 +21,7 @@ pub(in super::super) fn rng_of_draw(seed: u64, draw: u64) -> ChaCha8Rng {
 /// Two-sided p value of the hypothesis that the population mean over participants and clips is `expected`. The
 /// deviations from `expected` are flipped jointly for all votes of a participant, or of a clip if there are fewer
 /// clips.
+///
 /// # Errors
 /// There are fewer than two participants or clips, `n_draws` is 0, or a score or `expected` is not finite.
 pub fn sign_flip_p(votes: &[ClipVote], expected: f64, n_draws: usize, seed: u64) -> Result<f64, StatisticsError> {
@@ -71,6 +72,7 @@ impl SideBlock {
 
 /// Exact two-sided p value over all assignments of sides that preserve each block's number of real films on the left:
 /// the distribution of a sum of hypergeometric counts (Fisher 1935), by convolution.
+///
 /// # Errors
 /// There are no trials.
 pub fn side_p(blocks: &[SideBlock]) -> Result<f64, StatisticsError> {

@@ -30,6 +30,7 @@ pub(in super::super) struct VoteGroups {
 
 impl VoteGroups {
     /// Groups the votes of the cells.
+    ///
     /// # Errors
     /// A cell has no votes, or a score is not finite.
     pub(crate) fn new(cells: &[&[ClipVote]]) -> Result<Self, StatisticsError> {

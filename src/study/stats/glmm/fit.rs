@@ -30,6 +30,7 @@ pub struct MixedLogit {
 
 impl MixedLogit {
     /// Fits votes with scores 0 and 1.
+    ///
     /// # Errors
     /// Fewer than two participants or clips, scores other than 0 and 1, or all votes equal.
     pub fn fit(votes: &[ClipVote]) -> Result<Self, StatisticsError> {
