@@ -142,8 +142,6 @@ fn is_positive_definite(matrix: &Array2<f64>) -> bool {
     true
 }
 
-/// Compares fits with lme4 (`fixtures/reference/study_glmm.R`), and tests votes without a fit and simulated studies.
-
 const MAX_STEPS: usize = 200;
 /// Steps of the finite differences for gradients and Hessians.
 const GRADIENT_STEP: f64 = 1e-3;
