@@ -5,6 +5,7 @@ use super::retarget::captured_body::{CapturedBody, CapturedPart};
 use super::rig::constraints::{ClampCounter, Clamps, Constraints};
 use super::rig::rig::{CM, Rig};
 use super::solve::arm::{SolveFilters, rotations};
+use super::solve::hand_fit::with_fitted_hands;
 use super::solve::legs::Legs;
 use super::solve::positions::JointPositions;
 use super::solve::smoothing::Smoothing;
@@ -62,7 +63,7 @@ pub struct AnimationReport {
     pub arms: Jerk,
     /// Jerk of the fingers relative to their wrist.
     pub hands: Jerk,
-    /// Clamps by kind of the unsmoothed joints, at the motion's own rate.
+    /// Clamps by kind before directions are smoothed, at the motion's own rate.
     pub clamps: Vec<Clamps>,
     /// Number of frames in which the head was detected; `None` without a posture.
     pub face_frames: Option<usize>,
@@ -175,8 +176,9 @@ pub struct Performance {
 /// Animates a motion on a rig with its own bone lengths; a `posture` turns head and trunk without moving joints
 /// relative to the neck.
 ///
-/// Joint limits are applied before smoothing, so that a misplaced joint does not distort neighbouring frames, and again
-/// after smoothing and at the output rate, so that they hold in every written frame.
+/// Joint limits are applied before directions are smoothed, so that a misplaced joint does not distort neighbouring
+/// frames, and again after smoothing and at the output rate, so that they hold in every written frame. The noise of
+/// hands is reduced before the limits: in noisy fingers they would clamp to one side and add to the error.
 pub fn perform(motion: &Motion, posture: Option<&Posture>, options: &AnimationOptions) -> Performance {
     perform_on(Rig::from_motion(motion), motion, posture, options)
 }
@@ -210,14 +212,14 @@ fn animate(
         clip
     };
     let mut counter = ClampCounter::default();
-    let mut positions = JointPositions::from_motion(motion);
+    let filters = SolveFilters::new(options.smoothing, motion.fps);
+    let mut positions = with_fitted_hands(JointPositions::from_motion(motion), &filters.fingers);
     if options.constraints != Constraints::NONE {
         let unfiltered = rotations(&positions, &rig, &SolveFilters::new(Smoothing::None, motion.fps));
         let within = constrained(clip_of(&unfiltered), &mut counter);
         let frames: Vec<Vec<Vec3>> = (0..within.n_frames()).map(|t| within.positions(t)).collect();
         positions = positions.with_positions(|t, joint| scale(frames[t][rig.positions[joint]], 1.0 / CM));
     }
-    let filters = SolveFilters::new(options.smoothing, motion.fps);
     let mut tracks = rotations(&positions, &rig, &filters);
     let face_frames = posture.map(|posture| head::turn(posture, &rig, &filters, &mut tracks));
     if options.yaw == Yaw::Removed {

@@ -5,7 +5,7 @@
 use super::hinge::Hinge;
 use crate::animate::solve::positions::{JointPositions, palm_frame};
 use orator_base::math::order::upper_median;
-use orator_base::math::vec3::{Vec3, across, cross, norm, scale};
+use orator_base::math::vec3::{Vec3, across, cross, dot, norm, scale};
 use orator_base::motion::fk::Skeleton;
 use orator_base::types::pose3d::Motion;
 use orator_base::types::skeleton::{self, L_ELBOW, L_HAND, L_SHOULDER, L_WRIST, N_JOINTS, NECK, R_HAND};
@@ -28,6 +28,11 @@ const DEFAULT_FINGERS: [[f64; 4]; 5] = [
 const SPREAD_DEGREES: [f64; 5] = [50.0, 16.0, 5.0, -6.0, -17.0];
 /// Minimum cosine between a metacarpal and the axis of the hand (60 degrees); the default palm has at most 17 degrees.
 const MIN_METACARPAL_COS: f64 = 0.5;
+/// Ratio of a bone's length without noise to its median length: minimum, and the ratio below which it is used.
+const MIN_LENGTH_RATIO: f64 = 0.5;
+const NOISE_LENGTH_RATIO: f64 = 0.99;
+/// Number of frames over which the products are averaged.
+const NOISE_FRAMES: usize = 12;
 /// Directions of the left thumb at rest and towards which it flexes, close to the medians of speakers' hands.
 const THUMB_ALONG: Vec3 = [0.74, -0.35, 0.57];
 const THUMB_FLEXION: Vec3 = [0.0, -0.5, -0.87];
@@ -184,15 +189,22 @@ fn default_palm(metres: &[f64; N_JOINTS]) -> [Vec3; 5] {
 }
 
 /// Median length over the frames of the bone to each joint, metres; that of the other side or a default if never
-/// detected.
+/// detected. Noise lengthens short bones; where it does, the length is taken from products of different frames, whose
+/// errors are independent.
 pub fn bone_metres(motion: &Motion) -> [f64; N_JOINTS] {
     let seen: [Option<f64>; N_JOINTS] = std::array::from_fn(|joint| {
         let parent = skeleton::parent(joint)?;
-        let lengths = motion.joints.outer_iter().map(|frame| {
-            let square = |k| (f64::from(frame[[joint, k]]) - f64::from(frame[[parent, k]])).powi(2);
-            (0..3).map(square).sum::<f64>().sqrt()
-        });
-        upper_median(lengths)
+        let bone = |frame: ndarray::ArrayView2<f32>| -> Vec3 {
+            std::array::from_fn(|k| f64::from(frame[[joint, k]]) - f64::from(frame[[parent, k]]))
+        };
+        let bones: Vec<Vec3> = motion.joints.outer_iter().map(bone).collect();
+        let length = upper_median(bones.iter().map(|&bone| norm(bone)))?;
+        // For a bone that turns evenly the rotation between the frames cancels out.
+        let square = |run: &[Vec3]| (4.0 * dot(run[0], run[1]) - dot(run[0], run[2])) / 3.0;
+        let mean = |run: &[Vec3]| run.windows(3).map(square).sum::<f64>() / (NOISE_FRAMES - 2) as f64;
+        let without_noise = upper_median(bones.windows(NOISE_FRAMES).map(mean))
+            .map_or(length, |square| square.sqrt().max(length * MIN_LENGTH_RATIO));
+        Some(if without_noise < NOISE_LENGTH_RATIO * length { without_noise } else { length })
     });
     std::array::from_fn(|joint| seen[joint].or(seen[skeleton::mirror(joint)]).unwrap_or_else(|| default_metres(joint)))
 }
@@ -214,6 +226,30 @@ pub(crate) mod tests {
     pub(crate) fn default_rig() -> Rig {
         let missing = ndarray::Array3::from_elem((1, N_JOINTS, 3), f32::NAN);
         Rig::from_motion(&Motion::from_joints(orator_base::types::time::FrameRate::new(15, 1), missing))
+    }
+
+    #[test]
+    fn noise_does_not_lengthen_short_bones() {
+        let mut state = 1u64;
+        let mut uniform = || {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (state >> 33) as f64 / f64::from(1u32 << 31) - 0.5
+        };
+        // The first phalanx of the left thumb, 20 mm, turns by 3 degrees per frame.
+        let (from, to) = (L_HAND + 1, L_HAND + 2);
+        let mut lengths = |noise: f64| {
+            let mut joints = ndarray::Array3::<f32>::zeros((600, N_JOINTS, 3));
+            for (t, mut frame) in joints.outer_iter_mut().enumerate() {
+                let (sin, cos) = (3.0 * t as f64).to_radians().sin_cos();
+                for (joint, at) in [(from, [0.1, 0.0, 0.0]), (to, [0.1 + 0.02 * cos, 0.02 * sin, 0.0])] {
+                    let error = [0, 1, 2].map(|_| noise * (0..12).map(|_| uniform()).sum::<f64>());
+                    (0..3).for_each(|k| frame[[joint, k]] = (at[k] + error[k]) as f32);
+                }
+            }
+            bone_metres(&Motion::from_joints(orator_base::types::time::FrameRate::new(30, 1), joints))[to]
+        };
+        let (exact, noisy) = (lengths(0.0), lengths(0.008));
+        assert!((exact - 0.02).abs() < 1e-6 && (noisy - 0.02).abs() < 0.002, "{exact} {noisy}");
     }
 
     #[test]
