@@ -24,7 +24,7 @@ use serde::Serialize;
 use std::collections::BTreeMap;
 use std::ops::Range;
 
-/// Largest share of clamped finger angles of a clip with usable fingers; clips of real hands have 2 to 10 %.
+/// Largest share of clamped finger angles of a clip with usable fingers; clips of real hands have at most 10 %.
 pub const MAX_FINGER_CLAMPS: f64 = 0.25;
 
 /// Settings of the animation.
@@ -63,7 +63,7 @@ pub struct AnimationReport {
     pub arms: Jerk,
     /// Jerk of the fingers relative to their wrist.
     pub hands: Jerk,
-    /// Clamps by kind before directions are smoothed, at the motion's own rate.
+    /// Clamps by kind of the unsmoothed joints, at the motion's own rate.
     pub clamps: Vec<Clamps>,
     /// Number of frames in which the head was detected; `None` without a posture.
     pub face_frames: Option<usize>,
@@ -215,8 +215,13 @@ fn animate(
     let filters = SolveFilters::new(options.smoothing, motion.fps);
     let mut positions = with_fitted_hands(JointPositions::from_motion(motion), &filters.fingers);
     if options.constraints != Constraints::NONE {
-        let unfiltered = rotations(&positions, &rig, &SolveFilters::new(Smoothing::None, motion.fps));
-        let within = constrained(clip_of(&unfiltered), &mut counter);
+        let unfiltered = SolveFilters::new(Smoothing::None, motion.fps);
+        let limited = |positions: &JointPositions, counter: &mut ClampCounter| {
+            constrained(clip_of(&rotations(positions, &rig, &unfiltered)), counter)
+        };
+        // The report counts the angles of the input.
+        limited(&JointPositions::from_motion(motion), &mut counter);
+        let within = limited(&positions, &mut ClampCounter::default());
         let frames: Vec<Vec<Vec3>> = (0..within.n_frames()).map(|t| within.positions(t)).collect();
         positions = positions.with_positions(|t, joint| scale(frames[t][rig.positions[joint]], 1.0 / CM));
     }
