@@ -1,6 +1,6 @@
 //! Joint limits in degrees, for the left side: the normal ranges of an adult (American Academy of Orthopaedic Surgeons,
-//! Joint Motion, 1965; Norkin and White, Measurement of Joint Motion; fingers by Rebol et al. 2021), widened by about 12
-//! degrees beyond percentiles 0.1 and 99.9 of captured fingers on hands of several proportions, whose bone axes differ.
+//! Joint Motion, 1965; Norkin and White, Measurement of Joint Motion; fingers by Rebol et al. 2021), widened by about
+//! 12 degrees beyond percentiles 0.1 and 99.9 of captured fingers on hands of several proportions.
 //! `orator guide animation` lists the captures.
 
 /// Ranges of a hinge joint.

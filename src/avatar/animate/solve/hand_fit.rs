@@ -1,7 +1,7 @@
 //! Noise reduction of a hand that uses all of its points: their positions in the axes of the palm change slowly and are
-//! smoothed first, and this shape is then fitted rigidly to the observed points of every frame, so that the errors of 21
-//! points average out in the position and rotation of the hand. Motion without noise changes by the filter's tolerance,
-//! for palms of any rigidity.
+//! smoothed first, and this shape is then fitted rigidly to the observed points of every frame, so that the errors of
+//! 21 points average out in the position and rotation of the hand. Motion without noise changes by the filter's
+//! tolerance, for palms of any rigidity.
 
 use super::positions::{HandPositions, JointPositions};
 use super::smoothing::Filter;
