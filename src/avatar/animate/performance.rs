@@ -177,8 +177,8 @@ pub struct Performance {
 /// relative to the neck.
 ///
 /// Joint limits are applied before directions are smoothed, so that a misplaced joint does not distort neighbouring
-/// frames, and again after smoothing and at the output rate, so that they hold in every written frame. The noise of
-/// hands is reduced before the limits: in noisy fingers they would clamp to one side and add to the error.
+/// frames, and again after smoothing and at the output rate, so that they hold in every written frame. Noise of hands
+/// is reduced before, since limits would add to the error of noisy fingers; the report counts the input's angles.
 pub fn perform(motion: &Motion, posture: Option<&Posture>, options: &AnimationOptions) -> Performance {
     perform_on(Rig::from_motion(motion), motion, posture, options)
 }
@@ -215,11 +215,10 @@ fn animate(
     let filters = SolveFilters::new(options.smoothing, motion.fps);
     let mut positions = with_fitted_hands(JointPositions::from_motion(motion), &filters.fingers);
     if options.constraints != Constraints::NONE {
-        let unfiltered = SolveFilters::new(Smoothing::None, motion.fps);
         let limited = |positions: &JointPositions, counter: &mut ClampCounter| {
+            let unfiltered = SolveFilters::new(Smoothing::None, motion.fps);
             constrained(clip_of(&rotations(positions, &rig, &unfiltered)), counter)
         };
-        // The report counts the angles of the input.
         limited(&JointPositions::from_motion(motion), &mut counter);
         let within = limited(&positions, &mut ClampCounter::default());
         let frames: Vec<Vec<Vec3>> = (0..within.n_frames()).map(|t| within.positions(t)).collect();

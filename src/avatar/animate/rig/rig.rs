@@ -229,30 +229,6 @@ pub(crate) mod tests {
     }
 
     #[test]
-    fn noise_does_not_lengthen_short_bones() {
-        let mut state = 1u64;
-        let mut uniform = || {
-            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-            (state >> 33) as f64 / f64::from(1u32 << 31) - 0.5
-        };
-        // The first phalanx of the left thumb, 20 mm, turns by 3 degrees per frame.
-        let (from, to) = (L_HAND + 1, L_HAND + 2);
-        let mut lengths = |noise: f64| {
-            let mut joints = ndarray::Array3::<f32>::zeros((600, N_JOINTS, 3));
-            for (t, mut frame) in joints.outer_iter_mut().enumerate() {
-                let (sin, cos) = (3.0 * t as f64).to_radians().sin_cos();
-                for (joint, at) in [(from, [0.1, 0.0, 0.0]), (to, [0.1 + 0.02 * cos, 0.02 * sin, 0.0])] {
-                    let error = [0, 1, 2].map(|_| noise * (0..12).map(|_| uniform()).sum::<f64>());
-                    (0..3).for_each(|k| frame[[joint, k]] = (at[k] + error[k]) as f32);
-                }
-            }
-            bone_metres(&Motion::from_joints(orator_base::types::time::FrameRate::new(30, 1), joints))[to]
-        };
-        let (exact, noisy) = (lengths(0.0), lengths(0.008));
-        assert!((exact - 0.02).abs() < 1e-6 && (noisy - 0.02).abs() < 0.002, "{exact} {noisy}");
-    }
-
-    #[test]
     fn a_plausible_palm_points_along_the_hand() {
         let metres: [f64; N_JOINTS] = std::array::from_fn(default_metres);
         assert!(is_palm(&default_palm(&metres)));

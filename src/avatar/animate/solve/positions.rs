@@ -4,9 +4,7 @@
 use orator_base::math::rotation::Rotation;
 use orator_base::math::vec3::{Vec3, across, add, norm, scale, sub, unit};
 use orator_base::types::pose3d::Motion;
-use orator_base::types::skeleton::{
-    self, L_HAND, L_SHOULDER, L_WRIST, N_HAND_JOINTS, N_JOINTS, R_HAND, R_SHOULDER, R_WRIST,
-};
+use orator_base::types::skeleton::{self, L_HAND, L_SHOULDER, L_WRIST, N_JOINTS, R_HAND, R_SHOULDER, R_WRIST};
 
 /// Minimum length of a bone whose direction is defined, metres.
 const MIN_METRES: f64 = 1e-5;
@@ -14,7 +12,7 @@ const MIN_METRES: f64 = 1e-5;
 const LEVER_METRES: f64 = 0.1;
 
 /// Points of a hand, its wrist first.
-pub type HandPositions = [Option<Vec3>; N_HAND_JOINTS];
+pub type HandPositions = [Option<Vec3>; skeleton::N_HAND_JOINTS];
 
 /// Joint positions by frame.
 pub struct JointPositions {
