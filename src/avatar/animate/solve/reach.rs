@@ -17,8 +17,7 @@ const SAME_LENGTH: f64 = 0.03;
 const STRAIGHT_DEGREES: [f64; 2] = [10.0, 30.0];
 
 /// Turns the left upper arm and forearm, given by their directions in the clavicle's axes, so that the wrist is at its
-/// smoothed position relative to the neck. `metres`: lengths of clavicle, upper arm and forearm in the rig;
-/// `chest` and `clavicle`: world rotations.
+/// smoothed position relative to the neck. `metres`: clavicle, upper arm, forearm; `chest`, `clavicle`: world rotations.
 pub fn reach(
     positions: &JointPositions,
     metres: [f64; 3],
