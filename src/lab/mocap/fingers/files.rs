@@ -7,12 +7,13 @@
 use super::labels;
 use super::take::{FingerTake, Fingers, Size};
 use crate::evaluate::people::clips::ListedClip;
+use crate::mocap::smplx;
 use crate::rendered_truth::RenderedTruth;
 use anyhow::{Context, Result, bail, ensure};
 use orator_base::types::pose2d::N_HAND;
 use orator_base::types::skeleton::{L_HAND, R_HAND, Side};
 use orator_formats::bvh::read::{Bvh, Positions};
-use orator_formats::mocap::{fingers, smplx, ted};
+use orator_formats::mocap::{fingers, ted};
 use orator_formats::npz::Npz;
 use orator_formats::search;
 use std::path::{Path, PathBuf};

@@ -78,7 +78,7 @@ mod tests {
             };
             [x * cos - y * sin, x * sin + y * cos, score]
         };
-        DetectedHand { points: std::array::from_fn(point), score, right: Some(right) }
+        DetectedHand { points: std::array::from_fn(point), score, right: Some(right), depth: None }
     }
 
     /// Searches a left hand with a model that maps the number of the call and the square to a hand; returns the score

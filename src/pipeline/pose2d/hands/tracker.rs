@@ -238,7 +238,7 @@ mod tests {
     }
 
     fn hand(x: f64, right: f64) -> Option<DetectedHand> {
-        Some(DetectedHand { points: [[x, 0.0, 0.9]; 21], score: 0.9, right: Some(right) })
+        Some(DetectedHand { points: [[x, 0.0, 0.9]; 21], score: 0.9, right: Some(right), depth: None })
     }
 
     fn accepted(mut hands: [Option<DetectedHand>; 2], body: &[ScoredPoint; 17]) -> [bool; 2] {
