@@ -7,9 +7,6 @@ use std::process::Command;
 use tempfile::TempDir;
 
 /// Creates an empty folder for a program that needs no files of its own; dropping the value removes it.
-///
-/// # Errors
-/// The folder for temporary files is not writable.
 pub fn empty_folder() -> Result<TempDir> {
     let temp_dir = std::env::temp_dir();
     tempfile::tempdir().with_context(|| format!("cannot create a temporary folder in {} (TMPDIR)", temp_dir.display()))
@@ -19,9 +16,6 @@ pub fn empty_folder() -> Result<TempDir> {
 /// `folder`, so that a relative entry of PATH does not point into the working directory. A relative path is resolved
 /// against the working directory. Symbolic links in it are not resolved, because the Python of a virtual environment
 /// finds its packages by the link.
-///
-/// # Errors
-/// The path is relative and the working directory no longer exists.
 pub fn command_in(folder: &Path, program: &Path) -> Result<Command> {
     let is_path = program.as_os_str().as_encoded_bytes().contains(&b'/');
     let mut command = if is_path { Command::new(std::path::absolute(program)?) } else { Command::new(program) };

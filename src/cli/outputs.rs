@@ -52,9 +52,25 @@ pub fn names(outputs: &OutputFiles) -> Vec<String> {
     outputs.iter().map(|(path, _)| path.display().to_string()).collect()
 }
 
-/// The file to suggest next: first a film, then a file for an animation program; `None` if both were written.
-pub fn next_output(outputs: &OutputFiles) -> Option<PathBuf> {
-    let kinds = [(ExportFormat::Mp4, "mp4"), (ExportFormat::Bvh, "bvh")];
-    let missing = kinds.into_iter().find(|&(format, _)| outputs.iter().all(|&(_, written)| written != format));
-    Some(outputs.first()?.0.with_extension(missing?.1))
+/// The file to suggest next: first a film, then a file for an animation program; `None` if both were written or are
+/// files that the verb reads.
+pub fn next_output(outputs: &OutputFiles, is_read: impl Fn(&Path) -> bool) -> Option<PathBuf> {
+    let first = &outputs.first()?.0;
+    let kinds = [(ExportFormat::Mp4, "mp4"), (ExportFormat::Bvh, "bvh")].into_iter();
+    let missing = kinds.filter(|&(format, _)| outputs.iter().all(|&(_, written)| written != format));
+    missing.map(|(_, ending)| first.with_extension(ending)).find(|path| !is_read(path))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_input_is_not_suggested_as_output() {
+        let outputs = vec![(PathBuf::from("a.glb"), ExportFormat::from_path(Path::new("a.glb")).unwrap())];
+        let next = |read: &[&str]| next_output(&outputs, |path| read.iter().any(|one| Path::new(one) == path));
+        assert_eq!(next(&["a.npy"]), Some("a.mp4".into()));
+        assert_eq!(next(&["a.mp4"]), Some("a.bvh".into()));
+        assert_eq!(next(&["a.bvh", "a.mp4"]), None);
+    }
 }

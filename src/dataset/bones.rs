@@ -19,9 +19,6 @@ pub struct VideoBones {
 
 impl VideoBones {
     /// Reads `bones.json`.
-    ///
-    /// # Errors
-    /// An unreadable file, or invalid lengths (`check_lengths`).
     pub fn read(path: &Path) -> Result<Self> {
         let bytes = input::read(path, input::MAX_TEXT).with_context(|| format!("cannot read {}", path.display()))?;
         let bones: Self = serde_json::from_slice(&bytes)
@@ -32,9 +29,6 @@ impl VideoBones {
 }
 
 /// Checks bone lengths; `name` is the field named in the message.
-///
-/// # Errors
-/// A number of lengths other than 48, or a length outside [0, 10) metres.
 pub(crate) fn check_lengths(name: &str, lengths: &[f64]) -> Result<()> {
     ensure!(lengths.len() == N_BONES, "`{name}` has {} lengths, expected {N_BONES}", lengths.len());
     let invalid = lengths.iter().find(|length| !(0.0..10.0).contains(*length));

@@ -1,5 +1,6 @@
 //! Description file `info.json`: the meaning of all arrays and fields, for readers without this program.
 
+use super::config::SplitUnit;
 use super::index::{self, ShardRef};
 use super::sample::{N_KEYPOINTS, OPTIONAL_EXTENSIONS, WORDS_EXTENSION};
 use super::split::{Split, SplitBy, SplitRule, TimeBlock};
@@ -49,7 +50,6 @@ pub struct DatasetInfo {
     pub videos: Vec<DatasetVideo>,
 }
 
-/// Video of the dataset.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct DatasetVideo {
     pub name: String,
@@ -141,6 +141,25 @@ impl About {
 }
 
 impl DatasetInfo {
+    /// What to change so that `orator run` also fills an empty split.
+    pub fn empty_split_fix(&self) -> &'static str {
+        let is_by_time = self.split_rule.as_ref().is_some_and(|rule| rule.unit == SplitUnit::Time);
+        let are_named = self.videos.iter().any(|video| video.samples > 0 && video.split_by == SplitBy::Name);
+        match (is_by_time, are_named) {
+            (true, false) => {
+                "too little footage was accepted to divide it (about a minute is enough for three splits); add videos"
+            }
+            (true, true) => {
+                "videos with a split named under [[speaker]] are not divided: add videos, or remove the names and \
+                 splits/SPEAKER.json in the work folder"
+            }
+            (false, true) => {
+                "add videos, or remove the splits named under [[speaker]] and set `split_by = \"time\"` under [dataset]"
+            }
+            (false, false) => "add videos, or set `split_by = \"time\"` under [dataset] to divide all videos again",
+        }
+    }
+
     /// Contents for a dataset; `bones` are the speaker's 48 bone lengths, metres.
     pub fn new(about: &About, bones: &[f32], splits: BTreeMap<Split, SplitInfo>, videos: Vec<DatasetVideo>) -> Self {
         let About { speaker, tool, fps, models, licence, consent, source, notes, no_sound, split_rule } = about.clone();
@@ -257,6 +276,26 @@ pub fn keypoint_names() -> Vec<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// The setting that is already active is not proposed.
+    #[test]
+    fn the_remedy_of_an_empty_split_fits_its_rule() {
+        let about = About::new("anna", FrameRate::new(15, 1));
+        let remedy = |unit, split_by| {
+            let (name, file, content) = (String::new(), String::new(), String::new());
+            let (split, blocks) = (Some(Split::Train), Vec::new());
+            let video = DatasetVideo { name, file, content, split, split_by, blocks, samples: 1, secs: 9.0 };
+            let mut info = DatasetInfo::new(&about, &[0.2; N_JOINTS - 1], BTreeMap::new(), vec![video]);
+            info.split_rule = Some(SplitRule { unit, why: String::new(), guard_secs: 0.0 });
+            info.empty_split_fix()
+        };
+        let by_time = "set `split_by = \"time\"`";
+        assert!(remedy(SplitUnit::Video, SplitBy::Share).contains(by_time));
+        let named = remedy(SplitUnit::Video, SplitBy::Name);
+        assert!(named.contains(by_time) && named.contains("remove the splits named under [[speaker]]"), "{named}");
+        assert!(remedy(SplitUnit::Time, SplitBy::Time).starts_with("too little footage was accepted to divide it"));
+        assert!(remedy(SplitUnit::Time, SplitBy::Name).contains("named under [[speaker]] are not divided"));
+    }
 
     #[test]
     fn keypoint_names_are_unique() {

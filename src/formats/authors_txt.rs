@@ -117,11 +117,4 @@ mod tests {
         assert!(error_of(&format!("1 0 0 {line}\n")).contains("line 1: the first joint"));
         assert!(error_of("\n\n").contains("no frames"));
     }
-
-    proptest::proptest! {
-        #[test]
-        fn no_text_panics(text in "([0-9.eE+-]{1,6}[ \n]){0,30}|.{0,60}") {
-            let _ = parse(&text, FPS);
-        }
-    }
 }

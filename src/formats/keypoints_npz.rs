@@ -2,7 +2,8 @@
 //! px, score), `left_hand`, `right_hand` f32 [T,21,3], `image_size` i64 [2] (width, height), `fps` f64 [2]
 //! (numerator, denominator; one number is also accepted), `time_secs` f64 [T], `person` f32 [T,5] (x, y, width,
 //! height, score), `n_persons` i64 [T], `identity` i64 [T], `other_hand` i64 [T,2] (1: this hand was a duplicate of
-//! the other one); with a face model also `mouth_opening`, `face_score` f32 [T].
+//! the other one); with a hand model with depth `hand_depth` f32 [T,2,21] (px); with a face model `mouth_opening`,
+//! `face_score` f32 [T].
 
 use super::keypoints::range;
 use super::npz::{self, Npz};
@@ -110,6 +111,9 @@ pub(super) fn read_as_written(path: &Path) -> Result<(Keypoints, Option<[u32; 2]
     };
     let left_hand = hand("left_hand", &mut notes)?;
     let right_hand = hand("right_hand", &mut notes)?;
+    let depth_shape = [Some(n_frames), Some(2), Some(N_HAND)];
+    let hand_depth = npz.has("hand_depth").then(|| npz.floats("hand_depth", &depth_shape)).transpose()?;
+    let hand_depth = hand_depth.map(ArrayD::into_dimensionality::<Ix3>).transpose()?;
     let fps = if npz.has("fps") {
         npz.frame_rate("fps")?
     } else {
@@ -133,7 +137,7 @@ pub(super) fn read_as_written(path: &Path) -> Result<(Keypoints, Option<[u32; 2]
     };
     let extent = |axis: usize| body.slice(ndarray::s![.., .., axis]).fold(1.0f32, |m, &v| m.max(v)).min(1e6).ceil();
     let image_size = known_size.unwrap_or_else(|| [extent(0) as u32, extent(1) as u32]);
-    Ok((Keypoints { fps, image_size, body, left_hand, right_hand }, known_size, notes))
+    Ok((Keypoints { fps, image_size, body, left_hand, right_hand, hand_depth }, known_size, notes))
 }
 
 /// Reads the arrays other than the keypoints.
@@ -174,6 +178,9 @@ pub fn write(path: &Path, keypoints: &Keypoints, extras: &Extras) -> Result<()> 
         npz.add_array("person", &extras.person)?;
         npz.add_array("n_people", &extras.n_persons)?;
         npz.add_array("identity", &extras.identity)?;
+        if let Some(hand_depth) = &keypoints.hand_depth {
+            npz.add_array("hand_depth", hand_depth)?;
+        }
         if extras.other_hand.iter().any(|other| *other) {
             npz.add_array("other_hand", &extras.other_hand.mapv(i64::from))?;
         }
@@ -238,6 +245,7 @@ mod tests {
                 fps: FrameRate::new(30_000, 1001),
                 image_size: sides,
                 body: points(N_BODY),
+                hand_depth: Some(Array3::from_elem((n_frames, 2, N_HAND), numbers[0])),
                 left_hand: points(N_HAND),
                 right_hand: points(N_HAND),
             };

@@ -141,10 +141,6 @@ impl MediaInfo {
     }
 
     /// Reads `media.json`.
-    ///
-    /// # Errors
-    ///
-    /// The file is unreadable or incomplete, or has an invalid duration or frame rate.
     pub fn read(path: &Path) -> Result<Self> {
         let bytes = input::read(path, input::MAX_TEXT).with_context(|| format!("cannot read {}", path.display()))?;
         let info: Self =

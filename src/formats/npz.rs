@@ -67,10 +67,6 @@ impl Npz {
     }
 
     /// Numeric array of any float or integer type, converted to f64.
-    ///
-    /// # Errors
-    ///
-    /// The array is missing, or has another shape or an unsupported type.
     pub fn numbers(&mut self, name: &str, shape: &[AxisLength]) -> Result<ArrayD<f64>> {
         let found = npy::numbers(&self.bytes(name)?);
         let Some(array) = self.readable(name, found)? else {
@@ -80,11 +76,6 @@ impl Npz {
         Ok(array)
     }
 
-    /// Float array as f32.
-    ///
-    /// # Errors
-    ///
-    /// Those of [`Npz::numbers`].
     pub fn floats(&mut self, name: &str, shape: &[AxisLength]) -> Result<ArrayD<f32>> {
         let bytes = self.bytes(name)?;
         if let Some(array) = self.readable(name, npy::typed(&bytes))? {
@@ -95,10 +86,6 @@ impl Npz {
     }
 
     /// Boolean array.
-    ///
-    /// # Errors
-    ///
-    /// The array is missing, or has another shape or type.
     pub fn bools(&mut self, name: &str, shape: &[AxisLength]) -> Result<ArrayD<bool>> {
         let found = npy::typed(&self.bytes(name)?);
         let Some(array) = self.readable(name, found)? else {
@@ -364,28 +351,5 @@ mod tests {
         archive(&path, &npy_with_shape("(1000000000000,)"), zip::CompressionMethod::Stored);
         let text = format!("{:#}", Npz::open(&path).unwrap().floats("body", &[]).unwrap_err());
         assert!(text.contains("a.npz") && text.contains("body"), "{text}");
-    }
-
-    proptest::proptest! {
-        #![proptest_config(proptest::test_runner::Config::with_cases(24))]
-        #[test]
-        fn arrays_round_trip_and_damage_does_not_panic(
-            numbers in proptest::collection::vec(proptest::num::f64::ANY, 1..40),
-            damage in proptest::collection::vec((0usize..1000, proptest::num::u8::ANY), 1..6),
-        ) {
-            let dir = tempfile::tempdir().unwrap();
-            let path = file_with(dir.path(), |npz| npz.add_array("a", &Array1::from(numbers.clone())));
-            let found = Npz::open(&path).unwrap().numbers("a", &[Some(numbers.len())]).unwrap();
-            proptest::prop_assert!(found.iter().zip(&numbers).all(|(a, b)| a.to_bits() == b.to_bits()));
-            let mut bytes = std::fs::read(&path).unwrap();
-            for (at, value) in damage {
-                let at = at % bytes.len();
-                bytes[at] = value;
-            }
-            std::fs::write(&path, &bytes).unwrap();
-            if let Ok(mut npz) = Npz::open(&path) {
-                let _ = (npz.numbers("a", &[]), npz.frame_rate("a"), npz.text("a"), npz.bools("a", &[]));
-            }
-        }
     }
 }

@@ -31,10 +31,6 @@ pub struct FileBytes {
 
 impl FileMemory {
     /// Creates an empty file in `folder`.
-    ///
-    /// # Errors
-    ///
-    /// No temporary file can be created there.
     pub fn new(folder: &Path) -> Result<Self> {
         let create = || -> Result<Self> {
             let file = tempfile::tempfile_in(folder)?;
@@ -48,10 +44,6 @@ impl FileMemory {
     }
 
     /// Appends bytes.
-    ///
-    /// # Errors
-    ///
-    /// The disk or the file is full.
     pub fn append(&mut self, bytes: &[u8]) -> Result<FileBytes> {
         let (start, end) = (self.end, self.end.saturating_add(bytes.len() as u64));
         ensure!(end <= CAPACITY, "temporary data exceeds {} GiB", CAPACITY >> 30);

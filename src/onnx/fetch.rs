@@ -22,7 +22,6 @@ const MAX_DEPTH: usize = 3;
 pub enum FetchSource {
     /// Already present in the models folder.
     Present,
-    /// A file of the mirror.
     Mirror(PathBuf),
     /// Files of the mirror that are listed for this source.
     MirrorOf(ModelSource),

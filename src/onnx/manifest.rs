@@ -68,7 +68,6 @@ impl Manifest {
         Ok(manifest)
     }
 
-    /// The model with this id.
     pub fn get(&self, id: &str) -> Result<&ModelEntry> {
         self.models.iter().find(|entry| entry.id == id).with_context(|| {
             let known: Vec<_> = self.models.iter().map(|entry| entry.id.as_str()).collect();

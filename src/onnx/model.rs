@@ -87,7 +87,6 @@ impl Model {
         self.inside.as_secs_f64()
     }
 
-    /// Number of runs.
     pub fn n_runs(&self) -> u64 {
         self.n_runs
     }

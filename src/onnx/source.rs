@@ -11,7 +11,6 @@ use std::fmt;
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ModelSource {
-    /// Kind of source.
     pub from: SourceKind,
     /// URL prefix of the file paths; NAME@VERSION of an npm package, NAME==VERSION of a PyPI package.
     pub name: String,
@@ -36,14 +35,12 @@ pub struct PinnedFile {
     pub file: String,
     /// SHA-256 of the file, 64 hex digits.
     pub sha256: String,
-    /// Licence of the file.
     pub licence: String,
     /// Sources, in the order in which they are tried.
     #[serde(rename = "source")]
     pub sources: Vec<ModelSource>,
 }
 
-/// Kind of a source.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum SourceKind {
@@ -55,7 +52,6 @@ pub enum SourceKind {
     Pip,
 }
 
-/// A file in a source.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SourceFile {
@@ -72,7 +68,6 @@ pub struct SourceFile {
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Conversion {
-    /// The format of the source.
     pub format: SourceFormat,
     /// Names for the outputs of the source, in its order, "" for outputs to omit; if empty, the output names of the
     /// model.

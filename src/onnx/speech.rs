@@ -45,10 +45,6 @@ impl SpeechModel {
 
     /// Probability of speech, 0..1, in the next window of the audio; a window of fewer than 512 samples is padded
     /// with silence.
-    ///
-    /// # Errors
-    ///
-    /// The window is too long, or the outputs have another shape.
     pub fn probability(&mut self, window: &[f32]) -> Result<f32> {
         ensure!(window.len() <= WINDOW, "a window has {} samples, expected at most {WINDOW}", window.len());
         let (sound, silence) = self.input[CONTEXT..].split_at_mut(window.len());

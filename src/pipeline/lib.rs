@@ -25,7 +25,7 @@ pub mod timing;
 
 pub use pipeline::Pipeline;
 pub use run::{RunReport, RunState, Selection, StageCounts, UnitFailure, UnitReport};
-pub use stale_results::StaleResult;
+pub use stale_results::{ModelStatus, StaleResult};
 pub use status::{StagePlan, StatusReport, UnitState, UnitStatus};
 pub use time_budget::{BudgetKind, TimeBudget};
 

@@ -3,7 +3,7 @@
 
 use super::pipeline::Pipeline;
 use super::stages;
-use super::stale_results::{self, StaleResult};
+use super::stale_results::{self, ModelStatus, StaleResult};
 use super::time_budget::{TimeBudget, VideoProgress};
 use anyhow::Result;
 use orator_base::stage::artifacts::StageName;
@@ -29,7 +29,9 @@ pub struct StatusReport {
     /// Total over all speakers.
     #[serde(skip)]
     pub total: TimeBudget,
-    /// Datasets and models made by an older lifter.
+    /// Models of the speakers that have a dataset.
+    pub models: Vec<ModelStatus>,
+    /// Datasets and models to rebuild.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub stale: Vec<StaleResult>,
     /// Whether the seconds of every video add up to its duration.
@@ -160,7 +162,7 @@ impl Pipeline {
         }
         // Failing to save the hash cache only costs recomputation.
         hashes.save().unwrap_or_default();
-        report.stale = stale_results::find(work, &has_other_lifter);
+        (report.stale, report.models) = stale_results::find(work, &has_other_lifter);
         report.plan = plan(&report.units);
         report.adds_up = report.total.n_mismatched == 0;
         Ok(report)

@@ -17,5 +17,12 @@ pub(crate) fn bodies<const N: usize>(
         }
     }
     let hand = Array3::zeros((n_frames, 21, 3));
-    Keypoints { fps: FrameRate::new(15, 1), image_size, body, left_hand: hand.clone(), right_hand: hand }
+    Keypoints {
+        fps: FrameRate::new(15, 1),
+        image_size,
+        body,
+        left_hand: hand.clone(),
+        right_hand: hand,
+        hand_depth: None,
+    }
 }

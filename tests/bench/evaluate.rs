@@ -144,6 +144,6 @@ fn evaluate(speaker: Vec<RawClip>, watch: &Stopwatch) -> Result<(table::Table, S
     let length = text::text(&table, true).len() + result::json(&table).to_string().len();
     ensure!(length > 0, "the result is empty");
     watch.detail("the page");
-    let html = page::html(&table, &clips, "bench")?;
+    let html = page::html(&table, &clips, "bench", None)?;
     Ok((table, html))
 }

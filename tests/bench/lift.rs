@@ -115,6 +115,7 @@ fn rule_based_keypoints(n_frames: usize) -> Keypoints {
     let mut keypoints = Keypoints {
         fps: FrameRate::new(15, 1),
         image_size: [1280, 720],
+        hand_depth: None,
         body: Array3::zeros((n_frames, 17, 3)),
         left_hand: none.clone(),
         right_hand: none,

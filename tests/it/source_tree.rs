@@ -161,7 +161,7 @@ fn folders_have_at_most_16_files_and_mod_files_no_code() {
 /// Names of the structs, enums and traits that `text` defines outside of its tests.
 fn types(text: &str) -> Vec<String> {
     let tokens = tokens(without_tests(&without_comments(text)));
-    let defines = |pair: &[String]| ["struct", "enum", "trait"].contains(&pair[0].as_str());
+    let defines = |pair: &[String]| ["struct", "enum", "trait"].contains(&pair[0].as_str()) && pair[1] != "$";
     tokens.windows(2).filter(|pair| defines(pair)).map(|pair| pair[1].clone()).collect()
 }
 

@@ -5,12 +5,13 @@ use super::retarget::captured_body::{CapturedBody, CapturedPart};
 use super::rig::constraints::{ClampCounter, Clamps, Constraints};
 use super::rig::rig::{CM, Rig};
 use super::solve::arm::{SolveFilters, rotations};
+use super::solve::hand_fit::with_fitted_hands;
 use super::solve::legs::Legs;
 use super::solve::positions::JointPositions;
 use super::solve::smoothing::Smoothing;
 use super::solve::track::RotationTrack;
 use super::solve::{head, trunk};
-use ndarray::{Array2, Array3};
+use ndarray::{Array2, Array3, ArrayView1};
 use orator_base::math::rotation::Rotation;
 use orator_base::math::vec3::{Vec3, scale};
 use orator_base::motion::jerk;
@@ -20,7 +21,11 @@ use orator_base::types::skeleton::{L_HAND, L_SHOULDER, N_HAND_JOINTS, N_JOINTS, 
 use orator_base::types::time::FrameRate;
 use orator_formats::bvh::write::BvhClip;
 use serde::Serialize;
+use std::collections::BTreeMap;
 use std::ops::Range;
+
+/// Largest share of clamped finger angles of a clip with usable fingers; clips of real hands have at most 10 %.
+pub const MAX_FINGER_CLAMPS: f64 = 0.25;
 
 /// Settings of the animation.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -62,8 +67,14 @@ pub struct AnimationReport {
     pub clamps: Vec<Clamps>,
     /// Number of frames in which the head was detected; `None` without a posture.
     pub face_frames: Option<usize>,
+    /// Share of the finger angles that exceeded their limits, and whether it is above [`MAX_FINGER_CLAMPS`].
+    pub finger_clamps: f64,
+    pub fingers_unusable: bool,
     /// Number of frames in which each limb was detected.
     pub detected: DetectedFrames,
+    /// Joints that were detected, [T, 49], at the motion's own rate.
+    #[serde(skip)]
+    pub visible: Array2<bool>,
     /// Parts that move as in the capture the motion was read from.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub captured: Vec<CapturedPart>,
@@ -84,23 +95,61 @@ pub struct DetectedFrames {
 }
 
 impl DetectedFrames {
-    fn count(motion: &Motion) -> Self {
-        let finite = finite_joints(motion);
-        let is_detected = |t: usize, joint: usize| {
-            finite[[t, joint]] && motion.mask.get([t, joint]).is_none_or(|&is_visible| is_visible)
-        };
-        let frames = |joints: Range<usize>, min_joints: usize| {
-            let enough = |t: &usize| joints.clone().filter(|&joint| is_detected(*t, joint)).count() >= min_joints;
-            (0..motion.n_frames()).filter(enough).count()
-        };
-        let arm = |shoulder: usize| frames(shoulder..shoulder + 3, 3);
-        let hand = |root: usize| frames(root + 1..root + N_HAND_JOINTS, N_HAND_JOINTS / 2);
-        Self {
-            left_arm: arm(L_SHOULDER),
-            right_arm: arm(R_SHOULDER),
-            left_hand: hand(L_HAND),
-            right_hand: hand(R_HAND),
+    /// Counts the frames of `visible` [T, 49].
+    fn count(visible: &Array2<bool>) -> Self {
+        let [left_arm, right_arm, left_hand, right_hand] =
+            LIMBS.each_ref().map(|limb| visible.outer_iter().filter(|frame| limb.is_visible(frame.view())).count());
+        Self { left_arm, right_arm, left_hand, right_hand }
+    }
+}
+
+/// A limb, which is visible if at least `min_joints` of its joints are.
+struct DetectedLimb {
+    name: &'static str,
+    joints: Range<usize>,
+    min_joints: usize,
+}
+
+static LIMBS: [DetectedLimb; 4] = [
+    DetectedLimb { name: "left arm", joints: L_SHOULDER..L_SHOULDER + 3, min_joints: 3 },
+    DetectedLimb { name: "right arm", joints: R_SHOULDER..R_SHOULDER + 3, min_joints: 3 },
+    DetectedLimb { name: "left hand", joints: L_HAND + 1..L_HAND + N_HAND_JOINTS, min_joints: N_HAND_JOINTS / 2 },
+    DetectedLimb { name: "right hand", joints: R_HAND + 1..R_HAND + N_HAND_JOINTS, min_joints: N_HAND_JOINTS / 2 },
+];
+
+impl DetectedLimb {
+    fn is_visible(&self, frame: ArrayView1<bool>) -> bool {
+        self.joints.clone().filter(|&joint| frame[joint]).count() >= self.min_joints
+    }
+}
+
+impl AnimationReport {
+    /// Visible joints [49] in a frame of a clip that has `n_frames` frames for the complete motion.
+    fn frame(&self, frame_idx: usize, n_frames: usize) -> Option<ArrayView1<'_, bool>> {
+        let last = self.visible.nrows().checked_sub(1)?;
+        Some(self.visible.row((frame_idx * (last + 1) / n_frames.max(1)).min(last)))
+    }
+
+    /// Limbs that were not detected in a frame of a clip that has `n_frames` frames for the complete motion.
+    pub fn hidden_limbs(&self, frame_idx: usize, n_frames: usize) -> Vec<&'static str> {
+        let Some(frame) = self.frame(frame_idx, n_frames) else { return Vec::new() };
+        LIMBS.iter().filter(|limb| !limb.is_visible(frame)).map(|limb| limb.name).collect()
+    }
+
+    /// Frames [start, end) in which each limb was not detected, in a clip of `n_frames` frames; limbs that were always
+    /// detected are left out.
+    pub fn hidden_ranges(&self, n_frames: usize) -> BTreeMap<&'static str, Vec<[usize; 2]>> {
+        let mut hidden = BTreeMap::<&'static str, Vec<[usize; 2]>>::new();
+        for frame_idx in 0..n_frames {
+            for limb in self.hidden_limbs(frame_idx, n_frames) {
+                let ranges = hidden.entry(limb).or_default();
+                match ranges.last_mut() {
+                    Some([_, end]) if *end == frame_idx => *end += 1,
+                    _ => ranges.push([frame_idx, frame_idx + 1]),
+                }
+            }
         }
+        hidden
     }
 }
 
@@ -127,8 +176,9 @@ pub struct Performance {
 /// Animates a motion on a rig with its own bone lengths; a `posture` turns head and trunk without moving joints
 /// relative to the neck.
 ///
-/// Joint limits are applied before smoothing, so that a misplaced joint does not distort neighbouring frames, and again
-/// after smoothing and at the output rate, so that they hold in every written frame.
+/// Joint limits are applied before directions are smoothed, so that a misplaced joint does not distort neighbouring
+/// frames, and again after smoothing and at the output rate, so that they hold in every written frame. Noise of hands
+/// is reduced before, since limits would add to the error of noisy fingers; the report counts the input's angles.
 pub fn perform(motion: &Motion, posture: Option<&Posture>, options: &AnimationOptions) -> Performance {
     perform_on(Rig::from_motion(motion), motion, posture, options)
 }
@@ -162,14 +212,18 @@ fn animate(
         clip
     };
     let mut counter = ClampCounter::default();
-    let mut positions = JointPositions::from_motion(motion);
+    let filters = SolveFilters::new(options.smoothing, motion.fps);
+    let mut positions = with_fitted_hands(JointPositions::from_motion(motion), &filters.fingers);
     if options.constraints != Constraints::NONE {
-        let unfiltered = rotations(&positions, &rig, &SolveFilters::new(Smoothing::None, motion.fps));
-        let within = constrained(clip_of(&unfiltered), &mut counter);
+        let limited = |positions: &JointPositions, counter: &mut ClampCounter| {
+            let unfiltered = SolveFilters::new(Smoothing::None, motion.fps);
+            constrained(clip_of(&rotations(positions, &rig, &unfiltered)), counter)
+        };
+        limited(&JointPositions::from_motion(motion), &mut counter);
+        let within = limited(&positions, &mut ClampCounter::default());
         let frames: Vec<Vec<Vec3>> = (0..within.n_frames()).map(|t| within.positions(t)).collect();
         positions = positions.with_positions(|t, joint| scale(frames[t][rig.positions[joint]], 1.0 / CM));
     }
-    let filters = SolveFilters::new(options.smoothing, motion.fps);
     let mut tracks = rotations(&positions, &rig, &filters);
     let face_frames = posture.map(|posture| head::turn(posture, &rig, &filters, &mut tracks));
     if options.yaw == Yaw::Removed {
@@ -202,13 +256,17 @@ fn animate(
     };
     let arms = [R_SHOULDER, L_SHOULDER].into_iter().flat_map(|shoulder| (shoulder..shoulder + 3).map(|j| (j, NECK)));
     let hands = [R_HAND, L_HAND].into_iter().flat_map(|root| (root + 1..root + 21).map(move |j| (j, root)));
+    let (visible, finger_clamps) = (detected_joints(motion), counter.finger_share());
     let report = AnimationReport {
         n_frames: motion.n_frames(),
         arms: jerk(&arms.collect::<Vec<_>>()),
         hands: jerk(&hands.collect::<Vec<_>>()),
         clamps: if options.constraints == Constraints::NONE { Vec::new() } else { counter.clamps() },
         face_frames,
-        detected: DetectedFrames::count(motion),
+        finger_clamps,
+        fingers_unusable: finger_clamps > MAX_FINGER_CLAMPS,
+        detected: DetectedFrames::count(&visible),
+        visible,
         captured,
     };
     Performance { clip: resampled.unwrap_or(clip), rig, report }
@@ -221,9 +279,17 @@ impl Performance {
         Self { rig: self.rig.clone(), clip: self.clip.resampled(fps), report: self.report.clone() }
     }
 
-    /// Joints [T, 49, 3] of the rig (metres, axes of `types::skeleton`, neck at the origin) at the clip's rate.
+    /// Joints [T, 49, 3] of the rig (metres, axes of `types::skeleton`, neck at the origin) at the clip's rate; the
+    /// mask has the joints that were detected.
     pub fn motion(&self) -> Motion {
-        Motion::from_joints(self.clip.fps, joints(&self.rig, &self.clip))
+        let mut motion = Motion::from_joints(self.clip.fps, joints(&self.rig, &self.clip));
+        let n_frames = motion.n_frames();
+        for (frame_idx, mut mask) in motion.mask.outer_iter_mut().enumerate() {
+            if let Some(visible) = self.report.frame(frame_idx, n_frames) {
+                mask.assign(&visible);
+            }
+        }
+        motion
     }
 }
 
@@ -244,4 +310,13 @@ fn joints(rig: &Rig, clip: &BvhClip) -> Array3<f32> {
 /// Mask [T, 49] of the joints with finite coordinates, detected or filled.
 fn finite_joints(motion: &Motion) -> Array2<bool> {
     motion.joints.map_axis(ndarray::Axis(2), |position| position.iter().all(|v| v.is_finite()))
+}
+
+/// Mask [T, 49] of the joints that were detected: with finite coordinates, and not filled.
+fn detected_joints(motion: &Motion) -> Array2<bool> {
+    let mut detected = finite_joints(motion);
+    for (at, is_detected) in detected.indexed_iter_mut() {
+        *is_detected &= motion.mask.get(at).is_none_or(|&is_visible| is_visible);
+    }
+    detected
 }

@@ -13,7 +13,6 @@ const MAX_SAMPLE_OFFSET: i32 = 6;
 pub const NO_TRIANGLE: u32 = u32::MAX;
 /// Width of the cells of the hierarchical depth test, px.
 const CELL: usize = 8;
-/// Number of rows in a band.
 pub const BAND_ROWS: usize = 16;
 
 /// Pixels that may have a sample within a triangle: half-open ranges of columns and rows.

@@ -226,7 +226,6 @@ impl Surfaces {
         self.size[0]
     }
 
-    /// Number of vertices.
     pub fn n_vertices(&self) -> usize {
         self.vertices.len()
     }

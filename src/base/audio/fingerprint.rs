@@ -100,29 +100,11 @@ mod tests {
         fingerprinter.finish()
     }
 
-    fn bit_error_rate(a: &[u32], b: &[u32]) -> f64 {
-        let wrong: u32 = a.iter().zip(b).map(|(a, b)| (a ^ b).count_ones()).sum();
-        f64::from(wrong) / (32 * a.len().min(b.len())) as f64
-    }
-
     #[test]
     fn codes_are_independent_of_chunk_lengths_and_silence_is_zero() {
         let sound = babble(4, 1);
         assert_eq!(codes(&sound, 64_000), codes(&sound, 777));
         assert_eq!(codes(&sound, 999).len(), (64_000 - WINDOW) / HOP + 1);
         assert!(codes(&vec![0.0; 20_000], 512).iter().all(|code| *code == 0));
-    }
-
-    #[test]
-    fn copies_are_similar_and_other_audio_is_not() {
-        let sound = babble(10, 1);
-        let original = codes(&sound, 4096);
-        // Shifted by half a hop (the worst case), quieter, and with noise 20 dB below the signal.
-        let mut rng = ChaCha8Rng::seed_from_u64(5);
-        let level = (sound.iter().map(|v| v * v).sum::<f32>() / sound.len() as f32).sqrt();
-        let copy: Vec<f32> = sound[256..].iter().map(|v| 0.3 * (v + level * rng.random_range(-0.17..0.17))).collect();
-        let near = bit_error_rate(&original, &codes(&copy, 4096));
-        let far = bit_error_rate(&original, &codes(&babble(10, 2), 4096));
-        assert!(near < 0.25 && (far - 0.5).abs() < 0.03, "{near} {far}");
     }
 }

@@ -37,6 +37,10 @@ pub type Pose = [Vec3; N_POINTS];
 /// Nine keypoints of a picture, x and y in px; `None`: not visible.
 pub type BodyPoints = [Option<[f32; 2]>; N_POINTS];
 
+/// Directions of the right and the left hand of a frame, from the wrist to the mean of the four knuckles, as unit
+/// vectors in camera axes; `None`: not known.
+pub type HandDirections = [Option<[f32; 3]>; 2];
+
 /// Size in metres, in the sense of `size`, to which every body is scaled, because a picture does not show a person's
 /// size.
 pub const REFERENCE_SIZE: f64 = 0.90;

@@ -25,9 +25,6 @@ pub struct Fingerprint {
 
 impl Fingerprint {
     /// Computes the current fingerprint of `unit` at `stage`.
-    ///
-    /// # Errors
-    /// An input cannot be read.
     pub fn now(stage: &dyn Stage, unit: &Unit, hashes: &HashCache) -> Result<Self> {
         let mut inputs = BTreeMap::new();
         for input in stage.inputs(unit)? {
@@ -74,17 +71,11 @@ impl HashCache {
     }
 
     /// Returns the BLAKE3 of the content of `path` in hex; folders are hashed as in [`hash_file`].
-    ///
-    /// # Errors
-    /// `path` cannot be read.
     pub fn hash(&self, path: &Path) -> Result<String> {
         Ok(self.content(path)?.hash)
     }
 
     /// Returns size and hash of the content of `path`, which is read only if it is not cached.
-    ///
-    /// # Errors
-    /// `path` cannot be read.
     pub fn content(&self, path: &Path) -> Result<KnownHash> {
         let (bytes, changed_ns) = size_and_change(path)?;
         let read = || Ok(KnownHash { bytes, changed_ns, hash: hash_file(path)? });
@@ -103,9 +94,6 @@ impl HashCache {
 
     /// Returns whether `path` still has this content. Equal size and modification time, or a different size, decide
     /// without reading; otherwise the content is hashed.
-    ///
-    /// # Errors
-    /// `path` cannot be read.
     pub fn is_unchanged(&self, path: &Path, content: &KnownHash) -> Result<bool> {
         let (bytes, changed_ns) = size_and_change(path)?;
         let is_same_size = bytes == content.bytes;

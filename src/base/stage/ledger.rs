@@ -68,14 +68,12 @@ impl std::ops::AddAssign for WordCount {
     }
 }
 
-/// An accepted interval.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct AcceptedInterval {
     pub start_secs: f64,
     pub end_secs: f64,
 }
 
-/// A rejected interval.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RejectedInterval {
     pub start_secs: f64,

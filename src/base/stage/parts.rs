@@ -34,9 +34,6 @@ pub fn parts_folder(folder: &Path) -> PathBuf {
 }
 
 /// Removes the parts of the unit in `folder`, if there are any.
-///
-/// # Errors
-/// The folder with the parts cannot be removed.
 pub fn remove_parts(folder: &Path) -> Result<()> {
     let parts = parts_folder(folder);
     workdir::remove(&parts).with_context(|| format!("cannot remove {}", parts.display()))
@@ -44,9 +41,6 @@ pub fn remove_parts(folder: &Path) -> Result<()> {
 
 impl SplitWork<'_> {
     /// Runs a part, unless it is already done.
-    ///
-    /// # Errors
-    /// Those of the stage.
     pub fn work_on(&self, part: usize) -> Result<()> {
         let folder = self.part_folder(part);
         let progress = self.overall.of_part(self.stage, self.unit, part, self.n_parts);

@@ -21,9 +21,6 @@ pub struct FileNameError(String);
 
 impl FileName {
     /// Checks a name.
-    ///
-    /// # Errors
-    /// The name violates the rules of [`FileName`].
     pub fn new(name: impl Into<String>) -> Result<Self, FileNameError> {
         let name = name.into();
         let is_plain = (1..=MAX_BYTES).contains(&name.len())

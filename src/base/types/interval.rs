@@ -11,7 +11,6 @@ pub struct Interval {
 }
 
 impl Interval {
-    /// Number of frames.
     pub fn n_frames(&self) -> usize {
         self.end.saturating_sub(self.start)
     }

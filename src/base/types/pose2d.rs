@@ -66,6 +66,9 @@ pub struct Pose2d {
     pub left_hand: [Keypoint; N_HAND],
     /// The speaker's right hand.
     pub right_hand: [Keypoint; N_HAND],
+    /// Depth of the points of the [left, right] hand relative to the wrist, in px, away from the camera; `None` for a
+    /// missing hand and for hand models without depth.
+    pub hand_depth: [Option<[f32; N_HAND]>; 2],
     /// Whether the detector found the opposite hand in the search regions of the [left, right] hand, which then counts
     /// as missing.
     pub other_hand: [bool; 2],
@@ -111,6 +114,9 @@ pub struct Keypoints {
     pub left_hand: Array3<f32>,
     /// [T, 21, 3]
     pub right_hand: Array3<f32>,
+    /// Depth of the points of the left and right hand relative to the wrist, in px, away from the camera, [T, 2, 21];
+    /// NaN: unknown. `None`: the hand model gives no depth.
+    pub hand_depth: Option<Array3<f32>>,
 }
 
 impl Keypoints {

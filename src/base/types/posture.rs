@@ -61,7 +61,6 @@ impl Posture {
         }
     }
 
-    /// Returns the frames in `frames`.
     pub fn slice(&self, frames: Range<usize>) -> Self {
         let [head, trunk] = [&self.head, &self.trunk].map(|of| of.slice(s![frames.clone(), ..]).to_owned());
         Self { head, trunk }

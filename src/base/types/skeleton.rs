@@ -57,7 +57,6 @@ pub const fn parent(joint: usize) -> Option<usize> {
     }
 }
 
-/// Returns the side of a joint.
 pub const fn side(joint: usize) -> Side {
     match joint {
         NECK => Side::Centre,

@@ -1,5 +1,7 @@
 //! Input motions of `orator animate`, with their face keypoints and audio.
 
+use crate::cli::motion::video::VisibleVideo;
+use crate::cli::outputs::is_same_file;
 use anyhow::{Context as _, Result, bail, ensure};
 use ndarray::{Array3, ArrayView3};
 use orator_avatar::animate::retarget::captured_body::CapturedBody;
@@ -16,6 +18,7 @@ use orator_dataset::{Dataset, Split};
 use orator_formats::mocap::facing::LengthUnit;
 use orator_formats::mocap::motion_file::{self, MotionFile};
 use orator_formats::{joints_npz, keypoints_npz};
+use orator_pipeline::lift;
 use std::path::{Path, PathBuf};
 use std::rc::Rc;
 
@@ -28,6 +31,7 @@ pub struct MotionInput {
 enum InputLocation {
     File(PathBuf),
     Sample(Rc<Dataset>, Box<SampleRef>),
+    Video(Box<VisibleVideo>),
 }
 
 /// A motion with its posture and audio.
@@ -122,12 +126,17 @@ fn of_dataset(path: &Path, sample: Option<&str>, split: Option<Split>) -> Result
 }
 
 impl MotionInput {
+    /// Everything that is visible in a video.
+    pub fn of_video(video: VisibleVideo) -> Self {
+        let name = video.path().file_stem().unwrap_or_default().to_string_lossy().into_owned();
+        Self { name, location: InputLocation::Video(Box::new(video)) }
+    }
+
     /// Whether the motion is read from that file.
     pub fn is_at(&self, path: &Path) -> bool {
         match &self.location {
-            InputLocation::File(file) => {
-                file == path || file.canonicalize().is_ok_and(|a| path.canonicalize().is_ok_and(|b| a == b))
-            }
+            InputLocation::File(file) => is_same_file(file, path),
+            InputLocation::Video(video) => is_same_file(video.path(), path),
             InputLocation::Sample(..) => false,
         }
     }
@@ -157,6 +166,18 @@ impl MotionInput {
                 let has_rate = has_rate || fps.is_some();
                 let body = CapturedBody::read(path, units)?;
                 InputMotion { motion, posture: None, body, is_seated: None, sound: None, has_rate, notes }
+            }
+            InputLocation::Video(video) => {
+                ensure!(
+                    fps.is_none() && units.is_none() && keypoints.is_none(),
+                    "{} is a video: --input-fps, --units and --keypoints do not apply",
+                    self.name
+                );
+                let (keypoints, lifted) = video.lift(&video.settings.lift)?;
+                let notes = lift::notes(&keypoints, &lifted).into_iter().collect();
+                check(&lifted.motion).with_context(|| format!("cannot animate {}", self.name))?;
+                let lifted = InputMotion::with_keypoints(lifted.motion, keypoints.body.view(), Some(&lifted.extra));
+                return Ok(InputMotion { notes, ..lifted });
             }
         };
         check(&loaded.motion).with_context(|| format!("cannot animate {}", self.name))?;
@@ -198,7 +219,11 @@ impl MotionInput {
     /// Path of an artifact in the run: `work/lift/SPEAKER/VIDEO/joints.npz` has its keypoints at
     /// `work/pose2d/SPEAKER/VIDEO/keypoints.npz`, and so on.
     fn of_run(&self, file: Artifact) -> Option<PathBuf> {
-        let InputLocation::File(path) = &self.location else { return None };
+        let path = match &self.location {
+            InputLocation::File(path) => path,
+            InputLocation::Video(video) => return Some(video.file(file)),
+            InputLocation::Sample(..) => return None,
+        };
         let folder = path.canonicalize().ok()?.parent()?.to_owned();
         let (video, speaker) = (folder.file_name()?, folder.parent()?.file_name()?);
         let lift = folder.parent()?.parent()?;

@@ -1,6 +1,6 @@
 //! Report of an animation as text.
 
-use orator_avatar::animate::performance::{AnimationReport, DetectedFrames, Jerk};
+use orator_avatar::animate::performance::{AnimationReport, DetectedFrames, Jerk, MAX_FINGER_CLAMPS};
 use orator_avatar::animate::retarget::captured_body::CapturedPart;
 use orator_base::text::counted;
 
@@ -33,6 +33,13 @@ pub(super) fn text(report: &AnimationReport) -> String {
             100.0 * clamps.share,
             clamps.mean_excess_degrees,
             clamps.largest_excess_degrees
+        );
+    }
+    if report.fingers_unusable {
+        text += &format!(
+            "fingers: unusable, {:.0} % of their angles exceed the joint limits (usable: up to {:.0} %)\n",
+            100.0 * report.finger_clamps,
+            100.0 * MAX_FINGER_CLAMPS
         );
     }
     text

@@ -8,6 +8,7 @@ use super::retarget_args::{OpenedRig, RetargetArgs};
 use crate::cli::Outcome;
 use crate::cli::config_args::split;
 use crate::cli::figure_args::FigureArgs;
+use crate::cli::motion::video::VisibleVideo;
 use crate::cli::outputs::{OutputFiles, names, next_output, outputs};
 use crate::cli::sandbox::enter_sandbox;
 use crate::cli::ui::Ui;
@@ -33,11 +34,14 @@ use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-/// Convert motion to BVH, FBX, glTF, VRM, video and other formats.
+/// Animate a video, or convert motion to BVH, FBX, glTF, VRM, video and other formats.
 ///
 /// Joint positions become rotations of a full body, smoothed and limited to possible joint angles.
 ///
-/// IN is a motion: .npy (joints [frames, 49, 3], metres; the frame rate is in .npy.json), .txt (layout of Rebol et
+/// IN is a video: everything in which the speaker is visible is lifted as by `orator lift`, fit for training or not,
+/// and an .mp4 shows the avatar beside the video and marks the limbs that are not visible.
+///
+/// Or IN is a motion: .npy (joints [frames, 49, 3], metres; the frame rate is in .npy.json), .txt (layout of Rebol et
 /// al. 2021), joints.npz or the folder of a lifted video (work/lift/SPEAKER/VIDEO), or a dataset
 /// (work/dataset/SPEAKER) with --sample. With --format, IN may also be a folder of motions, the folder of lifted
 /// videos of a speaker or an entire dataset; --out is then a folder.
@@ -53,10 +57,10 @@ use std::time::Instant;
 ///
 /// Smoothing removes noise that is estimated for each bone; motion without noise changes by a few millimetres at
 /// most. The limits of elbow, forearm, wrist and finger joints were measured in motion capture; the report counts
-/// every clamped angle.
+/// every clamped angle. Above 25 % of the finger angles, the fingers are reported as unusable.
 #[derive(clap::Args)]
 pub struct Args {
-    /// Motion to convert, or a folder of motions.
+    /// Video or motion to convert, or a folder of motions.
     #[arg(value_name = "IN")]
     input: PathBuf,
     /// File to write; may be repeated. With --format: a single output folder.
@@ -116,12 +120,20 @@ pub struct Args {
     curl_coherence: bool,
 }
 
-pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
+pub fn run(mut args: Args, ui: &Ui) -> Result<Outcome> {
+    let video = VisibleVideo::find(&args.input, ui)?;
+    let is_film = |path: &PathBuf| ExportFormat::from_path(path).is_ok_and(|format| format == ExportFormat::Mp4);
+    if video.is_some() && args.compare.is_none() && (args.out.iter().any(is_film) || !args.format.is_empty()) {
+        args.compare = Some(args.input.clone());
+    }
     let written = args.out.iter().map(PathBuf::as_path).chain(args.retarget.writes());
     enter_sandbox(written, [args.input.as_path()].into_iter().chain(args.retarget.reads()));
     let options = options(&args)?;
     let rig = args.retarget.open()?;
-    let inputs = inputs(&args.input, args.sample.as_deref(), args.split)?;
+    let inputs = match video {
+        Some(video) => vec![MotionInput::of_video(video)],
+        None => inputs(&args.input, args.sample.as_deref(), args.split)?,
+    };
     if !args.format.is_empty() {
         return animate_folder(&args, &inputs, rig.as_ref(), &options, ui);
     }
@@ -145,7 +157,7 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     check_effect(&args, &outputs)?;
     let sound = args.audio.as_deref().map(audio::read_sound).transpose()?;
     let done = animate(&args, input, (sound, rig.as_ref()), &outputs, &options, ui)?;
-    let next = next_output(&outputs).map(|out| {
+    let next = next_output(&outputs, is_read).map(|out| {
         let sample = args.sample.as_ref().map(|key| format!(" --sample {key}")).unwrap_or_default();
         format!("orator animate {}{sample} --out {}", args.input.display(), out.display())
     });

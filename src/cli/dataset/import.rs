@@ -181,7 +181,10 @@ pub fn verify_deep(dataset: &Path) -> String {
 
 /// The command that trains on a dataset in any folder.
 pub fn train_gan(dataset: &Path) -> String {
-    format!("orator train gan --dataset {0} --out {0}-gan", dataset.display())
+    let work = dataset.parent().filter(|folder| folder.ends_with("dataset")).and_then(Path::parent);
+    let of_run = work.zip(dataset.file_name()).map(|(work, speaker)| work.join("gan").join(speaker));
+    let beside = || PathBuf::from(format!("{}-gan", dataset.display()));
+    format!("orator train gan --dataset {} --out {}", dataset.display(), of_run.unwrap_or_else(beside).display())
 }
 
 fn text(line: &ImportOutcome) -> String {
@@ -190,5 +193,18 @@ fn text(line: &ImportOutcome) -> String {
         "kept" => format!("imported  {file}: {message}"),
         "failed" => format!("failed    {file}: {message}"),
         _ => format!("rejected  {file}: {reason}: {message}"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn no_model_is_proposed_among_the_datasets() {
+        let out = |dataset: &str| train_gan(Path::new(dataset)).rsplit(' ').next().map(str::to_owned);
+        assert_eq!(out("work/dataset/host"), Some("work/gan/host".to_owned()));
+        assert_eq!(out("dataset/host"), Some("gan/host".to_owned()));
+        assert_eq!(out("speech"), Some("speech-gan".to_owned()));
     }
 }

@@ -1,6 +1,6 @@
 //! `orator evaluate`.
 
-mod speakers;
+pub mod speakers;
 pub mod verb;
 
 pub use verb::{Args, run};

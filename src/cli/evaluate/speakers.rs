@@ -26,10 +26,18 @@ use std::path::{Path, PathBuf};
 pub(super) const ALL: &str = "all";
 
 /// Dataset and model of a speaker, `work/dataset/NAME` and `work/gan/NAME`.
-pub(super) struct SpeakerFolders {
-    name: String,
-    pub(super) dataset: PathBuf,
-    model: PathBuf,
+pub struct SpeakerFolders {
+    pub name: String,
+    pub dataset: PathBuf,
+    pub model: PathBuf,
+}
+
+impl SpeakerFolders {
+    /// Folders of a speaker in the work folder.
+    pub fn new(work: &Path, name: &str) -> Self {
+        let dataset = speaker_dir(work, StageName::Dataset, name);
+        Self { name: name.to_owned(), dataset, model: work.join("gan").join(name) }
+    }
 }
 
 /// Folders of the speakers that `which` selects: a name, or `all`.
@@ -46,12 +54,7 @@ pub(super) fn folders(config: &ConfigArgs, which: &str) -> Result<Vec<SpeakerFol
         config.file.display(),
         names.map(String::as_str).collect::<Vec<_>>().join(", ")
     );
-    let of_speaker = |name: &String| SpeakerFolders {
-        name: name.clone(),
-        dataset: speaker_dir(work, StageName::Dataset, name),
-        model: work.join("gan").join(name),
-    };
-    Ok(selected.into_iter().map(of_speaker).collect())
+    Ok(selected.into_iter().map(|name| SpeakerFolders::new(work, name)).collect())
 }
 
 /// Measures all `speakers` on `split`; a speaker that cannot be measured does not stop the others.
@@ -59,7 +62,7 @@ pub(super) fn run(speakers: &[SpeakerFolders], split: Split, settings: &MetricSe
     let (mut text, mut rows, mut n_failed) = (heading(split, settings), Vec::new(), 0);
     for speaker in speakers {
         match measure(speaker, split, settings, ui) {
-            Ok(table) => {
+            Ok((_, table)) => {
                 let _ = writeln!(text, "{:<16} {}", speaker.name, line(&table));
                 rows.push(row(&speaker.name, &table));
             }
@@ -84,14 +87,25 @@ pub(super) fn run(speakers: &[SpeakerFolders], split: Split, settings: &MetricSe
     Ok(if n_failed > 0 { Outcome::SomeFailed } else { Outcome::Done })
 }
 
-fn measure(speaker: &SpeakerFolders, split: Split, settings: &MetricSettings, ui: &Ui) -> Result<Table> {
+/// Evaluates the model of a speaker on `split` of its dataset.
+///
+/// # Errors
+/// A dataset, split or model that is missing or cannot be measured.
+pub fn measure(
+    speaker: &SpeakerFolders,
+    split: Split,
+    settings: &MetricSettings,
+    ui: &Ui,
+) -> Result<(Evaluation, Table)> {
     let _dataset = FolderLock::shared(&speaker.dataset)?;
     let _model = model_lock(&speaker.model)?;
     let dataset = Dataset::open(&speaker.dataset)?;
     let checkpoints = EvaluatedCheckpoint::open_all(std::slice::from_ref(&speaker.model), &dataset.info().speaker)?;
     let store = MotionStore::in_folder(&speaker.dataset, MEMORY_BYTES);
     let evaluation = Evaluation::of_generators(&dataset, &checkpoints, split, &store, ui)?;
-    evaluation.measure(settings, ui).with_context(|| format!("cannot measure the speaker {}", speaker.name))
+    let table = evaluation.measure(settings, ui);
+    let table = table.with_context(|| format!("cannot measure the speaker {}", speaker.name))?;
+    Ok((evaluation, table))
 }
 
 fn heading(split: Split, settings: &MetricSettings) -> String {

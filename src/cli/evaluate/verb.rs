@@ -158,7 +158,7 @@ fn motion(args: &MotionArgs, ui: &Ui) -> Result<Outcome> {
     let mut text = text::text(&table, args.all);
     if let Some(path) = &args.report {
         let title = format!("Evaluation of {}", title(args));
-        let html = page::html(&table, &evaluation.clips, &title)?;
+        let html = page::html(&table, &evaluation.clips, &title, None)?;
         workdir::write_file(path, html.as_bytes())?;
         text += &format!("\nwrote {} ({:.1} MB)\n", path.display(), html.len() as f64 / 1e6);
         facts["report"] = json!(path);

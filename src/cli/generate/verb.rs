@@ -134,7 +134,8 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     let seed =
         variants.first().and_then(|variant| variant.seed).map_or(String::new(), |seed| format!(" --seed {seed}"));
     // Motion on a captured skeleton can be written as .bvh only.
-    let next = outputs.first().and_then(next_output).filter(|_| !trained.is_captured()).map(|out| {
+    let next = outputs.first().and_then(|files| next_output(files, |path| is_same_file(path, audio)));
+    let next = next.filter(|_| !trained.is_captured()).map(|out| {
         let (checkpoint, audio, out) = (given.display(), audio.display(), out.display());
         format!("orator generate --checkpoint {checkpoint} --audio {audio}{flags}{carried}{seed} --out {out}")
     });

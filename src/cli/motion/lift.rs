@@ -1,5 +1,6 @@
 //! `orator lift`.
 
+use super::video::VisibleVideo;
 use crate::cli::Outcome;
 use crate::cli::sandbox::enter_sandbox;
 use crate::cli::ui::Ui;
@@ -20,9 +21,12 @@ use serde_json::json;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-/// Lift 2D keypoints to 3D joints.
+/// Lift a video or 2D keypoints to 3D joints.
 ///
-/// KEYPOINTS is one of: a folder of OpenPose (one JSON file per frame); JSON of MMPose, AlphaPose or COCO-WholeBody;
+/// Everything in which the speaker is visible is lifted, fit for training or not. The keypoints of a video are detected
+/// in the work folder of pipeline.toml in the current folder, else in `work`; `orator animate VIDEO` shows the motion.
+///
+/// Other INPUTs are: a folder of OpenPose (one JSON file per frame); JSON of MMPose, AlphaPose or COCO-WholeBody;
 /// arrays of MediaPipe or PATS (.npy, .npz); or the .npz of this program. The format is detected from the content.
 /// The .npz of this program holds `body` [T,17,3] (COCO-17; x px, y px, score) and optionally `left_hand` and
 /// `right_hand` [T,21,3] (wrist, then thumb to little finger, each from base to tip), `fps` and `image_size`.
@@ -36,8 +40,8 @@ use std::time::Instant;
 /// them to the neck) or from the ears.
 #[derive(clap::Args)]
 pub struct Args {
-    /// File or folder of 2D keypoints.
-    #[arg(value_name = "KEYPOINTS")]
+    /// Video, or file or folder of 2D keypoints.
+    #[arg(value_name = "INPUT")]
     keypoints: PathBuf,
     /// Frame rate of the keypoints, frames per second; defaults to that of the file. Required for formats of other
     /// programs that do not state one; the .npz of this program is then read at 15.
@@ -115,6 +119,7 @@ fn read_foreign(args: &Args) -> Result<(Keypoints, Vec<String>)> {
 }
 
 pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
+    let video = VisibleVideo::find(&args.keypoints, ui)?;
     enter_sandbox([Some(&args.out), args.extra.as_ref()].into_iter().flatten().map(PathBuf::as_path), []);
     let format = ExportFormat::from_path(&args.out).ok().filter(|format| format.holds_joints());
     let format = format
@@ -129,24 +134,32 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
             "--smooth-arms and --smooth-hands: expected 0 to 100 frames, found {sigma}"
         );
     }
-    let (keypoints, mut notes) = if is_ours(&args.keypoints) { read_own(&args)? } else { read_foreign(&args)? };
+    ensure!(
+        video.is_none() || (args.input_fps.is_none() && args.size.is_none()),
+        "{} is a video: --input-fps and --size apply to keypoints only",
+        args.keypoints.display()
+    );
     let settings = config::LiftConfig {
-        body_weights: args.body_weights.unwrap_or_default(),
-        hand_weights: args.hand_weights.unwrap_or_default(),
+        body_weights: args.body_weights.clone().unwrap_or_default(),
+        hand_weights: args.hand_weights.clone().unwrap_or_default(),
         smooth_arms: args.smooth_arms,
         smooth_hands: args.smooth_hands,
         level: args.level,
         ..config::LiftConfig::default()
     };
-    let lifter = Lifter::new(&settings)?;
-    ensure!(
-        keypoints.n_frames() > 0,
-        "{} has no frames: `body` is [0, 17, 3], expected [T, 17, 3] with T at least 1",
-        args.keypoints.display()
-    );
-    let started = Instant::now();
-    let lifted = lifter.lift_all(&keypoints).with_context(|| format!("cannot lift {}", args.keypoints.display()))?;
-    let secs = started.elapsed().as_secs_f64();
+    let (keypoints, lifted, mut notes, secs) = if let Some(video) = &video {
+        let started = Instant::now();
+        let (keypoints, lifted) = video.lift(&settings)?;
+        (keypoints, lifted, Vec::new(), started.elapsed().as_secs_f64())
+    } else {
+        let (keypoints, notes) = if is_ours(&args.keypoints) { read_own(&args)? } else { read_foreign(&args)? };
+        let (file, lifter) = (args.keypoints.display(), Lifter::new(&settings)?);
+        let expected = "expected [T, 17, 3] with T at least 1";
+        ensure!(keypoints.n_frames() > 0, "{file} has no frames: `body` is [0, 17, 3], {expected}");
+        let started = Instant::now();
+        let lifted = lifter.lift_all(&keypoints).with_context(|| format!("cannot lift {file}"))?;
+        (keypoints, lifted, notes, started.elapsed().as_secs_f64())
+    };
     notes.extend(orator_pipeline::lift::notes(&keypoints, &lifted));
     notes.iter().for_each(|note| ui.say(&format!("{}: {note}", args.keypoints.display())));
     let (motion, camera) = (&lifted.motion, lifted.cameras.first());
@@ -183,7 +196,11 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
         angle(pitch),
         args.out.display()
     );
-    let next = format!("orator animate {} --out {}", args.out.display(), args.out.with_extension("bvh").display());
+    let (input, film) = match &video {
+        Some(_) => (&args.keypoints, args.out.with_file_name("film.mp4")),
+        None => (&args.out, args.out.with_extension("bvh")),
+    };
+    let next = format!("orator animate {} --out {}", input.display(), film.display());
     let facts = json!({
         "out": args.out,
         "n_frames": n,

@@ -8,6 +8,7 @@ use anyhow::{Result, bail, ensure};
 use orator_avatar::animate::{AnimationOptions, perform};
 use orator_base::stage::Unit;
 use orator_base::stage::artifacts::Artifact;
+use orator_base::stage::ledger::Ledger;
 use orator_base::stage::progress::Progress as _;
 use orator_base::stage::workdir::{self, FolderLock};
 use orator_base::text::counted;
@@ -68,6 +69,8 @@ struct SheetFiles {
     pictures: PictureOptions,
     keypoints: PathBuf,
     joints: PathBuf,
+    /// Ledger with the reasons for frames without joints.
+    ledger: Option<PathBuf>,
     out: PathBuf,
 }
 
@@ -84,7 +87,7 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
             let title = video.file_name().unwrap_or_default().to_string_lossy().into_owned();
             let pictures = PictureOptions::default();
             let (video, keypoints, joints) = (video.clone(), keypoints.clone(), joints.clone());
-            vec![SheetFiles { title, video, pictures, keypoints, joints, out }]
+            vec![SheetFiles { title, video, pictures, keypoints, joints, ledger: None, out }]
         }
         _ => {
             let pipeline = Pipeline::open(args.config.load()?)?;
@@ -143,6 +146,7 @@ fn of_run(pipeline: &Pipeline, args: &Args) -> Result<Vec<SheetFiles>> {
                 pictures: picture_options(work, &unit),
                 keypoints: Artifact::Keypoints.path(work, &unit),
                 joints: Artifact::Joints.path(work, &unit),
+                ledger: Some(Artifact::LiftLedger.path(work, &unit)),
                 out: folder.join(&unit.speaker).join(format!("{}.png", unit.video)),
                 video: unit.source,
             });
@@ -168,7 +172,9 @@ fn draw(files: &SheetFiles, every_secs: f64, figure: bool, ui: &Ui) -> Result<(V
     let figure = figure.then(|| perform(&motion, None, &AnimationOptions::default()).motion());
     let figure = figure.as_ref();
     let (title, video, pictures) = (&files.title, &files.video, files.pictures);
-    let clip = SheetClip { title, video, pictures, keypoints: &keypoints, motion: &motion, figure };
+    let rejected = files.ledger.as_deref().map(Ledger::read).transpose()?.unwrap_or_default().rejected;
+    let clip =
+        SheetClip { title, video, pictures, keypoints: &keypoints, motion: &motion, rejected: &rejected, figure };
     let mut written = Vec::new();
     clip.pages(every_secs, ui, |number, n_pages, page| {
         let path = if n_pages == 1 { files.out.clone() } else { numbered(&files.out, number) };
@@ -185,18 +191,19 @@ fn numbered(path: &Path, number: usize) -> PathBuf {
     path.with_file_name(format!("{stem}_{number:03}.png"))
 }
 
-type Row = (&'static str, &'static str, fn(&ArmStatistics) -> f64);
+type Row = (&'static str, &'static str, fn(&ArmStatistics) -> f64, &'static str);
 
-/// Label in the table, key in JSON, value.
+/// Label in the table, key in JSON, value, usual values. The usual lengths are those of adults; the usual jitter at 15
+/// fps is that of gestures in captured motion and in the clips released with Rebol et al. (2021).
 const ROWS: [Row; 8] = [
-    ("upper arm, m", "upper_arm_metres", |a| a.upper_arm_metres),
-    ("forearm, m", "forearm_metres", |a| a.forearm_metres),
-    ("wrist jitter, mm", "jitter_mm", |a| a.jitter_mm),
-    ("wrist reprojection error, mm", "wrist_reprojection_mm", |a| a.wrist_off_mm),
-    ("frames without wrist position, %", "missing_percent", |a| 100.0 * a.missing),
-    ("frames without detected wrist, %", "masked_percent", |a| 100.0 * a.masked),
-    ("hand joints with position, %", "hand_present_percent", |a| 100.0 * a.hand_there),
-    ("hand joints detected, %", "hand_detected_percent", |a| 100.0 * a.hand_visible),
+    ("upper arm, m", "upper_arm_metres", |a| a.upper_arm_metres, "0.25 to 0.37"),
+    ("forearm, m", "forearm_metres", |a| a.forearm_metres, "0.21 to 0.31"),
+    ("wrist jitter, mm", "jitter_mm", |a| a.jitter_mm, "3 to 12"),
+    ("wrist reprojection error, mm", "wrist_reprojection_mm", |a| a.wrist_off_mm, "below 30"),
+    ("frames without wrist position, %", "missing_percent", |a| 100.0 * a.missing, "the rejected share"),
+    ("frames without detected wrist, %", "masked_percent", |a| 100.0 * a.masked, "at most 10 more"),
+    ("hand joints with position, %", "hand_present_percent", |a| 100.0 * a.hand_there, "the accepted share"),
+    ("hand joints detected, %", "hand_detected_percent", |a| 100.0 * a.hand_visible, "at most 20 less"),
 ];
 
 fn table(metrics: &ClipStatistics) -> String {
@@ -205,15 +212,37 @@ fn table(metrics: &ClipStatistics) -> String {
             .to_owned();
     }
     let number = |v: f64| if v.is_finite() { format!("{v:.2}") } else { "-".to_owned() };
-    let head = format!("  {:40}{:>9}{:>9}\n", "", "left", "right");
-    ROWS.iter().fold(head, |text, (name, _, of)| {
-        text + &format!("  {name:40}{:>9}{:>9}\n", number(of(&metrics.left)), number(of(&metrics.right)))
+    let head = format!("  {:40}{:>9}{:>9}   usual\n", "", "left", "right");
+    ROWS.iter().fold(head, |text, (name, _, of, usual)| {
+        text + &format!("  {name:40}{:>9}{:>9}   {usual}\n", number(of(&metrics.left)), number(of(&metrics.right)))
     })
 }
 
 fn as_json(metrics: &ClipStatistics) -> Value {
     let arm = |arm: &ArmStatistics| -> serde_json::Map<String, Value> {
-        ROWS.iter().map(|(_, name, of)| ((*name).to_owned(), json!(of(arm)))).collect()
+        ROWS.iter().map(|(_, name, of, _)| ((*name).to_owned(), json!(of(arm)))).collect()
     };
     json!({ "left": arm(&metrics.left), "right": arm(&metrics.right) })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_table_states_usual_values() {
+        let arm = ArmStatistics {
+            upper_arm_metres: 0.3,
+            forearm_metres: 0.26,
+            jitter_mm: 3.5,
+            wrist_off_mm: 20.0,
+            missing: 0.0,
+            masked: 0.0,
+            hand_there: 1.0,
+            hand_visible: 1.0,
+        };
+        let table = table(&ClipStatistics { left: arm, right: arm });
+        let row = format!("  {:40}{:>9}{:>9}   0.25 to 0.37\n", "upper arm, m", "0.30", "0.30");
+        assert!(table.contains(&row) && table.lines().all(|line| line.len() > 60), "{table}");
+    }
 }

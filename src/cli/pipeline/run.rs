@@ -1,9 +1,10 @@
 //! `orator run`.
 
+use super::train::train_speakers;
 use crate::cli::Outcome;
 use crate::cli::config_args::ConfigArgs;
 use crate::cli::sandbox::this_program;
-use crate::cli::setup::models::fetch;
+use crate::cli::setup::models::with_models;
 use crate::cli::signals;
 use crate::cli::ui::Ui;
 use anyhow::Result;
@@ -12,10 +13,6 @@ use orator_base::stage::artifacts::StageName;
 use orator_base::stage::progress::{Event, Progress};
 use orator_base::text::{counted, first_three};
 use orator_cluster::plan::ClusterPlan;
-use orator_dataset::config::Settings;
-use orator_onnx::{ModelError, ModelStore};
-use orator_pipeline::pose2d::models::required_models;
-use orator_pipeline::segment::speech_rule::SpeechDetector;
 use orator_pipeline::{Pipeline, Selection, UnitFailure};
 use serde_json::json;
 
@@ -23,6 +20,11 @@ use serde_json::json;
 ///
 /// Every stage runs for every video of every speaker. Stages that are up to date are skipped, so an interrupted run
 /// continues when the same command is given again. A failed video is reported, and the others are still processed.
+///
+/// With --train, a GAN is then trained for each speaker with the settings of `[gan]`, as by `orator train gan --all`,
+/// and evaluated on a held-out part: gan/SPEAKER/result.html in the work folder has a film of generated beside true
+/// motion, the metrics and the conclusions. A training is resumed; a model whose dataset has changed since is moved to
+/// gan/SPEAKER-old and trained anew.
 ///
 /// Exit code 2: a video failed, a speaker has no accepted interval, or a dataset lacks a video because its earlier
 /// stages are not up to date or because it is listed in the plan of `orator plan` but no longer exists.
@@ -48,16 +50,15 @@ pub struct Args {
     /// Run the selected stages even where they are up to date.
     #[arg(long)]
     force: bool,
+    /// Then train a model for each speaker and evaluate it.
+    #[arg(long, conflicts_with_all = ["to", "only"])]
+    train: bool,
 }
 
 /// Parser for the name of a stage; former names are aliases.
 fn stage_parser() -> impl TypedValueParser<Value = StageName> {
     let name = |stage: StageName| PossibleValue::new(stage.as_str()).aliases(stage.former());
     PossibleValuesParser::new(StageName::ALL.map(name)).try_map(|name| name.parse::<StageName>())
-}
-
-fn is_missing_model(error: &anyhow::Error) -> bool {
-    matches!(error.downcast_ref(), Some(ModelError::Missing { .. }))
 }
 
 pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
@@ -67,19 +68,7 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     let selection = Selection { from, to, speakers: args.speaker, jobs: args.jobs, force: args.force };
     let pipeline = Pipeline::open(args.config.load()?)?.with_processes(this_program());
     signals::exit_on_signal("completed stages are saved; run the same command again to continue");
-    let mut report = match pipeline.run(&selection, ui) {
-        Err(error)
-            if is_missing_model(&error) && ui.confirm(&format!("{error:#}\ndownload the missing models now?")) =>
-        {
-            let settings = &pipeline.config().settings;
-            let Settings { models, pose2d, .. } = settings;
-            let models_used: Vec<_> =
-                required_models(pose2d).into_iter().chain(SpeechDetector::required_models(settings)).collect();
-            fetch(&ModelStore::open(&models.dir)?, &models_used, None, ui)?;
-            pipeline.run(&selection, ui)?
-        }
-        ended => ended?,
-    };
+    let mut report = with_models(&pipeline.config().settings, ui, || pipeline.run(&selection, ui))?;
 
     if selection.from == StageName::Dataset {
         // Videos of a plan were processed before: one that has been removed since is missing from the dataset.
@@ -112,16 +101,26 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
         lines.push(format!("{}; `orator status --why` prints the errors", counted(n_failed, "failure")));
     }
     let first = report.datasets.first().and_then(|dir| dir.file_name());
-    let next = match first {
+    let mut next = match first {
         Some(speaker) if report.datasets.len() == report.n_speakers => {
             format!("orator train gan{flags} --speaker {}", speaker.to_string_lossy())
         }
+        // The errors have been printed.
+        _ if n_failed > 0 => format!("orator report{flags}"),
         _ => format!("orator status{flags} --why"),
     };
     let mut facts = json!(report);
+    let mut outcome = if n_failed == 0 { Outcome::Done } else { Outcome::SomeFailed };
+    if args.train {
+        let trained = train_speakers(&pipeline, &report.datasets, ui)?;
+        lines.push(trained.text);
+        facts["models"] = json!(trained.facts);
+        next = trained.next.unwrap_or(next);
+        outcome = if trained.outcome == Outcome::Done { outcome } else { trained.outcome };
+    }
     facts["next"] = json!(next);
     facts["passed_over"] = chosen.iter().map(|videos| (videos.speaker.clone(), json!(videos.passed_over))).collect();
     facts["work_secs"] = json!(report.times.iter().map(|time| time.secs).sum::<f64>());
     ui.summary(&lines.join("\n"), Some(&next), facts);
-    Ok(if n_failed == 0 { Outcome::Done } else { Outcome::SomeFailed })
+    Ok(outcome)
 }

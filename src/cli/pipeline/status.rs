@@ -10,7 +10,7 @@ use orator_base::stage::artifacts;
 use orator_base::stage::artifacts::StageName;
 use orator_base::stage::ledger::longest_first;
 use orator_base::text::counted;
-use orator_pipeline::{Pipeline, StagePlan, StaleResult, StatusReport, TimeBudget, UnitState, UnitStatus};
+use orator_pipeline::{ModelStatus, Pipeline, StagePlan, StaleResult, StatusReport, TimeBudget, UnitState, UnitStatus};
 use serde_json::json;
 use std::path::PathBuf;
 
@@ -20,8 +20,9 @@ const REASONS_SHOWN: usize = 3;
 /// Show the state of every stage and the use of every second of video.
 ///
 /// A stage of a video is up to date, stale, failed, or waiting for an earlier stage. A second of video is accepted,
-/// rejected with a reason, missing because a stage failed, or not yet decided. Datasets and models made by an older
-/// lifter are listed with the command that rebuilds them.
+/// rejected with a reason, missing because a stage failed, or not yet decided. The model of a speaker is stale if its
+/// dataset has changed since. Stale models, and datasets made by an older lifter, are listed with the command that
+/// rebuilds them.
 #[derive(clap::Args)]
 pub struct Args {
     #[command(flatten)]
@@ -51,8 +52,26 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     for stale in &mut report.stale {
         stale.command = format!("orator {}{flags}", stale.command);
     }
-    let verb = if report.datasets_are_up_to_date() { "train gan" } else { "run" };
-    let next = format!("orator {verb}{flags}");
+    let is_new = |unit: &UnitStatus| matches!(unit.state, UnitState::Stale | UnitState::NeverDone);
+    let is_trained = |model: &ModelStatus| model.state == UnitState::UpToDate;
+    let next = match report.models.first() {
+        _ if !report.datasets_are_up_to_date() => {
+            if report.units.iter().any(is_new) {
+                format!("orator run{flags}")
+            } else if args.why {
+                // A run would only repeat the failures.
+                format!("orator report{flags}")
+            } else {
+                format!("orator status{flags} --why")
+            }
+        }
+        Some(first) if report.models.iter().all(is_trained) => {
+            let model = work.join(&first.name);
+            format!("orator generate --checkpoint {} --audio speech.wav --out motion.bvh", model.display())
+        }
+        _ if report.models.iter().any(|model| model.state == UnitState::Stale) => format!("orator run --train{flags}"),
+        _ => format!("orator train gan{flags}"),
+    };
     let mut facts = json!(report);
     facts["next"] = json!(next);
     ui.summary(&text(&report, args.why), Some(&next), facts);
@@ -80,6 +99,12 @@ fn text(report: &StatusReport, why: bool) -> String {
     lines.extend(report.time_budget.iter().filter_map(not_judged));
     let offset = |account: &TimeBudget| account.sound_offset.map(|offset| format!("{}: {offset}", account.unit));
     lines.extend(report.time_budget.iter().filter_map(offset));
+    let model = |model: &ModelStatus| {
+        let step = model.step.map(|step| format!(", step {step}")).unwrap_or_default();
+        let reason = if model.reason.is_empty() { String::new() } else { format!(": {}", model.reason) };
+        format!("model {}: {}{step}{reason}", model.name, model.state)
+    };
+    lines.extend(report.models.iter().filter(|model| model.state != UnitState::Stale).map(model));
     let rebuild = |StaleResult { name, reason, command }: &StaleResult| format!("{name}: {reason}: {command}");
     lines.extend(report.stale.iter().map(rebuild));
     if why {

@@ -4,6 +4,7 @@ use crate::cli::Outcome;
 use crate::cli::ui::Ui;
 use anyhow::Result;
 use orator_base::stage::progress::Progress as _;
+use orator_base::text::counted;
 use orator_dataset::config::{self, Settings};
 use orator_onnx::{Fetched, MANIFEST_FILE, ModelEntry, ModelError, ModelOrigin, ModelRequest, ModelState, ModelStore};
 use orator_onnx::{Runtime, find_library};
@@ -89,10 +90,7 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
                     let entries = store.manifest().models.iter().filter(is_available);
                     entries.map(|entry| ModelRequest::Id(entry.id.clone())).collect()
                 }
-                (false, []) => models::required_models(pose2d)
-                    .into_iter()
-                    .chain(SpeechDetector::required_models(&settings))
-                    .collect(),
+                (false, []) => required(&settings),
                 (false, ids) => ids.iter().cloned().map(ModelRequest::Id).collect(),
             };
             if find_library(&folder.onnxruntime, &folder.dir).is_err() {
@@ -125,37 +123,71 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
                     Err(error) => ModelLine::new(entry, "valid", false, error.to_string()),
                 }
             });
-            close(&lines.collect::<Vec<_>>(), ["orator run", "orator models fetch"], &store, ui)
+            close(&lines.collect::<Vec<_>>(), "", ["orator run", "orator models fetch"], &store, ui)
         }
     }
 }
 
-/// Prints the licences of the models, fetches them, and prints the result.
-pub fn fetch(store: &ModelStore, wanted: &[ModelRequest], mirror: Option<&Path>, ui: &Ui) -> Result<Outcome> {
+/// Models that the settings require.
+fn required(settings: &Settings) -> Vec<ModelRequest> {
+    models::required_models(&settings.pose2d).into_iter().chain(SpeechDetector::required_models(settings)).collect()
+}
+
+/// Calls `work`; if a model is missing and the user accepts the licences, fetches the models and calls it again.
+pub fn with_models<T>(settings: &Settings, ui: &Ui, work: impl Fn() -> Result<T>) -> Result<T> {
+    let error = match work() {
+        Err(error) if matches!(error.downcast_ref(), Some(ModelError::Missing { .. })) => error,
+        ended => return ended,
+    };
+    let (store, wanted) = (ModelStore::open(&settings.models.dir)?, required(settings));
+    let terms = terms(&store, &wanted)?;
+    if !ui.confirm(&format!("{error:#}\n{terms}\ndownload the models under these licences?")) {
+        return Err(error);
+    }
+    for Fetched { entry, source } in store.fetch(&wanted, None, ui)? {
+        ui.say(&source.map_or_else(|error| format!("{}: {error:#}", entry.id), |from| format!("{}: {from}", entry.id)));
+    }
+    work()
+}
+
+/// Sizes and licences of the missing models; empty if none is missing.
+fn terms(store: &ModelStore, wanted: &[ModelRequest]) -> Result<String> {
     let mut terms = String::new();
     for entry in store.missing(wanted)? {
         let size = entry.bytes as f64 / 1e6;
         terms += &format!("\n  {:<24} {size:5.1} MB  licence {}", entry.id, entry.origin.licence);
     }
+    let about = "missing models (of those for one purpose, the first that can be downloaded is enough):";
+    Ok(if terms.is_empty() { terms } else { format!("{about}{terms}") })
+}
+
+/// Prints the licences of the models, fetches them, and prints the result.
+fn fetch(store: &ModelStore, wanted: &[ModelRequest], mirror: Option<&Path>, ui: &Ui) -> Result<Outcome> {
+    let terms = terms(store, wanted)?;
     if !terms.is_empty() {
-        ui.say(&format!(
-            "missing models (of those for one purpose, the first that can be downloaded is enough):{terms}"
-        ));
+        ui.say(&terms);
     }
     let fetched = store.fetch(wanted, mirror, ui)?;
     let substitute = |one: &Fetched| {
         let is_fetched = |other: &&Fetched| other.source.is_ok() && other.entry.role == one.entry.role;
         fetched.iter().find(is_fetched).filter(|_| wanted.contains(&ModelRequest::Role(one.entry.role)))
     };
-    let lines = fetched.iter().map(|one| match &one.source {
-        Ok(source) => ModelLine::new(one.entry, "fetched", true, source.to_string()),
-        Err(error) => {
-            let other = substitute(one).map(|other| format!(" ({} is used instead)", other.entry.id));
-            let message = format!("FAILED{}: {error:#}", other.as_deref().unwrap_or_default());
-            ModelLine { is_failure: other.is_none(), ..ModelLine::new(one.entry, "fetched", false, message) }
+    let lines = fetched.iter().map(|one| fetched_line(one, substitute(one).map(|other| &*other.entry.id)));
+    let lines: Vec<ModelLine> = lines.collect();
+    let complete = format!("all {} are installed", counted(wanted.len(), "requested model"));
+    close(&lines, &complete, ["orator run", "orator models fetch --mirror DIR"], store, ui)
+}
+
+/// Line of a fetched model; `substitute`: id of the model that replaces it.
+fn fetched_line(one: &Fetched, substitute: Option<&str>) -> ModelLine {
+    match (&one.source, substitute) {
+        (Ok(source), _) => ModelLine::new(one.entry, "fetched", true, source.to_string()),
+        (Err(error), None) => ModelLine::new(one.entry, "fetched", false, format!("FAILED: {error:#}")),
+        (Err(error), Some(other)) => {
+            let message = format!("not needed: {other} is used instead; not available: {error:#}");
+            ModelLine { is_failure: false, ..ModelLine::new(one.entry, "fetched", false, message) }
         }
-    });
-    close(&lines.collect::<Vec<_>>(), ["orator run", "orator models fetch --mirror DIR"], store, ui)
+    }
 }
 
 fn settings(args: &Args) -> Result<Settings> {
@@ -186,10 +218,11 @@ impl ModelLine {
     }
 }
 
-/// Prints the lines; `next` holds the commands to suggest after success and after failure.
-fn close(lines: &[ModelLine], next: [&str; 2], store: &ModelStore, ui: &Ui) -> Result<Outcome> {
+/// Prints the lines, and `complete` after success; `next` holds the commands to suggest after success and failure.
+fn close(lines: &[ModelLine], complete: &str, next: [&str; 2], store: &ModelStore, ui: &Ui) -> Result<Outcome> {
     let has_failed = lines.iter().any(|line| line.is_failure);
-    let text: Vec<&str> = lines.iter().map(|line| line.text.as_str()).collect();
+    let last = Some(complete).filter(|_| !has_failed);
+    let text: Vec<&str> = lines.iter().map(|line| line.text.as_str()).chain(last).collect();
     let facts: Vec<&Value> = lines.iter().map(|line| &line.facts).collect();
     let next = next[usize::from(has_failed)];
     ui.summary(&text.join("\n"), Some(next), json!({ "dir": store.dir(), "models": facts }));
@@ -225,4 +258,22 @@ fn list(store: &ModelStore, chosen: &[String], ui: &Ui) -> Result<Outcome> {
     let next = if n_missing > 0 { "orator models fetch" } else { "orator run" };
     ui.summary(&text, Some(next), json!({ "dir": dir, "models": facts, "layouts": layouts }));
     Ok(Outcome::Done)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use anyhow::anyhow;
+
+    #[test]
+    fn a_source_that_is_not_needed_is_no_failure() {
+        let dir = tempfile::tempdir().unwrap();
+        let store = ModelStore::open(dir.path()).unwrap();
+        let failed = Fetched { entry: &store.manifest().models[0], source: Err(anyhow!("no address")) };
+        let line = fetched_line(&failed, Some("other"));
+        let expected = "not needed: other is used instead; not available: no address";
+        assert!(!line.is_failure && line.text.ends_with(expected), "{}", line.text);
+        let line = fetched_line(&failed, None);
+        assert!(line.is_failure && line.text.ends_with("FAILED: no address"));
+    }
 }

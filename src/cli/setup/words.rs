@@ -137,10 +137,14 @@ fn tables(folder: &Path) -> Vec<PathBuf> {
     tables
 }
 
+/// Tables in the models folder.
+pub fn table_files(models: &Path) -> Vec<PathBuf> {
+    tables(&models.join(FOLDER))
+}
+
 /// Tables in the models folder, each opened.
 pub(super) fn opened(models: &Path) -> Vec<(PathBuf, Result<WordVectors>)> {
-    let tables = tables(&models.join(FOLDER)).into_iter();
-    tables.map(|path| (path.clone(), WordVectors::open(&path))).collect()
+    table_files(models).into_iter().map(|path| (path.clone(), WordVectors::open(&path))).collect()
 }
 
 fn check(folder: &Path, transcripts: &[PathBuf], ui: &Ui) -> Result<Outcome> {

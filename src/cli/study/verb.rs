@@ -52,7 +52,7 @@ struct ServeArgs {
     #[arg(value_name = "DIR")]
     dir: PathBuf,
     /// IP address to listen on; a loopback address is reachable from this machine only.
-    #[arg(long, value_name = "ADDRESS", default_value = "127.0.0.1")]
+    #[arg(long, value_name = "ADDRESS", default_value = "127.0.0.1", value_parser = ip_address)]
     listen: IpAddr,
     /// Port to listen on; 0 selects a free one.
     #[arg(long, default_value_t = 8080)]
@@ -66,6 +66,20 @@ struct ServeArgs {
     /// answer at most 5 minutes plus twice the length of the films.
     #[arg(long, value_name = "MINUTES", default_value_t = 60)]
     abandoned_after: u32,
+}
+
+fn ip_address(text: &str) -> std::result::Result<IpAddr, String> {
+    text.parse().map_err(|_| match (text.parse::<SocketAddr>(), text.rsplit_once(':')) {
+        (Ok(socket), _) => format!("the port is a separate option: --listen {} --port {}", socket.ip(), socket.port()),
+        (Err(_), Some((host, port))) if !host.contains(':') => {
+            format!(
+                "expected an IP address, such as 127.0.0.1 for {host:?}; the port is a separate option: --port {port}"
+            )
+        }
+        (Err(_), _) => {
+            "expected an IP address, such as 127.0.0.1 (this machine only) or 0.0.0.0 (all networks)".to_owned()
+        }
+    })
 }
 
 fn serve(args: &ServeArgs, ui: &Ui) -> Result<Outcome> {
@@ -118,4 +132,23 @@ fn export_tables(args: &ExportArgs, ui: &Ui) -> Result<Outcome> {
     let next = format!("orator study analyse {}", args.dir.display());
     ui.summary(&text, Some(&next), json!(exported));
     Ok(Outcome::Done)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::ip_address;
+
+    #[test]
+    fn an_address_with_a_port_is_answered_with_the_options() {
+        assert!(ip_address("::1").is_ok() && ip_address("0.0.0.0").is_ok());
+        for (text, expected) in [
+            ("127.0.0.1:8080", "--listen 127.0.0.1 --port 8080"),
+            ("[::1]:80", "--listen ::1 --port 80"),
+            ("localhost:9000", "--port 9000"),
+            ("localhost", "expected an IP address, such as 127.0.0.1"),
+        ] {
+            let error = ip_address(text).unwrap_err();
+            assert!(error.contains(expected), "{text}: {error}");
+        }
+    }
 }

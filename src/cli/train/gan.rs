@@ -60,9 +60,17 @@ pub struct Args {
 pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     let config = if args.dataset.is_empty() { args.config.load()? } else { args.config.load_or_default()? };
     if args.all {
-        return train_all(&config, ui, |speaker| train_one(&args, Some(speaker), &config, ui));
+        let trained = train_all(&config, ui, |speaker| train_one(&args, Some(speaker), &config, ui))?;
+        return Ok(trained.report(ui));
     }
     Ok(train_one(&args, args.speaker.as_ref(), &config, ui)?.report(ui))
+}
+
+/// Trains the model of a configured speaker on its dataset, in `gan/SPEAKER` of the work folder.
+pub fn train_speaker(config: &Config, speaker: &str, ui: &Ui) -> Result<TrainedModel> {
+    let none = ConfigArgs { config: config.file.clone(), set: Vec::new() };
+    let args = Args { config: none, speaker: None, all: true, steps: None, from: None, out: None, dataset: Vec::new() };
+    train_one(&args, Some(&speaker.to_owned()), config, ui)
 }
 
 fn train_one(args: &Args, speaker: Option<&String>, config: &Config, ui: &Ui) -> Result<TrainedModel> {
@@ -171,12 +179,14 @@ fn metrics(validation: &Validation) -> String {
 fn pairs(dataset: &Dataset, speaker: &GestureGenerator, n_speakers: usize) -> Result<Vec<HeldOutPair>> {
     let mut samples = page_samples(dataset);
     samples.truncate(samples.len().div_ceil(n_speakers));
+    let split = samples.first().map_or("", |sample| sample.split.name());
     let intervals = held_out::read(dataset, &samples, &speaker.metadata.normalisation)?;
     let pair = |interval: HeldOutInterval| {
         let frames = middle(interval.ground_truth.n_frames(), speaker.fps());
         let HeldOutInterval { key, ground_truth, sound, .. } = interval.cut(frames.clone());
         let (predicted, _) = predictor::motion(speaker, &sound, frames.len())?;
-        Ok(HeldOutPair { name: key, start_secs: speaker.fps().secs(frames.start), ground_truth, predicted })
+        let (name, start_secs) = (format!("{split} {key}"), speaker.fps().secs(frames.start));
+        Ok(HeldOutPair { name, start_secs, ground_truth, predicted })
     };
     intervals.into_iter().map(pair).collect()
 }

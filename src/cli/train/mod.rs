@@ -3,7 +3,7 @@
 pub mod gan;
 pub mod seq2seq;
 pub mod stopped;
-mod training;
+pub mod training;
 pub mod verb;
 
 pub use verb::{Args, run};

@@ -3,9 +3,11 @@
 use super::training::{TrainedModel, TrainingFolders, TrainingPage, middle, page_samples, speed, train_all};
 use crate::cli::Outcome;
 use crate::cli::config_args::ConfigArgs;
+use crate::cli::setup::words;
 use crate::cli::ui::Ui;
 use anyhow::Result;
 use ndarray::s;
+use orator_base::stage::progress::Progress as _;
 use orator_base::text::counted;
 use orator_base::types::pose3d::Motion;
 use orator_dataset::Dataset;
@@ -15,6 +17,7 @@ use orator_formats::word_vectors::WordVectors;
 use orator_gesture::evaluate::clips::held_out;
 use orator_gesture::evaluate::clips::held_out::HeldOutInterval;
 use orator_gesture::generate::seq2seq::SequenceGenerator;
+use orator_gesture::generate::seq2seq::architecture::word_encoder;
 use orator_gesture::generate::seq2seq::poses::PoseFormat;
 use orator_gesture::train::epochs::ValidatedStep;
 use orator_gesture::train::gan::score::below_mean_pose;
@@ -73,7 +76,8 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     let config = if is_named { args.config.load_or_default()? } else { args.config.load()? };
     let vectors = args.words.as_deref().map(WordVectors::open).transpose()?;
     if args.all {
-        return train_all(&config, ui, |speaker| train_one(&args, Some(speaker), &config, vectors.as_ref(), ui));
+        let trained = train_all(&config, ui, |speaker| train_one(&args, Some(speaker), &config, vectors.as_ref(), ui))?;
+        return Ok(trained.report(ui));
     }
     Ok(train_one(&args, args.speaker.as_ref(), &config, vectors.as_ref(), ui)?.report(ui))
 }
@@ -91,6 +95,9 @@ fn train_one(
     }
     let start = Instant::now();
     let train = |source: TrainingSource, out: &Path, poses| {
+        if vectors.is_none() && word_encoder(settings.network).is_some() {
+            unused_words(&config.settings.models.dir, &source).iter().for_each(|note| ui.say(note));
+        }
         let mut page = TrainingPage::new(out, source.name(), poses, ui);
         let validated = &mut |at| page.update(at);
         let outcome = train::train_with_callback(source, vectors, &settings, out, ui, validated)?;
@@ -155,17 +162,33 @@ fn train_one(
     Ok(TrainedModel { text, next, facts, has_page: page.is_some() })
 }
 
+/// Note on word vectors that are installed in `models` but not used; `None` if none are installed.
+fn unused_words(models: &Path, source: &TrainingSource) -> Option<String> {
+    let table = words::table_files(models).into_iter().next()?;
+    let has_transcripts = match source {
+        TrainingSource::Dataset(dataset) => dataset.stats().footage.words.is_some(),
+        TrainingSource::Captures(_) => true,
+    };
+    Some(if has_transcripts {
+        format!("the installed word vectors are not used: add --words {}", table.display())
+    } else {
+        "the installed word vectors are not used: the dataset has no transcripts (`transcripts` under [[speaker]])"
+            .into()
+    })
+}
+
 /// True and generated poses of a few intervals, from the middle of each.
 fn pairs(dataset: &Dataset, speaker: &SequenceGenerator) -> Result<Vec<HeldOutPair>> {
     let PoseFormat::Joints { normalisation, .. } = &speaker.metadata.poses else { return Ok(Vec::new()) };
-    let fps = speaker.fps();
+    let (fps, samples) = (speaker.fps(), page_samples(dataset));
+    let split = samples.first().map_or("", |sample| sample.split.name());
     let pair = |interval: HeldOutInterval| {
         let predicted = speaker.motion(&speaker.poses(&interval.sound, &interval.words)?)?;
         let frames = middle(interval.ground_truth.n_frames().min(predicted.n_frames()), fps);
         let predicted = Motion::from_joints(fps, predicted.joints.slice(s![frames.clone(), .., ..]).to_owned());
         let start_secs = fps.secs(frames.start);
         let HeldOutInterval { key, ground_truth, .. } = interval.cut(frames);
-        Ok(HeldOutPair { name: key, start_secs, ground_truth, predicted })
+        Ok(HeldOutPair { name: format!("{split} {key}"), start_secs, ground_truth, predicted })
     };
-    held_out::read(dataset, &page_samples(dataset), normalisation)?.into_iter().map(pair).collect()
+    held_out::read(dataset, &samples, normalisation)?.into_iter().map(pair).collect()
 }

@@ -83,7 +83,7 @@ fn speaker(given: Option<&String>, config: &Config) -> Result<String> {
 }
 
 /// Result of a completed training.
-pub(super) struct TrainedModel {
+pub struct TrainedModel {
     pub text: String,
     pub next: String,
     pub facts: Value,
@@ -99,16 +99,33 @@ impl TrainedModel {
     }
 }
 
-/// Trains a model for each speaker of the configuration by `train_one`, and prints the results. Speakers that another
-/// process trains are skipped; a failure does not stop the others.
+/// Results of several trainings.
+pub struct TrainedModels {
+    pub text: String,
+    /// Command to type next: that of the first model.
+    pub next: Option<String>,
+    pub facts: Vec<Value>,
+    pub outcome: Outcome,
+}
+
+impl TrainedModels {
+    /// Prints the results.
+    pub(super) fn report(self, ui: &Ui) -> Outcome {
+        ui.summary(&self.text, self.next.as_deref(), json!({ "speakers": self.facts, "next": self.next }));
+        self.outcome
+    }
+}
+
+/// Trains a model for each speaker of the configuration by `train_one`. Speakers that another process trains are
+/// skipped; a failure does not stop the others.
 ///
 /// # Errors
 /// A training that was stopped on request.
-pub(super) fn train_all(
+pub fn train_all(
     config: &Config,
     ui: &Ui,
     train_one: impl Fn(&String) -> Result<TrainedModel>,
-) -> Result<Outcome> {
+) -> Result<TrainedModels> {
     let (mut text, mut facts, mut next, mut n_failed) = (String::new(), Vec::new(), None, 0);
     let mut outcome = None;
     for speaker in config.settings.speaker.iter().map(|speaker| &speaker.name) {
@@ -134,8 +151,8 @@ pub(super) fn train_all(
             }
         }
     }
-    ui.summary(&text, next.as_deref(), json!({ "speakers": facts, "next": next }));
-    Ok(outcome.unwrap_or(if n_failed == 0 { Outcome::Done } else { Outcome::SomeFailed }))
+    let outcome = outcome.unwrap_or(if n_failed == 0 { Outcome::Done } else { Outcome::SomeFailed });
+    Ok(TrainedModels { text, next, facts, outcome })
 }
 
 /// Steps per second of a call that trained from step `began_at` to `steps` in `secs`, as text and number.

@@ -28,9 +28,6 @@ const RENAMED_RECIPE: (&str, &str) = ("paper", "rebol2021");
 
 /// Settings of a section as records and checkpoints store them: JSON with the former names of renamed keys, in the same
 /// order.
-///
-/// # Errors
-/// Settings that cannot be serialised.
 pub fn to_stored(section: &str, settings: &impl Serialize) -> serde_json::Result<Value> {
     let stored_name = |key: String| {
         let current = format!("{section}.{key}");

@@ -53,9 +53,6 @@ const MAX_DEPTH: usize = 64;
 /// Files that an entry names: the files with one of `extensions` in a folder, the matches of a pattern, or a plain
 /// path, which is returned even if it does not exist, so that the error is reported for that file. `what` names the
 /// kind of file in messages.
-///
-/// # Errors
-/// Those of `matches`, a folder that cannot be listed or has no such file.
 pub fn expand(
     entry: &str,
     root: &SearchRoot,
@@ -78,9 +75,6 @@ pub fn expand(
 /// Files and folders that an entry names: a plain path, or the matches of a pattern in any case, without files that the
 /// program itself wrote. Accented letters may be composed or not. Messages about unreadable folders and file names that
 /// are not UTF-8 are added to `missing`.
-///
-/// # Errors
-/// An invalid pattern, or one without matches.
 pub fn matches(entry: &str, root: &SearchRoot, missing: &mut Vec<String>) -> Result<Vec<PathBuf>, String> {
     let folder = &root.folder;
     let path = search::existing(&folder.join(entry));

@@ -108,9 +108,6 @@ fn other_files(folder: &Path, has_transcripts: bool) -> Vec<String> {
 }
 
 /// Adds a video under its work name and returns the name.
-///
-/// # Errors
-/// A path that is not UTF-8, or a work name that another video already has.
 fn add(found: &mut BTreeMap<String, Unit>, speaker: &str, path: PathBuf, folder: &Path) -> Result<String, String> {
     if path.to_str().is_none() {
         return Err(patterns::not_utf8_message(&path));

@@ -46,9 +46,6 @@ pub fn ensure_intact_without(dir: &Path, names: &BTreeSet<String>) -> Result<()>
 }
 
 /// Replaces the dataset in `dir` by one without the videos `names`; if no video remains, `dir` is removed.
-///
-/// # Errors
-/// An entry that cannot be read, a folder that cannot be written.
 pub fn without(dir: &Path, names: &BTreeSet<String>) -> Result<()> {
     if !dir.exists() {
         return Ok(());

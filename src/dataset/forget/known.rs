@@ -53,9 +53,6 @@ impl KnownVideo {
 }
 
 /// All videos of a project, including those that the configuration excludes.
-///
-/// # Errors
-/// A folder that cannot be listed.
 pub fn project_videos(config: &Config) -> Result<Vec<KnownVideo>> {
     let work = &config.settings.work.dir;
     let mut all = config.clone();
@@ -119,10 +116,6 @@ fn speakers_on_record(work: &Path) -> Vec<String> {
         .collect()
 }
 
-/// All videos of the dataset in `dir`.
-///
-/// # Errors
-/// `dir` is not a dataset.
 pub fn dataset_videos(dir: &Path) -> Result<Vec<KnownVideo>> {
     ensure!(dir.join(entry::FOLDER).is_dir(), "{} is not a dataset: it has no folder {}", dir.display(), entry::FOLDER);
     let mut known = Vec::new();

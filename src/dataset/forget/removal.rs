@@ -27,9 +27,6 @@ pub fn models_dirs(work: &Path, speaker: &str) -> [PathBuf; 2] {
 
 /// Model folders, of any speaker, whose checkpoint metadata lists one of the videos: the model, or the one that it was
 /// initialised from, was trained on it.
-///
-/// # Errors
-/// A folder that cannot be listed.
 pub fn models_trained_on(work: &Path, videos: &[&KnownVideo]) -> Result<Vec<PathBuf>> {
     let contents: BTreeSet<&str> = videos.iter().filter_map(|video| video.content.as_deref()).collect();
     let mut folders = Vec::new();
@@ -71,9 +68,6 @@ pub struct Removal {
 impl Removal {
     /// Plans the removal of the data of `videos` from the work folder; `others` are the remaining videos, and
     /// `whole_speaker` means that all videos of the speaker go.
-    ///
-    /// # Errors
-    /// A folder that cannot be listed.
     pub fn of_work(
         work: &Path,
         speaker: &str,

@@ -168,30 +168,6 @@ mod tests {
     use super::*;
 
     #[test]
-    fn endings_of_recorders_and_decomposed_names_are_matched() {
-        let dir = tempfile::tempdir().unwrap();
-        let file = |name: &str| {
-            let path = dir.path().join(name);
-            std::fs::create_dir_all(path.parent().unwrap()).unwrap();
-            std::fs::write(&path, "").unwrap();
-            path
-        };
-        let take = |motion: &str, sound: &str, transcript: &str| TakeFiles {
-            kind: MotionKind::Bvh,
-            motion: file(motion),
-            sound: Some(file(sound)),
-            transcripts: vec![file(transcript)],
-        };
-        let expected = [
-            take("BVH/n\u{e3}o.Bvh", "Wav/na\u{303}o.WAV", "TSV/na\u{303}o.TSV"),
-            take("REC0007.BVH", "REC0007.Mp3", "REC0007.SRT"),
-        ];
-        let other = file("REC0008.WAV");
-        let found = find(&[dir.path().to_owned()], None).unwrap();
-        assert_eq!((found.takes, found.passed_over), (expected.to_vec(), vec![other]));
-    }
-
-    #[test]
     fn files_of_one_take_are_matched() {
         let dir = tempfile::tempdir().unwrap();
         let file = |name: &str, content: &str| {
@@ -207,7 +183,7 @@ mod tests {
         let flat_sound = file("flat/a.wav", "");
         let flat_words = ["flat/a.json", "flat/a.TextGrid"].map(|name| file(name, ""));
         let apart = file("trn/bvh/b.BVH", "");
-        let (apart_sound, apart_words) = (file("trn/wav/b.flac", ""), file("trn/tsv/b.tsv", ""));
+        let (apart_sound, apart_words) = (file("trn/Wav/b.Flac", ""), file("trn/TSV/b.TSV", ""));
         let alone = file("trn/bvh/c.bvh", "");
         let notes = file("trn/bvh/notes.txt", "words");
         let broken = file("d.npz", "no zip");

@@ -92,9 +92,6 @@ pub fn open(tars: &[PathBuf]) -> ShardTars {
 
 /// Adds the members of a tar file to `samples`, and counts files of other extensions in `unknown`. Returns the number
 /// of files in the tar.
-///
-/// # Errors
-/// A file that is not a readable tar, a truncated member, two members with the same name and different bytes.
 fn list(
     tar: &Path,
     samples: &mut BTreeMap<String, ShardSample>,

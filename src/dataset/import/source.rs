@@ -27,7 +27,6 @@ use std::path::{Path, PathBuf};
 /// Median shift of a take's joints by fixing the bone lengths, mm, above which a note is given.
 const NOTABLE_SHIFT_MM: f64 = 5.0;
 
-/// Item to import.
 #[derive(Clone, Debug)]
 pub enum ImportItem {
     Take(TakeFiles),

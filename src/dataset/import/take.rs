@@ -50,14 +50,12 @@ pub struct ImportedTake {
     pub outcome: TakeOutcome,
 }
 
-/// Outcome of a take.
 #[derive(Clone, Debug)]
 pub enum TakeOutcome {
     Accepted(Box<AcceptedTake>),
     Rejected(TakeRejection),
 }
 
-/// Accepted take.
 #[derive(Clone, Debug)]
 pub struct AcceptedTake {
     /// Median shift of the joints by fixing the bone lengths, mm.

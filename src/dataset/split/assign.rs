@@ -298,35 +298,20 @@ impl SplitFill {
 mod tests {
     use super::*;
 
-    fn filled(secs: &[f64]) -> [f64; 3] {
-        let mut fill = SplitFill::new(0.15, 0.15, secs.iter().sum());
-        for (n, one) in secs.iter().enumerate() {
-            let split = fill.furthest_below_share(secs.len() - n);
-            fill.add(split, *one);
-        }
-        Split::ALL.map(|split| fill.splits.iter().find(|entry| entry.0 == split).unwrap().2)
-    }
-
     #[test]
-    fn videos_fill_the_split_furthest_below_its_share_and_no_split_is_empty() {
-        assert_eq!(filled(&[10.0; 10]), [70.0, 20.0, 10.0]);
-        let few = |n: usize| {
+    fn few_videos_leave_no_split_empty() {
+        let filled = |n: usize| -> Vec<Split> {
             let mut fill = SplitFill::new(0.15, 0.15, n as f64);
-            (0..n)
-                .map(|k| {
-                    let split = fill.furthest_below_share(n - k);
-                    fill.add(split, 1.0);
-                    split
-                })
-                .collect::<Vec<_>>()
+            let next = |k: usize| {
+                let split = fill.furthest_below_share(n - k);
+                fill.add(split, 1.0);
+                split
+            };
+            (0..n).map(next).collect()
         };
-        assert_eq!(few(1), [Split::Train]);
-        assert_eq!(few(2), [Split::Train, Split::Validation]);
-        assert_eq!(few(3), [Split::Train, Split::Validation, Split::Test]);
-        assert_eq!(few(4), [Split::Train, Split::Train, Split::Validation, Split::Test]);
-        let mut fill = SplitFill::new(0.2, 0.0, 10.0);
-        assert_eq!(fill.furthest_below_share(2), Split::Train);
-        fill.add(Split::Train, 5.0);
-        assert_eq!(fill.furthest_below_share(1), Split::Validation);
+        assert_eq!(filled(1), [Split::Train]);
+        assert_eq!(filled(2), [Split::Train, Split::Validation]);
+        assert_eq!(filled(3), [Split::Train, Split::Validation, Split::Test]);
+        assert_eq!(filled(4), [Split::Train, Split::Train, Split::Validation, Split::Test]);
     }
 }

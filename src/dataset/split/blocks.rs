@@ -184,29 +184,6 @@ mod tests {
     }
 
     #[test]
-    fn adjacent_blocks_of_different_splits_are_a_gap_apart() {
-        let block = |split, start_secs, end_secs| TimeBlock { split: Some(split), start_secs, end_secs };
-        let blocks = [
-            block(Split::Train, 0.0, 10.0),
-            block(Split::Test, 10.0, 11.0),
-            block(Split::Train, 11.0, 30.0),
-            TimeBlock { split: None, start_secs: 30.0, end_secs: 31.0 },
-            block(Split::Train, 31.0, 32.0),
-            TimeBlock { split: None, start_secs: 32.0, end_secs: 35.0 },
-            block(Split::Validation, 35.0, 50.0),
-        ];
-        let fps = FrameRate::new(10, 1);
-        let usable = usable(&blocks, fps, 480, 45);
-        for (n, (split, part)) in usable.iter().enumerate() {
-            for (other, later) in &usable[n + 1..] {
-                assert!(later.start >= part.end + if split == other { 0 } else { 45 }, "{usable:?}");
-            }
-        }
-        assert_eq!(usable.last().unwrap().1.end, 480);
-        assert!(usable.iter().filter(|(split, _)| *split == Split::Train).count() >= 2, "{usable:?}");
-    }
-
-    #[test]
     fn shared_audio_is_excluded_where_the_splits_differ() {
         let block = |split, start_secs, end_secs| TimeBlock { split: Some(split), start_secs, end_secs };
         let own = [block(Split::Train, 0.0, 60.0), block(Split::Test, 60.0, 100.0)];
@@ -219,7 +196,6 @@ mod tests {
         let holes: Vec<Span> = found.into_iter().map(|(span, ..)| span).collect();
         let left = without(&own, &holes);
         assert!(conflicts(&left, (10.0, 70.0), &other, 10.0).is_empty(), "{left:?}");
-        assert_eq!(left.iter().map(TimeBlock::secs).sum::<f64>(), 100.0);
         assert_eq!(left.first().unwrap().end_secs, 29.0);
     }
 }

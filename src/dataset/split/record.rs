@@ -96,9 +96,6 @@ impl SplitRecord {
     }
 
     /// Writes the record atomically.
-    ///
-    /// # Errors
-    /// A folder that cannot be written.
     pub fn write(&self, path: &Path) -> Result<()> {
         workdir::write_file(path, &pretty(self)?)
     }

@@ -43,7 +43,6 @@ pub struct Verified {
     pub n_samples: usize,
     /// Seconds of motion.
     pub secs: f64,
-    /// Bytes read.
     pub bytes: u64,
 }
 
@@ -311,9 +310,6 @@ fn files_of(dir: &Path) -> Result<BTreeMap<String, u64>> {
 }
 
 /// Reads the ledgers of all videos of the dataset in `dir`.
-///
-/// # Errors
-/// An unreadable or damaged `ledger.jsonl`.
 pub fn read_ledgers(dir: &Path) -> Result<Vec<LedgerLine>> {
     let path = dir.join(crate::LEDGER);
     let text = input::read_text(&path, input::MAX_TEXT).with_context(|| format!("reading {}", path.display()))?;

@@ -79,16 +79,12 @@ pub struct EntryWriter {
     dir: PathBuf,
     entry: VideoEntry,
     max_shard_bytes: u64,
-    /// Shards of each split.
     shards: BTreeMap<Split, ShardWriter>,
 }
 
 impl EntryWriter {
     /// Starts the entry of a video in the dataset in `dir`. All its samples are in `split`, or (`None`) in several
     /// splits. A shard is closed before it would exceed `max_shard_bytes`.
-    ///
-    /// # Errors
-    /// An invalid name, or one that another video of the dataset has.
     pub fn new(
         dir: &Path,
         source: VideoSource,

@@ -42,11 +42,6 @@ impl ShardWriter {
         Ok(FileName::new(format!("{}-{}-{:04}.tar", self.split.name(), self.video, self.shards.len()))?)
     }
 
-    /// Appends a sample.
-    pub fn push(&mut self, sample: &Sample) -> Result<()> {
-        self.push_members(sample, &sample.members()?)
-    }
-
     /// Appends a sample with `members` as the bytes of its required members; the optional ones are encoded here.
     pub fn push_members(&mut self, sample: &Sample, members: &[Vec<u8>; 5]) -> Result<()> {
         let optional = sample.optional_members()?;

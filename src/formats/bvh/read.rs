@@ -322,15 +322,6 @@ mod tests {
     }
 
     #[test]
-    fn rounded_frame_times_and_frame_counts_are_noted() {
-        let text = arm("3 Zrotation Yrotation Xrotation", "0 0 0 0 0 0 0 0 0");
-        let bvh = Bvh::parse(&text.replace("0.04", "0.017").replace("Frames: 1", "Frames: 2")).unwrap();
-        assert_eq!((bvh.n_frames, bvh.frame_secs), (1, 1.0 / 60.0));
-        assert_eq!(bvh.notes[0], "the frame time 0.017 is rounded: read as 60 fps (as written 58.82 fps)");
-        assert_eq!(bvh.notes[1], "line 17 states 2 frames, the file has 1: all complete frames are read");
-    }
-
-    #[test]
     fn implausible_counts_allocate_no_memory() {
         let joints = "JOINT a { OFFSET 0 0 0 ".repeat(200) + &"} ".repeat(200);
         let file = |channels: &str, n_frames: usize, values: &str| {
@@ -359,20 +350,5 @@ mod tests {
         assert!(error_of(format!("{head}{}", "End Site { ".repeat(300))).contains("the name has"));
         let valid = format!("{head}{}}} MOTION Frames: 1 Frame Time: 0.04 0", joint.repeat(MAX_JOINTS - 1));
         assert_eq!(Bvh::parse(&valid).unwrap().joints.len(), MAX_JOINTS);
-    }
-
-    proptest::proptest! {
-        #[test]
-        fn no_text_panics(
-            words in "((HIERARCHY|ROOT|JOINT|End|Site|OFFSET|CHANNELS|MOTION|Frames:|Frame|Time:|Xposition|[{}]|a|-?[0-9.]{1,3})[ \n]){0,30}",
-            cut in 0usize..200,
-        ) {
-            let good = arm("3 Zrotation Yrotation Xrotation", "0 0 0 0 0 0 0 0 0");
-            for text in [words.clone(), format!("HIERARCHY ROOT a {{ {words}"), format!("{}{words}", &good[..cut.min(good.len())])] {
-                if let Ok(bvh) = Bvh::parse(&text) && bvh.n_frames < 1000 {
-                    let _ = bvh.positions(Positions::Auto);
-                }
-            }
-        }
     }
 }

@@ -24,7 +24,6 @@ pub struct BvhClip {
 }
 
 impl BvhClip {
-    /// Number of frames.
     pub fn n_frames(&self) -> usize {
         self.local.len()
     }

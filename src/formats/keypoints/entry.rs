@@ -33,7 +33,6 @@ pub struct JsonEntry {
     hand_right_keypoints_2d: PointNumbers,
 }
 
-/// Name or number of an image.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Deserialize)]
 #[serde(untagged)]
 pub enum ImageName {

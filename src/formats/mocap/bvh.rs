@@ -38,10 +38,6 @@ pub fn read_unrotated(path: &Path, units: Option<LengthUnit>) -> Result<Captured
 }
 
 /// Alignment by which [`read_unrotated`] converts a take; `frames` are the positions of its joints.
-///
-/// # Errors
-///
-/// Those of [`read`].
 pub fn unrotated_alignment(bvh: &Bvh, frames: &[Vec<Vec3>], units: Option<LengthUnit>) -> Result<AxisAlignment> {
     let alignment = AxisAlignment::fit(&torso(bvh, frames)?.1, units)?;
     Ok(alignment.unrotated().unwrap_or(alignment))
@@ -125,7 +121,6 @@ fn from_bvh(
     Ok(CapturedMotion { motion, text: None, facts: facts.as_object().cloned().unwrap_or_else(Map::new) })
 }
 
-/// Joints of a file.
 struct JointMap {
     /// Index of the file's joint for each joint of `types::skeleton`.
     joints: [Option<usize>; N_JOINTS],

@@ -47,10 +47,6 @@ impl MotionKind {
 }
 
 /// Reads a motion file of the given kind; the unit of a BVH is detected.
-///
-/// # Errors
-///
-/// Those of [`read_in`].
 pub fn read(kind: MotionKind, path: &Path) -> Result<CapturedMotion> {
     read_in(kind, path, None)
 }

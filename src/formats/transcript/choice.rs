@@ -44,37 +44,3 @@ fn without_folder(path: &Path, error: &anyhow::Error) -> String {
     let folder = path.parent().map(|folder| format!("{}/", folder.display())).filter(|folder| folder != "/");
     folder.iter().fold(format!("{error:#}"), |text, folder| text.replace(folder, ""))
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_first_usable_file_is_chosen() {
-        let dir = tempfile::tempdir().unwrap();
-        let write = |name: &str, text: &str| {
-            let path = dir.path().join(name);
-            std::fs::write(&path, text).unwrap();
-            path
-        };
-        let tracker = write("a.json", r#"{"names": ["jawOpen"], "frames": [{"weights": [0.5], "time": 0.1}]}"#);
-        let (plain, timed) = (write("a.txt", "so"), write("a.tsv", "0\t1\tso\n"));
-        let late = write("a.ctm", "a 1 90 1 so\n");
-        let check = |_: &Path, transcript: &Transcript| {
-            anyhow::ensure!(transcript.words.iter().all(|word| word.start_secs < 9.0), "late");
-            Ok(())
-        };
-        let choose = |paths: &[&PathBuf]| {
-            let paths: Vec<PathBuf> = paths.iter().map(|path| (*path).clone()).collect();
-            let TranscriptChoice { found, notes, n_read } = TranscriptChoice::first(&paths, "", check);
-            (found.map(|(path, _)| path), notes, n_read)
-        };
-        let (found, notes, n_read) = choose(&[&tracker, &late, &plain, &timed, &plain]);
-        assert_eq!((found, n_read, notes.len()), (Some(timed.clone()), 4, 3));
-        assert!(notes[0].starts_with("a.json is not a valid transcript: expected `words`"), "{notes:?}");
-        assert_eq!(notes[1..], ["late", "a.tsv was read instead"]);
-        assert_eq!(choose(&[&plain, &tracker]).0, Some(plain.clone()));
-        assert_eq!(choose(&[&timed, &tracker]), (Some(timed.clone()), Vec::new(), 1));
-        assert_eq!((choose(&[&tracker]).0, choose(&[]).2), (None, 0));
-    }
-}

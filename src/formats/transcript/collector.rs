@@ -30,10 +30,6 @@ impl WordCollector {
     }
 
     /// Adds the words of `text`, spoken from `start` to `end` seconds; one time alone limits the estimated other one.
-    ///
-    /// # Errors
-    ///
-    /// Those of `word::push`.
     pub(super) fn push(
         &mut self,
         text: &str,
@@ -75,10 +71,6 @@ impl WordCollector {
     }
 
     /// All words.
-    ///
-    /// # Errors
-    ///
-    /// There are words, but no time was stated.
     pub(super) fn finish(mut self) -> Result<Vec<Word>> {
         ensure!(
             self.waiting.is_empty() || self.has_times,
@@ -99,43 +91,5 @@ impl WordCollector {
             let (source, confidence) = (WordSource::Interpolated, Some(0.0));
             self.words.push(Word { word, start_secs, end_secs, source, confidence });
         }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn words_without_times_stay_within_their_sentence() {
-        let mut collector = WordCollector::default();
-        collector.push("so", (Some(0.0), Some(0.5)), None).unwrap();
-        collector.push("well", (None, None), None).unwrap();
-        collector.begin(2.0);
-        collector.push("in 2014", (None, None), None).unwrap();
-        collector.end(3.0);
-        collector.push("we", (Some(4.0), None), None).unwrap();
-        collector.push("go", (None, Some(5.0)), None).unwrap();
-        collector.append(".");
-        collector.push("on", (Some(6.0), Some(6.5)), Some(0.5)).unwrap();
-        collector.push("late", (None, None), None).unwrap();
-        let words = collector.finish().unwrap();
-        let found: Vec<_> = words.iter().map(|word| (word.word.as_str(), word.start_secs, word.end_secs)).collect();
-        let expected = [
-            ("so", 0.0, 0.5),
-            ("well", 0.5, 2.0),
-            ("in", 2.0, 2.5),
-            ("2014", 2.5, 3.0),
-            ("we", 4.0, 4.5),
-            ("go.", 4.5, 5.0),
-            ("on", 6.0, 6.5),
-            ("late", 6.5, 6.5),
-        ];
-        assert_eq!(found, expected);
-        let n_estimated = words.iter().filter(|word| word.source == WordSource::Interpolated).count();
-        assert_eq!((n_estimated, words[1].confidence, words[6].confidence), (6, Some(0.0), Some(0.5)));
-        let mut untimed = WordCollector::default();
-        untimed.push("so", (None, None), None).unwrap();
-        assert!(untimed.finish().unwrap_err().to_string().contains("word 1"));
     }
 }

@@ -19,10 +19,6 @@ pub enum JsonTranscript {
 
 /// Words of the tier of `speaker` (MFA), or of every list of words at any depth; of a recogniser's `alternatives` only
 /// the first is used. Words without times are placed within their sentence.
-///
-/// # Errors
-///
-/// Invalid JSON, or JSON without words or text; the index of a word with invalid times.
 pub fn read(content: &str, speaker: &str) -> Result<JsonTranscript> {
     let value = parse(content)?;
     if let Some(tiers) = value.get("tiers") {

@@ -13,10 +13,6 @@ const WORD: [&str; 3] = ["word", "text", "value"];
 const CONFIDENCE: [&str; 4] = ["confidence", "probability", "score", "conf"];
 
 /// Parses JSON in which Python's `NaN` and `Infinity` stand for null; several values in a row become a list.
-///
-/// # Errors
-///
-/// Invalid JSON.
 pub(super) fn parse(text: &str) -> Result<Value> {
     let all = |text: &str| Deserializer::from_str(text).into_iter::<Value>().collect::<serde_json::Result<Vec<_>>>();
     let has_literals = ["NaN", "Infinity"].iter().any(|literal| text.contains(literal));

@@ -188,18 +188,6 @@ mod tests {
         }
     }
 
-    #[test]
-    fn webvtt_inline_times_are_used_once_per_word() {
-        let vtt = "WEBVTT\n\n00:00:01.000 --> 00:00:03.000\nso<00:00:01.500><c> well</c><00:00:02.000><c> &amp;</c>\n\n\
-                   00:00:03.000 --> 00:00:03.010\nso well &amp;\n\n\
-                   00:00:03.010 --> 00:00:04.000\nso well &amp;\nnow<00:00:03.500><c> then</c>\n";
-        let words = read(vtt).unwrap();
-        let found: Vec<_> = words.iter().map(|w| (w.word.as_str(), w.start_secs, w.end_secs)).collect();
-        let expected = [("so", 1.0, 1.5), ("well", 1.5, 2.0), ("&", 2.0, 3.0), ("now", 3.01, 3.5), ("then", 3.5, 4.0)];
-        assert_eq!(found, expected);
-        assert!(words.iter().all(|word| word.source == WordSource::Given));
-    }
-
     /// Words with the start and end of their cues.
     fn spoken(text: &str) -> Vec<(String, f64, f64)> {
         let words = read(text).unwrap();

@@ -98,19 +98,6 @@ mod tests {
         \"words\"\n0\n2\n2\n0\n0.5\n\"\"\n0.5\n2\n\"so\"\n";
 
     #[test]
-    fn both_formats_yield_the_words() {
-        for text in [LONG, SHORT] {
-            let words = read(text, "").unwrap();
-            let found: Vec<_> = words.iter().map(|word| (word.word.as_str(), word.start_secs, word.end_secs)).collect();
-            assert_eq!(found, [("so", 0.5, 2.0)]);
-        }
-        assert!(read("File type = \"ooTextFile\"\n", "").is_err());
-        for end in 0..SHORT.len() {
-            let _ = read(&SHORT[..end], "");
-        }
-    }
-
-    #[test]
     fn labels_may_contain_line_breaks_and_quotes() {
         let found = |text: &str| {
             let words = read(text, "").map_err(|error| error.to_string())?;

@@ -8,10 +8,6 @@ const VOWELS: [&str; 15] = ["AA", "AE", "AH", "AO", "AW", "AY", "EH", "ER", "EY"
 
 /// Words of the tier of `speaker`, given all interval tiers with their names. Tiers with `word` in their name (`ORT` of
 /// WebMAUS) take precedence; if there are none, tiers of phones are excluded.
-///
-/// # Errors
-///
-/// No tier, only tiers of phones, or several tiers of which none is named after the speaker or only `words`.
 pub(super) fn words_of(mut tiers: Vec<(String, Vec<Word>)>, speaker: &str) -> Result<Vec<Word>> {
     ensure!(!tiers.is_empty(), "the file has no interval tier");
     let all = names(&tiers);

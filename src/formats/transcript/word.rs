@@ -33,10 +33,6 @@ pub enum WordSource {
 
 /// Appends the words of `text`, spoken from `start_secs` to `end_secs`, without its marks. Several words share the time
 /// in proportion to their number of characters. A `confidence` outside 0..1 is dropped.
-///
-/// # Errors
-///
-/// The times are not finite, negative or in the wrong order.
 pub fn push(
     words: &mut Vec<Word>,
     text: &str,

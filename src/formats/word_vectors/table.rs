@@ -86,7 +86,6 @@ impl WordVectors {
         self.dim
     }
 
-    /// Number of words.
     pub fn n_words(&self) -> usize {
         self.rows.len()
     }

@@ -22,7 +22,6 @@ pub struct TableWriter {
 }
 
 impl TableWriter {
-    /// Creates the file `path`.
     pub fn new(path: &Path, dim: usize) -> Result<Self> {
         ensure!((1..=10_000).contains(&dim), "invalid vector length {dim}: expected 1 to 10000");
         let file = File::create(path).with_context(|| format!("cannot write {}", path.display()))?;
@@ -58,10 +57,6 @@ impl TableWriter {
     }
 
     /// Writes the words and the header, and returns the number of words.
-    ///
-    /// # Errors
-    ///
-    /// No word was added.
     pub fn finish(mut self) -> Result<usize> {
         let (n_words, dim) = (self.known.len(), self.dim);
         ensure!(n_words > 0, "it contains no words");

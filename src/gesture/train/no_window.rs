@@ -1,4 +1,5 @@
-//! Explains why a split of a dataset has no window to train or validate on, and suggests a remedy.
+//! Explains why a split of a dataset has no window to train or validate on, or too little motion, and suggests a
+//! remedy.
 
 use anyhow::{Result, bail};
 use orator_base::text::{counted, length};
@@ -13,6 +14,21 @@ pub struct NeededFrames {
     pub n_frames: usize,
     /// Configuration key of the length in frames, and the number its values must be multiples of.
     pub key: Option<(&'static str, usize)>,
+}
+
+/// Shortest duration of motion, seconds, for which the recipes have values.
+const LITTLE_SECS: f64 = 120.0;
+
+/// Warning before a training from random weights on `secs` seconds of motion, if that is too little.
+pub fn motion_warning(secs: f64) -> Option<String> {
+    (secs < LITTLE_SECS).then(|| {
+        format!(
+            "warning: {} of motion to train on: expect a result close to the mean pose; add videos: at least {} are \
+             needed, ten minutes are better",
+            length(secs),
+            counted((LITTLE_SECS / 60.0) as usize, "minute")
+        )
+    })
 }
 
 /// Fails with cause and remedy if no interval of the training split is long enough.
@@ -63,13 +79,10 @@ fn empty(info: &DatasetInfo, split: Split) -> String {
         "import it again with other shares (`--validation`, `--test`) or more data".to_owned()
     } else {
         let longest = info.videos.iter().filter(|video| video.samples > 0).max_by(|a, b| a.secs.total_cmp(&b.secs));
-        let named = longest.map_or(String::new(), |video| format!("{name} = [{:?}]", video.file));
-        match split {
-            Split::Train => format!(
-                "set {named} under [[speaker]] or split_by = \"time\" under [dataset], then run `orator run` again"
-            ),
-            _ => "set split_by = \"time\" under [dataset] or add videos, then run `orator run` again".to_owned(),
-        }
+        let named = longest.filter(|_| split == Split::Train);
+        let named =
+            named.map_or(String::new(), |video| format!(", or set `{name} = [{:?}]` under [[speaker]]", video.file));
+        format!("{}{named}; then run `orator run` again", info.empty_split_fix())
     };
     format!("the {name} split is empty ({}); {remedy}", others.join(", "))
 }

@@ -3,4 +3,5 @@
 pub mod captured;
 pub mod fingers;
 pub mod neck;
+pub mod smplx;
 pub mod upper_body;

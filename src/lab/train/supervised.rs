@@ -7,9 +7,9 @@ use orator_base::stage::progress::Progress;
 use orator_base::stage::workdir::FolderLock;
 use orator_gesture::train::epochs::StoppedTraining;
 use orator_gesture::train::log::MetricsLog;
+use orator_gesture::train::log::ProgressLog;
 use orator_gesture::train::optim::adam;
 use orator_gesture::train::optim::adam::Adam;
-use orator_gesture::train::progress_log::ProgressLog;
 use orator_nn::Mode;
 use orator_nn::params::Params;
 use orator_nn::weights::Contents;
@@ -27,6 +27,10 @@ pub trait TrainingTask: Send + Sync {
     /// The network's configuration and everything else that the samples depend on; stored in the weights file.
     fn metadata(&self) -> Value;
     fn params(&self) -> &Params;
+    /// Tensors of a weights file as this network's, if it has inputs that the file's network lacks.
+    fn initial(&self, tensors: BTreeMap<String, Tensor>) -> Result<BTreeMap<String, Tensor>> {
+        Ok(tensors)
+    }
     /// Shape of one input sample.
     fn shape_in(&self) -> Vec<usize>;
     /// Loss weight of each output point; a target has three numbers per point.
@@ -108,7 +112,7 @@ pub fn start_from(training_task: &dyn TrainingTask, path: &Path) -> Result<Strin
             contents.facts["kind"],
             training_task.kind()
         );
-        training_task.params().load(&contents.tensors)
+        training_task.params().load(&training_task.initial(contents.tensors)?)
     };
     load().with_context(|| format!("cannot initialise from {}", path.display()))?;
     Ok(blake3::hash(&bytes).to_hex().to_string())

@@ -80,10 +80,6 @@ impl Aligner {
 
     /// Aligns words with audio; `None` for a word that does not fit. `feed` is called with a function that takes
     /// chunks of mono samples in -1..1 at 16 kHz.
-    ///
-    /// # Errors
-    ///
-    /// Those of `feed`; a subprocess that ended early, with the last line of its error output.
     pub fn align(
         mut self,
         words: &[SpokenWord],

@@ -191,14 +191,6 @@ mod tests {
     }
 
     #[test]
-    fn the_louder_channel_replaces_a_cancelled_mix() {
-        let (out, left, n_single) = chosen(2.3, 0.5, |_, left| -0.9 * left);
-        assert_eq!((out == left, n_single as usize), (true, left.len()));
-        let (out, left, _) = chosen(0.2, 0.5, |_, left| -1.1 * left);
-        assert!(out.iter().zip(&left).all(|(out, left)| *out == -1.1 * left));
-    }
-
-    #[test]
     fn changes_of_phase_are_cross_faded() {
         // The right channel changes its sign gradually, around 2 s and 4 s.
         let gain = |secs: f64| (10.0 * (secs - 3.0).abs() - 10.0).clamp(-1.0, 1.0) as f32;

@@ -12,10 +12,6 @@ use orator_base::types::image::Image;
 const QUALITY: i32 = 4;
 
 /// Encodes an image as a JPEG file.
-///
-/// # Errors
-///
-/// The image has no pixels, or ffmpeg has no JPEG encoder.
 pub fn encode(image: &Image) -> Result<Vec<u8>> {
     super::source::init();
     let [width, height] = [u32::try_from(image.width)?, u32::try_from(image.height)?];

@@ -21,6 +21,11 @@ impl SrcFromDst {
         self.0.map(|[a, b, c]| a * x + b * y + c)
     }
 
+    /// Source px per px of the warped image.
+    pub fn scale(&self) -> f64 {
+        self.0[0][0].hypot(self.0[1][0])
+    }
+
     fn is_plausible(&self) -> bool {
         self.0.iter().flatten().all(|number| number.abs() < MAX_COORDINATE_PX)
     }

@@ -5,7 +5,7 @@ use super::temporal::{Config, TemporalLifter};
 use crate::Mode;
 use crate::params::Params;
 use candle_core::{Device, Result, Tensor};
-use orator_base::motion::upper_body::{BodyPoints, Pose};
+use orator_base::motion::upper_body::{BodyPoints, HandDirections, Pose};
 use orator_base::motion::view::body::{BodyView, N_IN, N_OUT, mirror_mean};
 
 /// Number of windows per forward pass.
@@ -32,11 +32,11 @@ impl BodyLifter {
 
     /// Returns a pose for every frame, in px of the picture with the neck at 0; `None` where a shoulder is not visible
     /// within half a window. The first and last frame are repeated beyond the ends. The frames of a window are `step`
-    /// frames apart, because the network is trained at 15 frames per second. The result is averaged with that of the
-    /// mirrored window.
-    pub fn poses(&self, seen: &[BodyPoints], step: f64) -> Result<Vec<Option<Pose>>> {
+    /// frames apart, because the network is trained at 15 frames per second. `hands` has the directions of the hands in
+    /// every frame, or is empty. The result is averaged with that of the mirrored window.
+    pub fn poses(&self, seen: &[BodyPoints], hands: &[HandDirections], step: f64) -> Result<Vec<Option<Pose>>> {
         let window = self.net.config().receptive_field();
-        let view = |t: usize| BodyView::around(seen, t, window, step);
+        let view = |t: usize| BodyView::around(seen, hands, t, window, step);
         let mut poses = Vec::with_capacity(seen.len());
         for first in (0..seen.len()).step_by(BATCH) {
             let views: Vec<Option<BodyView>> = (first..seen.len().min(first + BATCH)).map(view).collect();
@@ -52,13 +52,13 @@ impl BodyLifter {
 
     /// Returns N_OUT values per view.
     fn outputs<'a>(&self, views: impl Iterator<Item = &'a BodyView>) -> Result<Vec<f32>> {
-        let numbers: Vec<f32> = views.flat_map(|view| view.numbers.iter().copied()).collect();
-        let window = self.net.config().receptive_field();
-        let n_views = numbers.len() / (N_IN * window);
+        let (n_in, window) = (self.net.config().n_in, self.net.config().receptive_field());
+        let numbers: Vec<f32> = views.flat_map(|view| view.numbers.iter().take(n_in * window).copied()).collect();
+        let n_views = numbers.len() / (n_in * window);
         if n_views == 0 {
             return Ok(Vec::new());
         }
-        let x = Tensor::from_vec(numbers, (n_views, N_IN, window), &Device::Cpu)?;
+        let x = Tensor::from_vec(numbers, (n_views, n_in, window), &Device::Cpu)?;
         self.net.forward(&x, &mut Mode::Eval)?.flatten_all()?.to_vec1::<f32>()
     }
 }
@@ -74,12 +74,12 @@ mod tests {
         let seen: BodyPoints = std::array::from_fn(|j| Some([j as f32 * 10.0, (j * j) as f32]));
         let mut frames = vec![seen; 300];
         frames[100..200].fill([None; 9]);
-        let poses = lifter.poses(&frames, 1.0)?;
+        let poses = lifter.poses(&frames, &[], 1.0)?;
         assert_eq!(poses.len(), 300);
         for (t, pose) in poses.iter().enumerate() {
             assert_eq!(pose.is_none(), (113..187).contains(&t), "frame {t}");
         }
-        assert!(lifter.poses(&[], 2.0)?.is_empty());
+        assert!(lifter.poses(&[], &[], 2.0)?.is_empty());
         Ok(())
     }
 }

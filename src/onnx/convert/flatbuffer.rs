@@ -48,7 +48,6 @@ impl<'a> FlatTable<'a> {
         self.field(field).map_or(Ok(absent), |at| Ok(i32::from_le_bytes(read(self.file, at)?)))
     }
 
-    /// Reads a table.
     pub(crate) fn table(&self, field: usize) -> Result<Option<Self>> {
         let Some(at) = self.field(field) else { return Ok(None) };
         Self::at(self.file, target(self.file, at)?).map(Some)

@@ -45,10 +45,6 @@ pub struct ConversionOptions {
 
 impl ConversionOptions {
     /// Shape of the input.
-    ///
-    /// # Errors
-    ///
-    /// A size is not in 1..=16384.
     pub fn shape(&self) -> Result<Vec<usize>> {
         let size = |size: &i64| usize::try_from(*size).ok().filter(|size| (1..=1 << 14).contains(size));
         let sizes: Option<Vec<usize>> = self.input.shape.iter().map(size).collect();
@@ -58,10 +54,6 @@ impl ConversionOptions {
     }
 
     /// Name of the only output.
-    ///
-    /// # Errors
-    ///
-    /// There is not exactly one named output.
     pub fn only_output(&self) -> Result<&str> {
         match self.outputs.as_slice() {
             [name] if !name.is_empty() => Ok(name),

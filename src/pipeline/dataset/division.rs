@@ -54,9 +54,6 @@ pub fn guard_frames(settings: &Settings, context_secs: f64) -> usize {
 }
 
 /// Recorded splits: of the work folder, else of the existing dataset.
-///
-/// # Errors
-/// A damaged record.
 pub fn recorded_splits(work: &Path, speaker: &Unit) -> Result<Option<SplitRecord>> {
     let record = SplitRecord::read(&artifacts::splits(work, &speaker.speaker))?;
     Ok(record.or_else(|| of_dataset(&dir(work, StageName::Dataset, speaker))))

@@ -9,7 +9,7 @@ use orator_media::opencv::{draw, png};
 use std::path::Path;
 
 /// Width and height of a cell in px: the face, and below it the name of the video.
-const CELL: [usize; 2] = [144, 160];
+const CELL: [usize; 2] = [144, 186];
 const FACE_PX: usize = 128;
 const N_COLUMNS: usize = 8;
 /// Largest number of rows.
@@ -19,9 +19,6 @@ const RULE: [u8; 3] = [170; 3];
 const INK: [u8; 3] = [30; 3];
 
 /// Writes the faces of groups of videos as PNG.
-///
-/// # Errors
-/// A picture that cannot be read or written.
 pub fn write(path: &Path, work: &Path, groups: &[Vec<&VideoPerson>]) -> Result<()> {
     let rows: Vec<(bool, &[&VideoPerson])> = groups
         .iter()
@@ -43,8 +40,10 @@ pub fn write(path: &Path, work: &Path, groups: &[Vec<&VideoPerson>]) -> Result<(
                 let face = png::read(&file)?;
                 draw::paste(&mut sheet, &face, [left + gap, top + gap]);
             }
-            let name = truncate_to_cell(&video.file)?;
-            draw::text(&mut sheet, &name, [(left + gap) as f32, (top + CELL[1] - 8) as f32], TEXT_PX, INK)?;
+            for (number, line) in lines(&video.file)?.iter().enumerate() {
+                let y = top + gap + FACE_PX + LINE_PX * (number + 1);
+                draw::text(&mut sheet, line, [(left + gap) as f32, y as f32], TEXT_PX, INK)?;
+            }
         }
     }
     workdir::replace(path, |attempt| png::write(attempt, &sheet))
@@ -53,11 +52,43 @@ pub fn write(path: &Path, work: &Path, groups: &[Vec<&VideoPerson>]) -> Result<(
 /// Height of a capital letter, px.
 const TEXT_PX: f32 = 7.0;
 
-/// Truncates a name at the front to fit its cell, because names within a folder usually share their beginning.
-fn truncate_to_cell(name: &str) -> Result<String> {
-    let mut letters: Vec<char> = name.chars().map(|letter| if letter.is_ascii() { letter } else { '?' }).collect();
-    while letters.len() > 3 && draw::text_width(&letters.iter().collect::<String>(), TEXT_PX)? > FACE_PX as f32 {
-        letters.remove(0);
+/// Distance of two lines of a name, px, and largest number of lines.
+const LINE_PX: usize = 14;
+const MAX_LINES: usize = 3;
+
+/// Lines of a name that fit its cell. Of a longer name the end is shown, because names within a folder usually share
+/// their beginning.
+fn lines(name: &str) -> Result<Vec<String>> {
+    let (mut lines, mut line) = (Vec::new(), String::new());
+    for letter in name.chars().map(|letter| if letter.is_ascii() { letter } else { '?' }) {
+        if draw::text_width(&format!("{line}{letter}"), TEXT_PX)? > FACE_PX as f32 {
+            lines.push(std::mem::take(&mut line));
+        }
+        line.push(letter);
     }
-    Ok(letters.into_iter().collect())
+    lines.push(line);
+    let n_omitted = lines.len().saturating_sub(MAX_LINES);
+    let mut shown = lines.split_off(n_omitted);
+    if let Some(first) = shown.first_mut().filter(|_| n_omitted > 0) {
+        *first = format!("...{}", first.chars().skip(3).collect::<String>());
+    }
+    Ok(shown)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_are_wrapped_instead_of_cut() {
+        let name = "interview-with-a-long-name-2021-05-14.mp4";
+        let wrapped = lines(name).unwrap();
+        assert!((2..=MAX_LINES).contains(&wrapped.len()) && wrapped.concat() == name, "{wrapped:?}");
+        let long = lines(&name.repeat(4)).unwrap();
+        assert!(
+            long.len() == MAX_LINES && long[0].starts_with("...") && long.concat().ends_with("05-14.mp4"),
+            "{long:?}"
+        );
+        assert_eq!(lines("a.mp4").unwrap(), ["a.mp4"]);
+    }
 }

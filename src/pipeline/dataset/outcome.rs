@@ -50,7 +50,6 @@ impl SeveralPersons {
     }
 }
 
-/// Outcome of writing a dataset.
 pub struct DatasetOutcome<'a> {
     pub settings: &'a config::DatasetConfig,
     pub rule: &'a SplitRule,
@@ -64,13 +63,10 @@ pub struct DatasetOutcome<'a> {
 
 impl DatasetOutcome<'_> {
     /// Report of the stage on the dataset in `out`.
-    ///
-    /// # Errors
-    /// Files of the dataset that cannot be read.
     pub fn report(&self, out: &Path) -> Result<Report> {
         let info: DatasetInfo = serde_json::from_slice(&std::fs::read(out.join(INFO))?).context(INFO)?;
         let leakage: Leakage = serde_json::from_slice(&std::fs::read(out.join(LEAKAGE))?).context(LEAKAGE)?;
-        let warnings = self.warnings(&leakage);
+        let warnings = self.warnings(&info, &leakage);
         let part = |split: Split| {
             let info = info.splits.get(split.name()).cloned().unwrap_or_default();
             format!("{} {:.1} s in {}", split.name(), info.secs, counted(info.samples, "interval"))
@@ -98,7 +94,7 @@ impl DatasetOutcome<'_> {
     }
 
     /// Warnings, each with what to do.
-    fn warnings(&self, leakage: &Leakage) -> Vec<String> {
+    fn warnings(&self, info: &DatasetInfo, leakage: &Leakage) -> Vec<String> {
         let Self { videos, stats, n_failed, n_left_out, .. } = *self;
         let mut warnings: Vec<String> = self.several_persons.iter().map(SeveralPersons::warning).collect();
         // The longest video is proposed for training; each of the others is proposed once.
@@ -114,19 +110,14 @@ impl DatasetOutcome<'_> {
                 Split::Train => by_length.first(),
                 _ => others.next(),
             };
+            let remedy = info.empty_split_fix();
             warnings.push(match file {
-                Some(_) | None if self.rule.unit == SplitUnit::Time => {
-                    format!("no sample in the {name} split: too little footage was accepted to divide it; add videos")
-                }
+                _ if self.rule.unit == SplitUnit::Time => format!("no sample in the {name} split: {remedy}"),
                 Some(video) => format!(
-                    "no video in the {name} split: add videos, or set `{name} = [{:?}]` under [[speaker]], or set \
-                     `split_by = \"time\"` under [dataset] to divide all videos again",
+                    "no video in the {name} split: {remedy}, or set `{name} = [{:?}]` under [[speaker]]",
                     video.file
                 ),
-                None => format!(
-                    "no video in the {name} split: add videos, or set `split_by = \"time\"` under [dataset] to divide \
-                     all videos again"
-                ),
+                None => format!("no video in the {name} split: {remedy}"),
             });
         }
         for leak in &leakage.leaks {

@@ -344,9 +344,6 @@ impl Stage for DatasetStage {
 pub struct NothingAccepted(pub String);
 
 /// Checks that there is an accepted interval.
-///
-/// # Errors
-/// No video; `NothingAccepted`.
 fn check(unit: &Unit, work: &Path, videos: &[LiftedVideo]) -> Result<()> {
     ensure!(
         !videos.is_empty(),

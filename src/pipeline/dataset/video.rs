@@ -234,9 +234,6 @@ pub struct LiftedSamples<'a> {
 
 impl LiftedSamples<'_> {
     /// Sample of the next interval; `None` after the last.
-    ///
-    /// # Errors
-    /// Audio that cannot be read.
     pub fn next_sample(&mut self) -> Result<Option<CutSample>> {
         self.remaining.next().map(|interval| self.cut(*interval)).transpose()
     }

@@ -22,9 +22,6 @@ pub fn count(secs: f64) -> usize {
 }
 
 /// Sets `timeline.span` where spans begin. `open` opens a reader of the pictures, of which `area` counts.
-///
-/// # Errors
-/// Those of `open`.
 pub fn mark(
     read: &mut PictureReading,
     open: impl FnOnce() -> Result<FrameReader>,

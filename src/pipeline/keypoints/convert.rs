@@ -67,8 +67,7 @@ fn pose(person: Option<FoundPerson>, followed: &FollowedPerson, nearest: usize) 
         body: person.body,
         left_hand: person.left_hand,
         right_hand: person.right_hand,
-        other_hand: [false; 2],
-        face: None,
+        ..Pose2d::default()
     }
 }
 

@@ -50,22 +50,6 @@ mod tests {
     }
 
     #[test]
-    fn linear_motion_is_interpolated_exactly() {
-        let people: Vec<FoundPerson> = (0..10).map(|t| person(3.0 * t as f32)).collect();
-        let frames: Vec<Option<&FoundPerson>> = people.iter().map(Some).collect();
-        for frame_idx in [0.0, 0.4, 1.0, 2.75, 8.999_99] {
-            let found = person_at(&frames, frame_idx).unwrap().body[0];
-            assert!(
-                (f64::from(found.x) - 3.0 * frame_idx).abs() < 1e-3 && found.x == -found.y,
-                "{frame_idx}: {found:?}"
-            );
-        }
-        assert_eq!(person_at(&frames, 9.4).unwrap().body[0].x, 27.0);
-        assert_eq!(person_at(&frames, 9.6).unwrap().body[0].score, 0.0);
-        assert_eq!(person_at(&frames, 10.2), None);
-    }
-
-    #[test]
     fn a_point_in_one_frame_only_is_used_up_to_the_midpoint() {
         let (shown, hidden) = (person(4.0), FoundPerson::default());
         let frames = [Some(&shown), Some(&hidden), None, Some(&shown)];

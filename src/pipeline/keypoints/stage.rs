@@ -199,13 +199,11 @@ pub struct StageBySource {
 }
 
 impl StageBySource {
-    /// The stage `extract`.
     pub fn extract(of_videos: Box<dyn Stage>, settings: &Settings, all: &[Videos]) -> Box<dyn Stage> {
         let of_keypoints = KeypointExtractStage::new(&settings.extract, all);
         Self::dispatch(of_videos, Box::new(of_keypoints), all)
     }
 
-    /// The stage `pose2d`.
     pub fn pose2d(of_videos: Box<dyn Stage>, settings: &Settings, all: &[Videos]) -> Box<dyn Stage> {
         Self::dispatch(of_videos, Box::new(KeypointPose2dStage { work: settings.work.dir.clone() }), all)
     }

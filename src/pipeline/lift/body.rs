@@ -2,13 +2,14 @@
 //! size.
 
 use super::gaps::long_gaps;
+use super::hand_direction::hand_directions;
 use super::lifter::IntervalView;
 use super::observed::ObservedBody;
 use anyhow::Result;
 use ndarray::{Array2, s};
 use orator_base::math::order::lower_median;
 use orator_base::motion::upper_body::{
-    ARMS, BodyPoints, L_HIP, L_SHOULDER, NOSE, Pose, R_HIP, R_SHOULDER, REFERENCE_SIZE, size,
+    ARMS, BodyPoints, HandDirections, L_HIP, L_SHOULDER, NOSE, Pose, R_HIP, R_SHOULDER, REFERENCE_SIZE, size,
 };
 use orator_base::types::interval::Interval;
 use orator_base::types::pose2d::Keypoints;
@@ -58,7 +59,9 @@ pub fn lift(
             let end = n_frames.min(first + frames(BATCH_FRAMES).max(1));
             let from = first.saturating_sub(margin);
             let points: Vec<BodyPoints> = (from..n_frames.min(end + margin)).map(|t| observed.frame(t)).collect();
-            let poses = lifter.poses(&points, step)?;
+            let hands: Vec<HandDirections> =
+                (from..n_frames.min(end + margin)).map(|t| hand_directions(keypoints, interval.start + t)).collect();
+            let poses = lifter.poses(&points, &hands, step)?;
             for (t, pose) in poses.iter().enumerate().take(end - from).skip(first - from) {
                 if let Some(pose) = pose {
                     sizes[from + t] = size(pose) as f32;

@@ -5,7 +5,7 @@ use super::hand_depth;
 use super::observed::MAX_PX;
 use super::weights::HandNetwork;
 use anyhow::Result;
-use ndarray::{ArrayView3, ArrayViewMut2, ArrayViewMut3, Axis, s};
+use ndarray::{ArrayView2, ArrayView3, ArrayViewMut2, ArrayViewMut3, Axis, s};
 use orator_base::math::vec3;
 use orator_base::motion::view::hand::{HandJoints, HandPoints, parent};
 use orator_base::types::pose2d::{HAND_VISIBLE_SCORE, N_HAND};
@@ -17,13 +17,15 @@ const MIN_POINTS: usize = 12;
 const BATCH: usize = 1024;
 
 /// Lifts one hand from `points` [T, 21, 3] (x, y in px, score) into `joints` [T, 21, 3]: wrist at 0, sum of the bone
-/// lengths 1; NaN where the hand is missing. `mask` [T, 21] marks the visible points.
+/// lengths 1; NaN where the hand is missing. `mask` [T, 21] marks the visible points. `depth` [T, 21]: depth of the hand
+/// model, if it gives one.
 ///
 /// # Errors
 /// Those of the network.
 pub fn lift(
     lifter: &HandNetwork,
     points: &ArrayView3<f32>,
+    depth: Option<ArrayView2<f32>>,
     side: Side,
     frame_secs: f32,
     mut joints: ArrayViewMut3<f32>,
@@ -41,7 +43,7 @@ pub fn lift(
             joints.slice_mut(s![t, .., ..]).indexed_iter_mut().for_each(|((j, k), v)| *v = hand[j][k] as f32);
         }
     }
-    hand_depth::resolve(joints.view_mut(), frame_secs);
+    hand_depth::resolve(joints.view_mut(), depth, frame_secs);
     median_filter(joints.view_mut());
     Ok(())
 }

@@ -163,9 +163,12 @@ impl Lifter {
             [(L_HAND, Side::Left, &keypoints.left_hand), (R_HAND, Side::Right, &keypoints.right_hand)]
         {
             let points = points.slice(s![interval.start..interval.end, .., ..]);
+            let depth = keypoints.hand_depth.as_ref();
+            let depth =
+                depth.map(|depth| depth.slice(s![interval.start..interval.end, usize::from(side == Side::Right), ..]));
             let mut joints = into.joints.slice_mut(s![.., root..root + N_HAND, ..]);
             let mask = into.mask.slice_mut(s![.., root..root + N_HAND]);
-            hands::lift(&self.hands, &points, side, (1.0 / fps) as f32, joints.view_mut(), mask)?;
+            hands::lift(&self.hands, &points, depth, side, (1.0 / fps) as f32, joints.view_mut(), mask)?;
         }
         rest::fill(&mut into.joints, interval, resting);
         for root in [L_HAND, R_HAND] {

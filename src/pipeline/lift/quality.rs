@@ -195,7 +195,14 @@ mod tests {
         }
         let hand = Array3::zeros((n_frames, 21, 3));
         let fps = FrameRate::new(15, 1);
-        let keypoints = Keypoints { fps, image_size: [640, 480], body, left_hand: hand.clone(), right_hand: hand };
+        let keypoints = Keypoints {
+            fps,
+            image_size: [640, 480],
+            body,
+            left_hand: hand.clone(),
+            right_hand: hand,
+            hand_depth: None,
+        };
         (Motion::from_joints(fps, joints), keypoints)
     }
 

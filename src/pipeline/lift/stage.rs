@@ -8,11 +8,11 @@ use super::{Lifted, Lifter, weights};
 use anyhow::{Context, Result, ensure};
 use ndarray::{Array1, s};
 use orator_base::stage::artifacts::{Artifact, StageName};
-use orator_base::stage::ledger::Ledger;
+use orator_base::stage::ledger::{Ledger, longest_first};
 use orator_base::stage::progress::Progress;
 use orator_base::stage::{Input, Report, Stage, Unit, write_json};
-use orator_base::text::counted;
-use orator_base::types::interval::Intervals;
+use orator_base::text::{counted, length};
+use orator_base::types::interval::{Interval, Intervals};
 use orator_base::types::pose2d::Keypoints;
 use orator_dataset::config;
 use orator_formats::timeline_npz::Timeline;
@@ -57,7 +57,7 @@ impl Stage for LiftStage {
     }
 
     fn version(&self) -> u32 {
-        10
+        11
     }
 
     fn settings(&self, _unit: &Unit) -> serde_json::Value {
@@ -92,17 +92,7 @@ impl Stage for LiftStage {
     }
 
     fn run(&self, unit: &Unit, out: &Path, _progress: &dyn Progress) -> Result<Report> {
-        let mut keypoints = keypoints_npz::read(&self.file(Artifact::Keypoints, unit))?;
-        let timeline = self.file(Artifact::Timeline, unit);
-        let repeated = Timeline::read(&timeline)?.repeated;
-        ensure!(
-            repeated.len() == keypoints.n_frames(),
-            "the keypoints have {} frames, {} has {}: run the stage pose2d again",
-            keypoints.n_frames(),
-            timeline.display(),
-            repeated.len()
-        );
-        hide_repeated_frames(&mut keypoints, &repeated);
+        let (mut keypoints, _) = self.keypoints(unit)?;
         let path = self.file(Artifact::SegmentIntervals, unit);
         let bytes = std::fs::read(&path).with_context(|| format!("cannot read {}", path.display()))?;
         let intervals: Intervals = serde_json::from_slice(&bytes)
@@ -115,6 +105,7 @@ impl Stage for LiftStage {
             intervals.n_frames
         );
         let ledger = Ledger::read(&self.file(Artifact::SegmentLedger, unit))?;
+        let (accepted_secs, before) = (ledger.accepted_secs(), ledger.rejected_secs());
         let (lifted, intervals, ledger) = self.lift(&mut keypoints, intervals, ledger, out)?;
         joints_npz::write_lifted(&Artifact::Joints.within(out), &lifted.motion, &lifted.extra)?;
         let bones = json!({ "lengths_metres": lifted.lengths.to_vec(), "n_frames": lifted.n_frames });
@@ -126,11 +117,17 @@ impl Stage for LiftStage {
         let n_visible = lifted.motion.mask.iter().filter(|m| **m).count();
         let n_known = lifted.motion.joints.iter().filter(|v| v.is_finite()).count() / 3;
         let filled = 100.0 * (1.0 - n_visible as f64 / n_known.max(1) as f64);
+        let mut newly = ledger.rejected_secs();
+        newly.iter_mut().for_each(|(reason, secs)| *secs -= before.get(reason).copied().unwrap_or(0.0));
+        let rejected = match accepted_secs - ledger.accepted_secs() {
+            secs if secs < 0.05 => String::new(),
+            secs => format!("; {} of {} rejected: {}", length(secs), length(accepted_secs), longest_first(&newly)),
+        };
         let line = match lifted.n_frames {
-            0 => "no interval to lift".to_owned(),
+            0 => format!("no interval to lift{rejected}"),
             n => {
                 let intervals = counted(intervals.intervals.len(), "interval");
-                format!("{n} frames in {intervals}, {filled:.1} % of the joint positions interpolated")
+                format!("{n} frames in {intervals}, {filled:.1} % of the joint positions interpolated{rejected}")
             }
         };
         let facts = json!({ "n_frames": lifted.n_frames, "filled_percent": filled });
@@ -139,6 +136,37 @@ impl Stage for LiftStage {
 }
 
 impl LiftStage {
+    /// Keypoints of the video, without the points of repeated frames, and its timeline.
+    fn keypoints(&self, unit: &Unit) -> Result<(Keypoints, Timeline)> {
+        let mut keypoints = keypoints_npz::read(&self.file(Artifact::Keypoints, unit))?;
+        let path = self.file(Artifact::Timeline, unit);
+        let timeline = Timeline::read(&path)?;
+        ensure!(
+            timeline.n_frames() == keypoints.n_frames(),
+            "the keypoints have {} frames, {} has {}: run the stage pose2d again",
+            keypoints.n_frames(),
+            path.display(),
+            timeline.n_frames()
+        );
+        hide_repeated_frames(&mut keypoints, &timeline.repeated);
+        Ok((keypoints, timeline))
+    }
+
+    /// Lifts every frame of a video in which the speaker is visible, fit for training or not, each shot by itself; also
+    /// returns the keypoints. Only the stages `extract` and `pose2d` must be done.
+    ///
+    /// # Errors
+    /// Files of these stages that cannot be read.
+    pub fn lift_visible(&self, unit: &Unit) -> Result<(Keypoints, Lifted)> {
+        let (keypoints, Timeline { shot_score, .. }) = self.keypoints(unit)?;
+        let is_cut = |t: &usize| shot_score[*t] > 0.0 && shot_score[*t] >= self.rules.shot_threshold;
+        let cuts = (1..keypoints.n_frames()).filter(is_cut);
+        let bounds: Vec<usize> = std::iter::once(0).chain(cuts).chain([keypoints.n_frames()]).collect();
+        let shots: Vec<Interval> = bounds.windows(2).map(|pair| Interval { start: pair[0], end: pair[1] }).collect();
+        let lifted = self.lifter.lift_intervals(&keypoints, &shots)?;
+        Ok((keypoints, lifted))
+    }
+
     /// Lifts, and removes frames with errors from intervals and ledger. Writes `bone_change.npz`: `bone_change` f32
     /// [T], the largest relative deviation of a bone in each frame from its length in the video.
     fn lift(

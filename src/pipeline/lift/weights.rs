@@ -2,12 +2,13 @@
 
 use anyhow::{Context, Result, ensure};
 use orator_base::input;
+use orator_base::motion::view::body::{N_BODY_IN, N_IN};
 use orator_base::motion::view::hand::{HandJoints, HandPoints};
 use orator_base::types::skeleton::Side;
 use orator_nn::lifter::body::BodyLifter;
 use orator_nn::lifter::hand::{self, HandLifter};
 use orator_nn::lifter::heatmap_network::{self, HeatmapLifter};
-use orator_nn::lifter::temporal;
+use orator_nn::lifter::temporal::Config;
 use orator_nn::params::Params;
 use orator_nn::weights::Contents;
 use serde::de::DeserializeOwned;
@@ -27,8 +28,9 @@ pub const MAX_FRAMES: usize = 729;
 /// A file that cannot be read or does not contain a body lifter within the limits.
 pub fn body(path: &Path) -> Result<BodyLifter> {
     load(path, BODY, &["body-lifter"], "body", |contents, params| {
-        let config: temporal::Config = config(contents)?;
-        let expected = BodyLifter::config(config.channels.clamp(1, MAX_WIDTH), &config.widths);
+        let config: Config = config(contents)?;
+        let n_in = if config.n_in == N_BODY_IN { N_BODY_IN } else { N_IN };
+        let expected = Config { n_in, ..BodyLifter::config(config.channels.clamp(1, MAX_WIDTH), &config.widths) };
         let window = config.receptive_field();
         ensure!(
             (1..=MAX_FRAMES).contains(&window),

@@ -159,6 +159,8 @@ impl Chain {
             pose.face = self.face_track.find(face, image, &body.points, self.settings.joint_score)?;
         }
         pose.body = body.points.map(keypoint);
+        let depth = |hand: &Option<DetectedHand>| Some(hand.as_ref()?.depth?.map(|depth| depth as f32));
+        pose.hand_depth = [depth(&left), depth(&right)];
         pose.left_hand = left.map_or(pose.left_hand, |hand| hand.points.map(keypoint));
         pose.right_hand = right.map_or(pose.right_hand, |hand| hand.points.map(keypoint));
         Ok(pose)

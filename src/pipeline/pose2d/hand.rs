@@ -19,12 +19,14 @@ pub struct DetectedHand {
     pub score: f64,
     /// Probability that it is a right hand.
     pub right: Option<f64>,
+    /// Depth of the points relative to the wrist, away from the camera; `None` if the model gives none.
+    pub depth: Option<[f64; 21]>,
 }
 
 impl DetectedHand {
     /// Creates a hand from points that each have a score.
     pub fn from_points(points: [ScoredPoint; 21]) -> Self {
-        Self { score: points.iter().map(|point| point[2]).sum::<f64>() / 21.0, points, right: None }
+        Self { score: points.iter().map(|point| point[2]).sum::<f64>() / 21.0, points, right: None, depth: None }
     }
 
     /// Coordinates x, y of the points.
@@ -61,9 +63,16 @@ impl HandModel {
         let hand = if let Decode::Regression { landmarks, score, logit, right } = &self.decode {
             let score = points::regression_score(single(score)?, *logit);
             let n_points = self.map.iter().max().map_or(0, |largest| largest + 1);
-            let points = points::regression(outputs.floats(landmarks)?.1, score, n_points.max(21))?;
+            let landmarks = outputs.floats(landmarks)?.1;
+            let points = points::regression(landmarks, score, n_points.max(21))?;
+            let depth = points::depths(landmarks, points.len()).map(|depths| {
+                let px = src_from_dst.scale();
+                let at = |point: usize| px * self.map.get(point).and_then(|at| depths.get(*at)).unwrap_or(&0.0);
+                std::array::from_fn(|point| at(point) - at(0))
+            });
             let right = right.as_ref().map(|name| single(name)).transpose()?.map(f64::from);
-            DetectedHand { points: map_points(&points, &self.map, &src_from_dst), score: f64::from(score), right }
+            let points = map_points(&points, &self.map, &src_from_dst);
+            DetectedHand { points, score: f64::from(score), right, depth }
         } else {
             DetectedHand::from_points(map_points(&self.reader.points(&outputs, size)?, &self.map, &src_from_dst))
         };

@@ -105,9 +105,6 @@ impl SubprocessStage<'_> {
 }
 
 /// Reports how far a subprocess of `program` can be sandboxed on this machine.
-///
-/// # Errors
-/// The program cannot be started, or does not answer.
 pub fn probe(program: &Path) -> Result<Restriction> {
     let mut process = UnitProcess::start(program)?;
     process.ask(&Request::Restrict);
@@ -119,9 +116,6 @@ pub fn probe(program: &Path) -> Result<Restriction> {
 }
 
 /// Lets a sandboxed subprocess of `program` run `answer_media`.
-///
-/// # Errors
-/// Those of `answer_media`; a subprocess that crashes or exceeds its limits.
 pub fn ask_media(program: &Path, request: &MediaRequest, limits: &Limits) -> Result<MediaHeader> {
     let source = &request.source;
     let request = Request::Media { request: request.clone(), memory: limits.memory };

@@ -27,9 +27,6 @@ pub const VERB: &str = "work-unit";
 const MESSAGE_INTERVAL: Duration = Duration::from_millis(50);
 
 /// Answers the request on standard input. Must be called before the process starts threads.
-///
-/// # Errors
-/// No valid request; the answer cannot be written.
 pub fn serve() -> Result<()> {
     rustix::process::set_parent_process_death_signal(Some(rustix::process::Signal::KILL))?;
     let out = Messages(Mutex::new(std::io::stdout()));
@@ -85,9 +82,6 @@ fn work(request: UnitRequest, out: &Messages) -> Result<Report> {
 }
 
 /// Reads the header of a video, or copies an excerpt and returns its duration.
-///
-/// # Errors
-/// A video that cannot be read; an excerpt that cannot be copied.
 pub fn answer_media(request: &MediaRequest) -> Result<MediaHeader> {
     if let Some(excerpt_request) = &request.excerpt {
         let secs =

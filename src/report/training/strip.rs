@@ -10,8 +10,10 @@ use orator_base::types::skeleton::{L_WRIST, R_WRIST};
 use orator_media::opencv::draw;
 use std::ops::Range;
 
-/// Ground truth and generated motion of a held-out interval, with the same rate and, up to rounding, the same length.
+/// Ground truth and generated motion of an interval, held out if possible, with the same rate and, up to rounding, the
+/// same length.
 pub struct HeldOutPair {
+    /// Split and key of the interval.
     pub name: String,
     /// Start within the interval, seconds.
     pub start_secs: f64,

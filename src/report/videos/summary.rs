@@ -1,14 +1,12 @@
 //! First sections of the report: totals, seconds by reason, and a table of videos.
 
-use super::reasons;
-use super::reasons::WAITING;
-use super::video::VideoSummary;
-use crate::html;
-use crate::html::{Node, legend, node};
-use orator_base::stage::artifacts::{StageName, speaker_dir};
+use super::gather::VideoSummary;
+use super::timelines::{self, WAITING};
+use crate::html::{self, Node, legend, node};
+use orator_base::stage::artifacts::{StageName, dir, speaker_dir};
+use orator_base::stage::record::Record;
 use orator_base::stage::rejection::Rejection;
-use orator_base::text::counted;
-use orator_base::text::{length, percent};
+use orator_base::text::{counted, length, percent};
 use orator_base::types::split::Split;
 use orator_dataset::INFO;
 use orator_dataset::config::Settings;
@@ -16,7 +14,6 @@ use orator_dataset::config::videos::Videos;
 use orator_dataset::info::{DatasetInfo, DatasetVideo};
 use std::collections::BTreeMap;
 
-/// Total seconds over all videos.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ReportTotals {
     /// All footage.
@@ -27,7 +24,6 @@ pub struct ReportTotals {
     pub waiting: f64,
     /// By reason.
     pub rejected: BTreeMap<String, f64>,
-    /// Number of accepted intervals.
     pub n_accepted: usize,
 }
 
@@ -100,8 +96,9 @@ type Part<'a> = (&'a str, String, f64, &'static str);
 
 /// Section with a bar for each reason, the longest first.
 pub fn by_reason(sums: &ReportTotals) -> Vec<Node> {
-    let of_reason =
-        |(reason, secs): (&'_ String, &f64)| (reason.clone(), reasons::class(reason), *secs, reasons::heading(reason));
+    let of_reason = |(reason, secs): (&'_ String, &f64)| {
+        (reason.clone(), timelines::class(reason), *secs, timelines::heading(reason))
+    };
     let mut rejected: Vec<_> = sums.rejected.iter().map(of_reason).collect();
     rejected.sort_by(|a, b| b.2.total_cmp(&a.2).then(a.0.cmp(&b.0)));
     let mut parts: Vec<Part> = vec![("accepted", "accepted".to_owned(), sums.accepted, "usable for the dataset")];
@@ -168,10 +165,9 @@ pub fn table(videos: &[VideoSummary], splits: &VideoSplits) -> Vec<Node> {
         let mut rejected: Vec<(String, f64)> = ledger.rejected_secs().into_iter().collect();
         rejected.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
         let longest = rejected.iter().take(3);
-        let why =
-            legend(longest.map(|(reason, secs)| {
-                (reasons::class(reason), format!("{} {}", Rejection::label(reason), length(*secs)))
-            }));
+        let why = legend(longest.map(|(reason, secs)| {
+            (timelines::class(reason), format!("{} {}", Rejection::label(reason), length(*secs)))
+        }));
         let state = match ledger.failed.first() {
             Some(failed) if failed.stage == WAITING => node("span").text("not processed"),
             Some(failed) => node("span").text(format!("failed at {}", failed.stage)),
@@ -195,32 +191,37 @@ pub fn table(videos: &[VideoSummary], splits: &VideoSplits) -> Vec<Node> {
 /// Names of the splits of each video, by `speaker/video`.
 pub type VideoSplits = BTreeMap<String, String>;
 
-/// Splits of all videos that are in a dataset; a speaker without a dataset has none.
+/// Splits of all videos in the datasets of their speakers.
 pub fn video_splits(settings: &Settings, videos: &[Videos]) -> VideoSplits {
     let mut splits = VideoSplits::new();
     for Videos { speaker, units, .. } in videos {
         // A single file is read, which is consistent even while a run replaces the dataset.
         let info = std::fs::read(speaker_dir(&settings.work.dir, StageName::Dataset, speaker).join(INFO));
         let info: Option<DatasetInfo> = info.ok().and_then(|bytes| serde_json::from_slice(&bytes).ok());
-        // The dataset names videos by their content, the work folder by their path; both have the file name.
-        let videos: Vec<&DatasetVideo> = info.iter().flat_map(|info| &info.videos).collect();
         for unit in units {
-            let is_of =
-                |video: &&&DatasetVideo| unit.source.file_name().is_some_and(|name| name == video.file.as_str());
-            let mut named = videos.iter().filter(is_of);
-            if let (Some(video), None) = (named.next(), named.next())
-                && video.samples > 0
-            {
-                splits.insert(unit.to_string(), split_names(video));
-            }
+            let extracted = Record::read(&dir(&settings.work.dir, StageName::Extract, unit));
+            let content = extracted.and_then(|record| record.fingerprint.inputs.get("video").cloned());
+            // The dataset names videos by their content, the work folder by their path.
+            let is_of = |video: &&DatasetVideo| match &content {
+                Some(content) => video.content == *content,
+                None => unit.source.file_name().is_some_and(|name| name == video.file.as_str()),
+            };
+            let split = match &info {
+                None => "no dataset yet".to_owned(),
+                Some(info) => info.videos.iter().find(is_of).map_or_else(String::new, split_names),
+            };
+            splits.insert(unit.to_string(), if split.is_empty() { "none".to_owned() } else { split });
         }
     }
     splits
 }
 
-/// Names of the splits of a video or of its time blocks.
+/// Names of the splits of a video or of its time blocks; empty if it has no samples.
 fn split_names(video: &DatasetVideo) -> String {
     let has =
         |split: &Split| video.split == Some(*split) || video.blocks.iter().any(|block| block.split == Some(*split));
+    if video.samples == 0 {
+        return String::new();
+    }
     Split::ALL.into_iter().filter(has).map(Split::name).collect::<Vec<_>>().join(", ")
 }

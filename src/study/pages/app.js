@@ -75,7 +75,8 @@ function consent() {
 
 async function instructions() {
   keep("language", currentLanguage());
-  const words = t("instructions.text", { n: study.n_trials });
+  const checks = study.has_checks ? t("instructions.checks") : "";
+  const words = t("instructions.text", { n: study.n_trials, checks });
   await step(t("instructions.title"), [text(words)], t("continue"));
   if (study.sound_check) await checkSound(`films/${study.sound_check}.mp4`);
   await begin();

@@ -42,7 +42,8 @@ export function checkSound(film) {
       if (screening.playing || input.value === "") return;
       if (Number(input.value) !== TONES) {
         input.value = "";
-        go.disabled = true;
+        // The next answer needs another play.
+        go.disabled = asked.disabled = true;
         announce(t("sound.wrong"));
         play.focus();
         return;

@@ -257,7 +257,8 @@ fn the_avatar_over_the_source_video_covers_the_person() {
         body.slice_mut(s![t, point, ..]).assign(&ndarray::arr1(&[x as f32, y as f32, 0.9]));
     }
     let hand = Array3::zeros((4, 21, 3));
-    let keypoints = Keypoints { fps: FPS, image_size: [64, 48], body, left_hand: hand.clone(), right_hand: hand };
+    let keypoints =
+        Keypoints { fps: FPS, image_size: [64, 48], body, left_hand: hand.clone(), right_hand: hand, hand_depth: None };
     let camera = SourceCamera::fit(&motion, &keypoints).unwrap();
     let performance = unchanged(&motion);
     let panel = SecondPanel::Video { path: &clip.path, from_secs: 0.0, camera: Some(&camera) };

@@ -60,7 +60,7 @@ fn shards_are_ustar_files_of_bounded_size_and_deterministic() {
     let samples: Vec<_> = (0..5).map(|n| random_sample(&format!("talk-0a1b2c3d-{n:06}"), 64, n)).collect();
     for dir in [&one, &two] {
         let mut writer = ShardWriter::new(dir.path(), "talk-0a1b2c3d", Split::Train, 512 << 10);
-        samples.iter().for_each(|sample| writer.push(sample).unwrap());
+        samples.iter().for_each(|sample| writer.push_members(sample, &sample.members().unwrap()).unwrap());
         let (shards, refs) = writer.finish().unwrap();
         assert_eq!((shards.len(), refs.len()), (3, 5));
         assert!(shards.iter().all(|shard| shard.bytes <= 512 << 10));

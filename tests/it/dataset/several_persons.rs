@@ -44,7 +44,7 @@ fn a_second_person_gives_a_warning_unless_same_person_is_set() {
     let warning = facts(&settings, "two people");
     assert_eq!(warning["videos"][1], json!(["other.mp4"]), "{warning}");
     let sheet = png::read(&picture).unwrap();
-    assert_eq!((sheet.width, sheet.height), (8 * 144, 2 * 160));
+    assert_eq!((sheet.width, sheet.height), (8 * 144, 2 * 186));
     assert_eq!(sheet.pixel(8, 8), [200, 150, 120]);
     let speaker = SpeakerConfig { name: units[0].speaker.clone(), same_person: true, ..SpeakerConfig::default() };
     settings.speaker = vec![speaker];

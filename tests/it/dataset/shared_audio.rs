@@ -39,6 +39,7 @@ fn assert_reupload_is_matched(source: &Path, other: &Path) {
     assert_eq!((one.a.as_str(), one.b.as_str()), ("a", "c"));
     assert!((one.b_secs - one.a_secs - (4.0 - 2.013)).abs() < 0.1, "{one:?}");
     assert!(one.secs > 0.8 * secs && one.secs < secs + 1.0, "{one:?}");
+    assert!(find(&names, |n| Ok(videos[n].clone()), secs + 1.0).unwrap().is_empty());
 }
 
 #[test]

@@ -13,7 +13,7 @@ use orator_gesture::evaluate::clips::from_checkpoints::nearest_neighbours;
 use orator_gesture::evaluate::clips::held_out;
 use orator_gesture::evaluate::clips::motion_store::{MotionStore, StoredMotion};
 use orator_gesture::evaluate::clips::sound_features::from_samples;
-use orator_gesture::train::gan::speaker_metadata::normalisation;
+use orator_gesture::train::gan::speakers::normalisation;
 use orator_test_support::project::Project;
 use std::path::Path;
 
@@ -96,7 +96,8 @@ fn a_training_writes_a_page_and_its_speaker_is_evaluated() {
     assert_eq!((value("pck_3d", "truth"), value("mpjpe", "truth")), (1.0, 0.0));
     let sentence = result["better_than_constant_pose"]["sentence"].as_str().unwrap();
     assert!(sentence.contains(&format!("{n_blocks} block")), "{sentence}");
-    assert!(sentence.contains("too few for a conclusion (at least 7 are needed)"), "{sentence}");
+    assert!(sentence.contains("too few for a conclusion (at least 7 are needed); hold out about "), "{sentence}");
+    assert!(sentence.ends_with(" s more motion."), "{sentence}");
     let invalid = project.answer(&["evaluate", "--dataset", &data, "--checkpoint", &out, "--split", "test"]);
     assert!(
         invalid.code == 1 && invalid.errors.contains("splits with intervals: train, validation"),

@@ -169,7 +169,14 @@ fn swinging(fps: u32) -> Keypoints {
         }
     }
     let hand = Array3::zeros((n, 21, 3));
-    Keypoints { fps: FrameRate::new(fps, 1), image_size: [1280, 720], body, left_hand: hand.clone(), right_hand: hand }
+    Keypoints {
+        fps: FrameRate::new(fps, 1),
+        image_size: [1280, 720],
+        body,
+        left_hand: hand.clone(),
+        right_hand: hand,
+        hand_depth: None,
+    }
 }
 
 #[test]

@@ -40,7 +40,14 @@ fn project_keypoints(poses: &[Pose], roll: f64, pitch: f64) -> Keypoints {
         }
     }
     let hand = Array3::zeros((poses.len(), 21, 3));
-    Keypoints { fps: FrameRate::new(15, 1), image_size: [1280, 720], body, left_hand: hand.clone(), right_hand: hand }
+    Keypoints {
+        fps: FrameRate::new(15, 1),
+        image_size: [1280, 720],
+        body,
+        left_hand: hand.clone(),
+        right_hand: hand,
+        hand_depth: None,
+    }
 }
 
 fn median(mut values: Vec<f64>) -> f64 {

@@ -16,8 +16,8 @@ use orator_formats::joints_npz;
 use orator_pipeline::lift::LiftStage;
 use orator_pipeline::segment::SegmentStage;
 
-/// Runs `segment` and `lift`; returns intervals, ledger and joints.
-fn lifted(footage: &Footage) -> (Vec<(usize, usize)>, Ledger, Motion) {
+/// Runs `segment` and `lift`; returns intervals, ledger, joints and the report of `lift`.
+fn reported(footage: &Footage) -> (Vec<(usize, usize)>, Ledger, Motion, String) {
     let dir = tempfile::tempdir().unwrap();
     let work = dir.path().join("work");
     let unit = Unit { speaker: "host".into(), video: "talk-00000000".into(), source: dir.path().join("talk.mp4") };
@@ -25,11 +25,13 @@ fn lifted(footage: &Footage) -> (Vec<(usize, usize)>, Ledger, Motion) {
     let rules = config::SegmentConfig::default();
     let segment = SegmentStage::new(&rules, &work);
     let lift = LiftStage::new(&config::LiftConfig::default(), &rules, &work).unwrap();
-    for stage in [&segment as &dyn Stage, &lift] {
+    let run = |stage: &dyn Stage| {
         let out = unit.dir(&work.join(stage.name()));
         std::fs::create_dir_all(&out).unwrap();
-        stage.run(&unit, &out, &Silent).unwrap();
-    }
+        stage.run(&unit, &out, &Silent).unwrap().line
+    };
+    run(&segment);
+    let line = run(&lift);
     let out = artifacts::dir(&work, StageName::Lift, &unit);
     let intervals: Intervals = serde_json::from_slice(&std::fs::read(out.join("intervals.json")).unwrap()).unwrap();
     let ledger = Ledger::read(&out.join("ledger.json")).unwrap();
@@ -39,7 +41,13 @@ fn lifted(footage: &Footage) -> (Vec<(usize, usize)>, Ledger, Motion) {
     for (t, joints) in motion.joints.outer_iter().enumerate() {
         assert!(joints.iter().all(|v| v.is_finite() == is_accepted(t)), "frame {t}");
     }
-    (intervals.intervals.iter().map(|i| (i.start, i.end)).collect(), ledger, motion)
+    (intervals.intervals.iter().map(|i| (i.start, i.end)).collect(), ledger, motion, line)
+}
+
+fn lifted(footage: &Footage) -> (Vec<(usize, usize)>, Ledger, Motion) {
+    let (intervals, ledger, motion, line) = reported(footage);
+    assert_eq!(line.contains("rejected"), !ledger.rejected.is_empty(), "{line}");
+    (intervals, ledger, motion)
 }
 
 /// Stretches the left forearm far beyond its length, and moves its hand along.
@@ -82,8 +90,9 @@ fn adjacent_gaps_longer_than_lifting_fills_are_rejected() {
     // Each gap alone is accepted: first the score of all its points, then single points.
     footage.keypoints.left_hand.slice_mut(s![100..112, .., 2]).fill(0.0);
     footage.keypoints.left_hand.slice_mut(s![112..124, ..12, 2]).fill(0.0);
-    let (intervals, ledger, _) = lifted(&footage);
+    let (intervals, ledger, _, line) = reported(&footage);
     assert_eq!(intervals, [(0, 100), (124, 300)], "{ledger:?}");
+    assert!(line.ends_with("; 1.6 s of 20.0 s rejected: missing joints 1.6 s"), "{line}");
     assert_eq!(ledger.rejected[0].reason, "open");
     assert!(ledger.rejected[0].message.starts_with("21 of the joints"), "{}", ledger.rejected[0].message);
 }

@@ -45,10 +45,20 @@ fn the_page_is_drawn_and_its_sliders_predict_a_run() {
 #[test]
 fn the_page_states_the_splits_of_the_videos() {
     let project = Project::with_clips("report-splits", 2, 4.6);
+    // Two videos of the same file name in different folders.
+    let [first, second] = &project.clips()[..] else { panic!("expected two clips") };
+    let other = project.dir().join("videos/other");
+    std::fs::create_dir(&other).unwrap();
+    std::fs::rename(second, other.join(first.file_name().unwrap())).unwrap();
+    project.name_videos(&["videos/*/*.mp4"]);
+    let column = |expected: &str| {
+        let (_, html) = report(&project, &[]);
+        let videos = html.split_once("id=\"videos\"").map_or(html.as_str(), |(_, table)| table);
+        assert!(videos.contains(expected), "{videos:.3000}");
+    };
+    column("<td>no dataset yet</td>");
     assert_eq!(project.run(&[]).code, 0);
-    let (_, html) = report(&project, &[]);
-    let videos = html.split_once("id=\"videos\"").map_or(html.as_str(), |(_, table)| table);
-    assert!(videos.contains("<td>train</td>"), "{videos:.3000}");
+    column("<td>train</td>");
 }
 
 /// Checks the page in a browser, and the prediction of a slider with a run.

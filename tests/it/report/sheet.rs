@@ -4,7 +4,9 @@
 use crate::fixtures::clips::write_sized;
 use crate::fixtures::figures::{FPS, swinging};
 use ndarray::{Array1, Array2, Array3, s};
+use orator_base::stage::ledger::RejectedInterval;
 use orator_base::stage::progress::Silent;
+use orator_base::stage::rejection::{FrameRejection, Rejection};
 use orator_base::types::image::Image;
 use orator_base::types::pose2d::Keypoints;
 use orator_base::types::pose3d::Motion;
@@ -37,11 +39,22 @@ fn keypoints(motion: &Motion) -> Keypoints {
         hand
     });
     let image_size = SIZE.map(|px| px as u32);
-    Keypoints { fps: motion.fps, image_size, body, left_hand, right_hand }
+    Keypoints { fps: motion.fps, image_size, body, left_hand, right_hand, hand_depth: None }
 }
 
 fn pages(video: &Path, keypoints: &Keypoints, motion: &Motion, every_secs: f64) -> anyhow::Result<Vec<Image>> {
-    let clip = SheetClip { title: "a clip", video, pictures: Default::default(), keypoints, motion, figure: None };
+    pages_with(video, keypoints, motion, every_secs, &[])
+}
+
+fn pages_with(
+    video: &Path,
+    keypoints: &Keypoints,
+    motion: &Motion,
+    every_secs: f64,
+    rejected: &[RejectedInterval],
+) -> anyhow::Result<Vec<Image>> {
+    let (title, pictures) = ("a clip", Default::default());
+    let clip = SheetClip { title, video, pictures, keypoints, motion, rejected, figure: None };
     let mut pages = Vec::new();
     clip.pages(every_secs, &Silent, |number, n_pages, page| {
         assert!(number == pages.len() && number < n_pages);
@@ -65,6 +78,15 @@ fn pages_have_ten_moments_each_and_are_deterministic() {
     assert!(drawn[0].height > drawn[1].height && drawn[0].width <= 2400);
     assert_eq!(drawn, pages(&video, &keypoints, &motion, 0.2).unwrap());
     assert_eq!(pages(&video, &keypoints, &motion, 60.0).unwrap().len(), 1);
+    // The reason stands in the cells without joints only.
+    motion.joints.slice_mut(s![10..20, .., ..]).fill(f32::NAN);
+    let why = FrameRejection::new(Rejection::HandGap, 0.7, 0.5);
+    let sheet = |start: f64, end: f64| {
+        pages_with(&video, &keypoints, &motion, 0.2, &[RejectedInterval::new(start, end, why)]).unwrap()
+    };
+    let unexplained = pages(&video, &keypoints, &motion, 0.2).unwrap();
+    assert_ne!(sheet(FPS.secs(10), FPS.secs(20)), unexplained);
+    assert_eq!(sheet(0.0, FPS.secs(10)), unexplained);
     let quality = quality::measure(&motion, &keypoints).unwrap();
     assert!(quality.right.wrist_off_mm < 1.0 && quality.left.missing > 0.2, "{quality:?}");
 }

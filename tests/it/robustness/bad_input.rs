@@ -214,3 +214,14 @@ fn invalid_models_exit_with_1_and_name_the_model_and_the_cause() {
         assert!(expected.iter().all(|text| answer.errors.contains(text)), "{folder}: {}", answer.errors);
     }
 }
+
+#[test]
+fn after_a_failure_run_and_status_do_not_propose_each_other() {
+    let project = Project::with_clips("circle", 0, 1.0);
+    fs::write(project.video("broken.mp4"), "no film").unwrap();
+    let run = project.run(&[]);
+    assert_eq!((run.code, run.json["next"].as_str()), (2, Some("orator report")), "{}", run.errors);
+    for (args, next) in [(&["status"][..], "orator status --why"), (&["status", "--why"], "orator report")] {
+        assert_eq!(project.answer(args).json["next"], next);
+    }
+}

@@ -19,6 +19,13 @@ fn a_session_leads_from_consent_to_code_and_exported_tables() {
     let mut client = Client::new();
     let (status, about) = client.get(&address, "/api/study").unwrap();
     assert_eq!((status, &about["title"], &about["n_trials"]), (200, &json!("A made-up study"), &json!(4)));
+    let without = MadeStudy::new(1, 1, 1, 5);
+    let (_, other) = client.get(&without.serve(&[]).address, "/api/study").unwrap();
+    assert_eq!(
+        (&about["has_checks"], &other["has_checks"]),
+        (&json!(true), &json!(false)),
+        "named in the instructions"
+    );
     let (status, reply) = client.begin(&address, "p1").unwrap();
     assert_eq!((status, &reply["state"]["position"]), (200, &json!(0)), "{reply}");
     assert_eq!(reply["state"]["trial"], json!({ "task": 0, "phase": "training", "films": study.films[..2] }));

@@ -70,12 +70,16 @@ fn all_speakers_are_trained_by_the_papers_reading() {
         let samples = [(Split::Train, sample("a-00000000-000000", 99, 0.0))];
         write_dataset(&dir.join("work/dataset").join(speaker), speaker, FPS, &samples).unwrap();
     }
+    std::fs::create_dir_all(dir.join("models/words")).unwrap();
+    std::fs::write(dir.join("models/words/glove.safetensors"), "not read").unwrap();
     let trained = answer(dir, "train seq2seq --all --set seq2seq.reading=paper --set seq2seq.epochs=2");
     let speakers = trained["speakers"].as_array().unwrap();
     let of = |key: &str| speakers.iter().map(|trained| trained[key].clone()).collect::<Vec<_>>();
     assert_eq!(of("speaker"), ["anna", "ben"]);
     // 99 frames at 15 fps: six segments of 8 previous and 15 predicted poses, in batches of three.
     assert_eq!((of("segments"), of("steps")), (vec![6.into(), 6.into()], vec![4.into(), 4.into()]));
+    let page = std::fs::read_to_string(dir.join("work/seq2seq/ben/training.html")).unwrap();
+    assert!(page.contains("poses of train a-00000000-000000") && page.contains("Without validation data"));
     let facts = orator_formats::checkpoint::facts(&dir.join("work/seq2seq/ben/best.safetensors")).unwrap();
     let settings = &facts["settings"];
     assert_eq!((&settings["distance"], &settings["continuity"]), (&"mse".into(), &"poses".into()));
@@ -83,6 +87,8 @@ fn all_speakers_are_trained_by_the_papers_reading() {
 
     let resumed = orator(dir, "train seq2seq --speaker ben --set seq2seq.reading=code --set seq2seq.epochs=3");
     let said = String::from_utf8_lossy(&resumed.stderr).into_owned();
+    assert!(said.contains("the installed word vectors are not used: the dataset has no transcripts"), "{said}");
+    assert!(said.contains("warning: 6.0 s of motion to train on: expect a result close to the mean pose"), "{said}");
     assert!(resumed.status.success() && said.contains("seq2seq.reading is \"code\", but \"paper\""), "{said}");
     assert!(String::from_utf8_lossy(&resumed.stdout).contains("6 steps"), "{resumed:?}");
     let rejected = orator(dir, "train seq2seq --speaker ben --set seq2seq.lambda_adversarial=0.5");
@@ -99,10 +105,17 @@ fn captures_need_an_output_folder_and_have_a_page_without_poses() {
     assert!(!rejected.status.success() && String::from_utf8_lossy(&rejected.stderr).contains("--out"));
     let rejected = orator(dir, "train seq2seq --out model");
     assert!(String::from_utf8_lossy(&rejected.stderr).contains("pipeline.toml"), "{rejected:?}");
+    std::fs::create_dir_all(dir.join("models/words")).unwrap();
+    std::fs::write(dir.join("models/words/glove.safetensors"), "not read").unwrap();
     let set = "--set seq2seq.batch=3 --set seq2seq.hidden=8 --set seq2seq.epoch_steps=4";
-    answer(dir, &format!("train seq2seq --captures takes --steps 8 --out model {set}"));
+    let trained = orator(dir, &format!("train seq2seq --captures takes --steps 8 --out model {set}"));
+    let said = String::from_utf8_lossy(&trained.stderr);
+    assert!(
+        trained.status.success() && said.contains("not used: add --words models/words/glove.safetensors"),
+        "{said}"
+    );
     let page = std::fs::read_to_string(dir.join("model/training.html")).unwrap();
-    assert!(page.contains("Training of takes") && page.contains("No validation interval with the 49 joints to show"));
+    assert!(page.contains("Training of takes") && page.contains("No interval with the 49 joints to show"));
     let output = orator(dir, "generate --checkpoint model --audio takes/a.wav --transcript takes/a.tsv --out a.bvh");
     assert!(output.status.success() && dir.join("a.bvh").is_file());
 }

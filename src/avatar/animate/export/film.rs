@@ -1,10 +1,10 @@
 //! Motion as a film: the avatar, alone or next to the source video or another motion, above the waveform of the audio
-//! with a position marker.
+//! with a position marker. The times and names of limbs that were not detected in the video are marked below.
 
 use super::film_avatar::{AvatarView, FilmCamera};
 use super::film_source::SourceCamera;
 use crate::animate::draw::figure::{INK, PAPER, mix};
-use crate::animate::performance::Performance;
+use crate::animate::performance::{AnimationReport, Performance};
 use anyhow::{Context as _, ensure};
 use orator_base::stage::progress::Progress;
 use orator_base::types::image::Image;
@@ -13,6 +13,7 @@ use orator_base::types::time::FrameRate;
 use orator_media::ffmpeg::frames::FrameReader;
 use orator_media::ffmpeg::write::encode::VideoWriter;
 use orator_media::opencv::draw;
+use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::mpsc::sync_channel;
 
@@ -24,6 +25,10 @@ const FULL_AREA: FilmArea = [0.0, 0.0, 1280.0, 620.0];
 const HALF_AREAS: [FilmArea; 2] = [[30.0, 66.0, 630.0, 610.0], [650.0, 66.0, 1250.0, 610.0]];
 const WAVE_AREA: FilmArea = [40.0, 636.0, 1240.0, 684.0];
 const TEXT_PX: f32 = 11.0;
+/// Colour of the marks of limbs that were not detected.
+const HIDDEN: [u8; 3] = [190, 60, 40];
+/// Left edge of the text about visibility, px.
+const HIDDEN_TEXT_PX: f32 = 260.0;
 /// Opening of the mouth at the loudest frame, 0..1.
 const MAX_MOUTH_OPENING: f64 = 0.7;
 /// Number of frames drawn ahead of the encoder.
@@ -64,6 +69,9 @@ pub enum SecondPanel<'a> {
 pub struct Film<'a> {
     fps: FrameRate,
     n_frames: usize,
+    report: &'a AnimationReport,
+    /// Frames in which a limb of the performance was not detected.
+    hidden: BTreeMap<&'static str, Vec<[usize; 2]>>,
     panels: Vec<LabelledPanel<'a>>,
     overlay: Option<VideoOverlay<'a>>,
     /// Loudness of each column of the waveform, 0..1; empty without audio.
@@ -117,7 +125,8 @@ impl<'a> Film<'a> {
         let secs = fps.secs(n_frames);
         let loudness = |n_parts: usize| sound.map(|sound| loudness(sound, secs, n_parts)).unwrap_or_default();
         let wave = loudness(((WAVE_AREA[2] - WAVE_AREA[0]) / COLUMN_PX) as usize);
-        Self { fps, n_frames, panels, overlay, wave, voice: loudness(n_frames) }
+        let (report, voice) = (&performance.report, loudness(n_frames));
+        Self { fps, n_frames, report, hidden: report.hidden_ranges(n_frames), panels, overlay, wave, voice }
     }
 
     /// Image of one frame, `SIZE` px; the area of a separate video is left empty.
@@ -138,9 +147,23 @@ impl<'a> Film<'a> {
             overlay.draw(&mut image, frame_idx, mouth)?;
         }
         self.draw_wave(&mut image, frame_idx)?;
+        self.draw_visibility(&mut image, frame_idx)?;
         let clock = format!("{} / {}", clock(secs), clock(self.fps.secs(self.n_frames)));
         draw::text(&mut image, &clock, [WAVE_AREA[0], 706.0], TEXT_PX, INK)?;
         Ok(image)
+    }
+
+    fn draw_visibility(&self, image: &mut Image, frame_idx: usize) -> anyhow::Result<()> {
+        let [left, _, right, bottom] = WAVE_AREA;
+        let at = |frame: usize| [left + (right - left) * frame as f32 / self.n_frames.max(1) as f32, bottom + 5.0];
+        for &[start, end] in self.hidden.values().flatten() {
+            draw::line(image, at(start), at(end), 3.0, HIDDEN)?;
+        }
+        let limbs = self.report.hidden_limbs(frame_idx, self.n_frames);
+        let hidden = (!limbs.is_empty()).then(|| format!("not visible: {}", limbs.join(", ")));
+        let fingers = self.report.fingers_unusable.then(|| "fingers unusable".to_owned());
+        let notes: Vec<String> = fingers.into_iter().chain(hidden).collect();
+        draw::text(image, &notes.join("; "), [HIDDEN_TEXT_PX, 706.0], TEXT_PX, HIDDEN)
     }
 
     fn draw_wave(&self, image: &mut Image, frame_idx: usize) -> anyhow::Result<()> {

@@ -171,7 +171,8 @@ mod tests {
         let fps = FrameRate::new(10, 1);
         let motion = Motion::from_joints(fps, joints);
         let none = Array3::zeros((n, 21, 3));
-        let keypoints = Keypoints { fps, image_size: size, body, left_hand: none.clone(), right_hand: none };
+        let keypoints =
+            Keypoints { fps, image_size: size, body, left_hand: none.clone(), right_hand: none, hand_depth: None };
         let camera = SourceCamera::fit(&motion, &keypoints).unwrap();
         let neck = [3.0, 140.0, 2.0];
         for t in 1..n - 1 {

@@ -2,8 +2,8 @@
 //! `units`, `axes`; `names`, `parents` (index or null) and `offsets` (from the parent in T-pose) of the joints, bone
 //! ends included; `joints49`, the joint index of each of a motion's 49 joints; `positions` [frame][joint][x, y, z] to
 //! 1e-6 m, soles at y = 0; `rotations` [frame][joint][x, y, z, w], unit quaternions relative to the parent, to 1e-7.
-//! `posture` holds generated angles before they are applied: `fps`, `head` and `trunk` [frame][yaw, pitch, roll] in
-//! radians, null if not modelled.
+//! `posture`: generated angles, `fps`, `head`, `trunk` [frame][yaw, pitch, roll] in radians, null if not modelled;
+//! `hidden`: frames [start, end) of each limb that was not detected; `fingers_unusable`: true, or left out.
 
 use crate::animate::performance::Performance;
 use crate::animate::rig::names::Names;
@@ -34,6 +34,13 @@ pub fn write(
         "offsets": bones.iter().map(|bone| bone.offset.map(|cm| (cm * 1e4).round() / 1e6)).collect::<Vec<_>>(),
         "joints49": performance.rig.positions.to_vec(),
     });
+    let hidden = performance.report.hidden_ranges(clip.n_frames());
+    if !hidden.is_empty() {
+        head["hidden"] = json!(hidden);
+    }
+    if performance.report.fingers_unusable {
+        head["fingers_unusable"] = json!(true);
+    }
     if let Some((fps, posture)) = posture {
         let channel = |channel: PostureChannel| {
             let rows = posture.channel(channel).outer_iter();

@@ -106,6 +106,13 @@ impl ClampCounter {
         to
     }
 
+    /// Share of the angles of fingers and thumbs that exceeded their limits.
+    pub fn finger_share(&self) -> f64 {
+        let n: usize = self.kinds[FINGER..COHERENCE].iter().map(|(n, ..)| n).sum();
+        let n_angles: usize = KINDS[FINGER..COHERENCE].iter().map(|(_, n)| n).sum();
+        n as f64 / (n_angles * self.n_frames).max(1) as f64
+    }
+
     /// Statistics of every kind, including those without clamps.
     pub fn clamps(&self) -> Vec<Clamps> {
         let kinds = KINDS.into_iter().zip(self.kinds);
@@ -148,9 +155,9 @@ fn bend(given: Bend, limit: Limit, kind: usize, counter: &mut ClampCounter) -> B
     }
 }
 
-/// Certainty of a flexion: 1, falling from a sideways bend of 60 degrees to 0 at 90.
+/// Certainty of a flexion: 1, falling from a sideways bend of 70 degrees, the widest limit, to 0 at 90.
 fn certainty(side: f64) -> f64 {
-    1.0 - smoothstep([60.0, 90.0], side.abs())
+    1.0 - smoothstep([70.0, 90.0], side.abs())
 }
 
 /// Clamps the four fingers' flexion, level by level, to a range around their mean. The mean is that of the result, so a

@@ -5,7 +5,9 @@
 
 use crate::math::order::Ordered;
 use crate::math::vec3;
-use crate::motion::upper_body::{BodyPoints, L_HIP, L_SHOULDER, MIRROR, N_POINTS, NOSE, Pose, R_HIP, R_SHOULDER};
+use crate::motion::upper_body::{
+    BodyPoints, HandDirections, L_HIP, L_SHOULDER, MIRROR, N_POINTS, NOSE, Pose, R_HIP, R_SHOULDER,
+};
 use crate::types::skeleton::BODY_BONES;
 
 /// Number of frames before and after the middle one over which the proportions are measured.
@@ -16,16 +18,21 @@ const LARGEST_BY_SECOND: f32 = 1.4;
 /// Number of bone types with a maximum length in the input: shoulders, upper arm, forearm, neck to nose, neck to
 /// pelvis.
 const N_KINDS: usize = 5;
-/// Input channels per frame: x, y and visibility of each point, then the bone types, which are constant over the
-/// window.
-pub const N_IN: usize = 3 * N_POINTS + N_KINDS;
+/// Input channels per frame without hands: x, y and visibility of each point, then the bone types, which are constant
+/// over the window.
+pub const N_BODY_IN: usize = 3 * N_POINTS + N_KINDS;
+/// Channels of one hand: x, y, z of its direction and whether it is known.
+const N_OF_HAND: usize = 4;
+/// Input channels per frame with the right and the left hand. Networks of `N_BODY_IN` channels do not use the hands.
+pub const N_IN: usize = N_BODY_IN + 2 * N_OF_HAND;
 /// Output channels per frame: x, y, z of each point.
 pub const N_OUT: usize = 3 * N_POINTS;
 
 /// Input window of the network.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BodyView {
-    /// [N_IN][window]: channel `3 * point + k` over time; k: x, y, visible (1) or copied from the nearest frame (0).
+    /// [N_IN][window]: channel `3 * point + k` over time; k: x, y, visible (1) or copied from the nearest frame (0);
+    /// then the bone types and the hands.
     pub numbers: Vec<f32>,
     /// px per unit of `numbers`.
     pub scale: f32,
@@ -33,23 +40,28 @@ pub struct BodyView {
 
 impl BodyView {
     /// Builds the input for frame `t`: `window` frames (an odd number), `step` frames apart, interpolated if that is
-    /// not an integer; the first and last frame are repeated beyond the ends. `None` if a shoulder is never visible in
-    /// the window or all points coincide.
-    pub fn around(seen: &[BodyPoints], t: usize, window: usize, step: f64) -> Option<Self> {
+    /// not an integer; the first and last frame are repeated beyond the ends. `hands` has the directions of the hands in
+    /// every frame, or is empty if none is known. `None` if a shoulder is never visible in the window or all points
+    /// coincide.
+    pub fn around(seen: &[BodyPoints], hands: &[HandDirections], t: usize, window: usize, step: f64) -> Option<Self> {
         let last = seen.len().checked_sub(1)? as f64;
         let source_time = |d: isize| t as f64 + d as f64 * step;
         let half = window as isize / 2;
-        let frames: Vec<BodyPoints> = (-half..=half).map(|d| at(seen, source_time(d).clamp(0.0, last))).collect();
+        let times = (-half..=half).map(|d| source_time(d).clamp(0.0, last));
+        let frames: Vec<BodyPoints> = times.clone().map(|time| at(seen, time)).collect();
+        let nearest = |time: f64| hands.get(time.round() as usize).copied().unwrap_or_default();
+        let hands: Vec<HandDirections> = times.map(nearest).collect();
         let inside = |d: &isize| (0.0..=last).contains(&source_time(*d));
         let half_range = AROUND.max(half);
         let range: Vec<BodyPoints> =
             (-half_range..=half_range).filter(inside).map(|d| at(seen, source_time(d))).collect();
-        Self::from_frames(&frames, &longest(&range))
+        Self::from_frames(&frames, &hands, &longest(&range))
     }
 
     /// Builds the input from `frames` and the largest apparent bone lengths. A point that is not visible is copied,
-    /// relative to the neck, from the nearest frame in which it is; one that is never visible is put on the neck.
-    fn from_frames(frames: &[BodyPoints], longest: &[f32; N_KINDS]) -> Option<Self> {
+    /// relative to the neck, from the nearest frame in which it is; one that is never visible is put on the neck. Hands
+    /// are copied likewise; an unknown one has no direction.
+    fn from_frames(frames: &[BodyPoints], hands: &[HandDirections], longest: &[f32; N_KINDS]) -> Option<Self> {
         let n = frames.len();
         let right = held(frames.iter().map(|f| f[R_SHOULDER]).collect())?;
         let left = held(frames.iter().map(|f| f[L_SHOULDER]).collect())?;
@@ -75,6 +87,14 @@ impl BodyView {
         for (kind, length) in longest.iter().enumerate() {
             numbers[(3 * N_POINTS + kind) * n..][..n].fill(length / scale);
         }
+        for side in 0..2 {
+            let track = held(hands.iter().map(|hands| hands[side]).collect()).unwrap_or_else(|| vec![[0.0; 3]; n]);
+            let channels = &mut numbers[(N_BODY_IN + N_OF_HAND * side) * n..][..N_OF_HAND * n];
+            for t in 0..n {
+                (0..3).for_each(|k| channels[k * n + t] = track[t][k]);
+                channels[3 * n + t] = f32::from(hands[t][side].is_some());
+            }
+        }
         Some(Self { numbers, scale })
     }
 
@@ -87,7 +107,12 @@ impl BodyView {
             numbers.extend(channels[..n].iter().map(|x| -x));
             numbers.extend_from_slice(&channels[n..]);
         }
-        numbers.extend_from_slice(&self.numbers[3 * N_POINTS * n..]);
+        numbers.extend_from_slice(&self.numbers[3 * N_POINTS * n..N_BODY_IN * n]);
+        for side in [1, 0] {
+            let channels = &self.numbers[(N_BODY_IN + N_OF_HAND * side) * n..][..N_OF_HAND * n];
+            numbers.extend(channels[..n].iter().map(|x| -x));
+            numbers.extend_from_slice(&channels[n..]);
+        }
         Self { numbers, scale: self.scale }
     }
 
@@ -137,7 +162,7 @@ fn at(seen: &[BodyPoints], time: f64) -> BodyPoints {
 }
 
 /// Fills each gap from the nearest frame with a value, the earlier of two; `None` if there is no value.
-fn held(mut track: Vec<Option<[f32; 2]>>) -> Option<Vec<[f32; 2]>> {
+fn held<T: Copy>(mut track: Vec<Option<T>>) -> Option<Vec<T>> {
     let seen: Vec<usize> = (0..track.len()).filter(|&t| track[t].is_some()).collect();
     let mut next = 0;
     for t in 0..track.len() {
@@ -183,7 +208,7 @@ mod tests {
     const WINDOW: usize = 27;
 
     fn middle_view(frames: &[BodyPoints]) -> Option<BodyView> {
-        BodyView::around(frames, frames.len() / 2, WINDOW, 1.0)
+        BodyView::around(frames, &[], frames.len() / 2, WINDOW, 1.0)
     }
 
     fn frame(shift: f32) -> BodyPoints {
@@ -216,6 +241,21 @@ mod tests {
         let mirrored: Vec<f32> =
             MIRROR.iter().flat_map(|&j| [-output[3 * j], output[3 * j + 1], output[3 * j + 2]]).collect();
         assert_eq!(mirror_mean(&output, &mirrored), output);
+    }
+
+    #[test]
+    fn hands_follow_the_points_and_are_mirrored() {
+        let frames: Vec<BodyPoints> = (0..WINDOW).map(|t| frame(t as f32)).collect();
+        let mut hands: Vec<HandDirections> = vec![[Some([0.6, 0.0, -0.8]), None]; WINDOW];
+        hands[3][0] = None;
+        let view = BodyView::around(&frames, &hands, WINDOW / 2, WINDOW, 1.0).unwrap();
+        let channel = |view: &BodyView, k: usize| view.numbers[(N_BODY_IN + k) * WINDOW..][..WINDOW].to_vec();
+        assert_eq!((channel(&view, 0)[5], channel(&view, 2)[3]), (0.6, -0.8));
+        assert_eq!((channel(&view, 3)[3], channel(&view, 3)[4], channel(&view, 7)[4]), (0.0, 1.0, 0.0));
+        let mirrored = view.mirrored();
+        assert_eq!((channel(&mirrored, 4)[5], channel(&mirrored, 6)[5], channel(&mirrored, 3)[5]), (-0.6, -0.8, 0.0));
+        assert_eq!(mirrored.mirrored(), view);
+        assert_eq!(middle_view(&frames).unwrap().numbers[..N_BODY_IN * WINDOW], view.numbers[..N_BODY_IN * WINDOW]);
     }
 
     #[test]

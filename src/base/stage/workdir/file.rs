@@ -77,9 +77,6 @@ pub fn read_file(path: &Path) -> std::io::Result<Vec<u8>> {
 }
 
 /// Writes `bytes` to `path` atomically and creates its folder if missing.
-///
-/// # Errors
-/// Those of [`replace`].
 pub fn write_file(path: &Path, bytes: &[u8]) -> Result<()> {
     replace(path, |attempt| Ok(File::create(attempt)?.write_all(bytes)?))
 }
@@ -105,9 +102,6 @@ pub fn replace(path: &Path, write: impl FnOnce(&Path) -> Result<()>) -> Result<(
 }
 
 /// Removes the file at `path`, if it exists, and flushes its folder.
-///
-/// # Errors
-/// The file cannot be removed or the folder cannot be flushed.
 pub fn remove_file(path: &Path) -> Result<()> {
     match fs::remove_file(path) {
         Ok(()) => flush(&parent(path)),

@@ -14,9 +14,6 @@ use std::path::{Path, PathBuf};
 type Exchange<'a> = &'a dyn Fn(&Path, &Path) -> io::Result<bool>;
 
 /// Replaces `target`, which may be missing, by the finished folder `attempt`, after flushing every file to disk.
-///
-/// # Errors
-/// A file operation fails (`NoSpace` if the disk is full).
 pub fn replace_folder(attempt: &Path, target: &Path) -> Result<()> {
     let moved = || -> Result<()> {
         flush_tree(attempt)?;
@@ -43,9 +40,6 @@ pub fn build_folder<T>(target: &Path, write: impl FnOnce(&Path) -> Result<T>) ->
 
 /// Creates an empty working folder beside `target`. First undoes a replacement that was killed halfway, and removes
 /// what killed attempts left beside `target`.
-///
-/// # Errors
-/// A file operation fails (`NoSpace` if the disk is full).
 pub fn attempt_folder(target: &Path) -> Result<PathBuf> {
     restore_folder(target)?;
     let create = || -> io::Result<PathBuf> {
@@ -62,9 +56,6 @@ pub fn attempt_folder(target: &Path) -> Result<PathBuf> {
 
 /// Recovers from programs that were killed while replacing `target`: moves the folder back to its path and removes
 /// attempts. The caller must hold an exclusive lock on the folder or on the work folder.
-///
-/// # Errors
-/// A file operation fails.
 pub fn recover_folder(target: &Path) -> Result<()> {
     restore_folder(target)?;
     let remove = || -> io::Result<()> {
@@ -78,9 +69,6 @@ pub fn recover_folder(target: &Path) -> Result<()> {
 }
 
 /// Moves the folder back that `replace_folder` had renamed when it was killed between its two renames.
-///
-/// # Errors
-/// The folder cannot be renamed.
 pub fn restore_folder(target: &Path) -> Result<()> {
     let old = attempt::backup_path(target);
     if target.symlink_metadata().is_ok() || !old.is_dir() {

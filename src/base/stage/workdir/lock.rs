@@ -114,9 +114,6 @@ impl Drop for FolderLock {
 }
 
 /// Returns whether locks work in the existing folder `folder`: a second file handle must be rejected.
-///
-/// # Errors
-/// The folder is not writable.
 pub fn locks_work(folder: &Path) -> Result<bool> {
     let probe = folder.join(format!(".lock-probe-{}", std::process::id()));
     let tried = || -> std::io::Result<bool> {
@@ -167,9 +164,6 @@ fn take(folder: &Path, path: &Path, is_exclusive: bool) -> Result<Option<File>> 
 
 /// Opens a lock file, created if missing: links are rejected and the file is never truncated. Opened for reading only
 /// if it is not writable.
-///
-/// # Errors
-/// `ErrorKind::InvalidInput` for a named pipe.
 fn open(path: &Path) -> std::io::Result<File> {
     let flags = (OFlags::NOFOLLOW | OFlags::NONBLOCK).bits() as i32;
     let mut options = OpenOptions::new();

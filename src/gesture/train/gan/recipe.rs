@@ -46,7 +46,6 @@ impl TrainingMaterial {
     }
 }
 
-/// Values of a key in all recipes.
 struct RecipeRow {
     key: &'static str,
     rebol: f64,
@@ -104,7 +103,6 @@ const CHOICES: [(&str, &str, &str); 4] = [
     ("bone_loss", "metres", "relative"),
 ];
 
-/// Source of a value of the recipe `rebol2021`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ValueSource {
     /// Stated in Rebol et al. 2021, with the section or equation.
@@ -208,10 +206,21 @@ fn auto(row: &RecipeRow, minutes: f64) -> f64 {
     }
 }
 
+/// Warning before a new network is trained on so little speech that it learns no more than the mean pose.
+pub fn mean_pose_warning(material: &TrainingMaterial) -> Option<String> {
+    const MIN_SECS: f64 = 60.0;
+    (material.train_secs < MIN_SECS).then(|| {
+        let missing = length(60.0 * MINUTES[1] - material.train_secs);
+        format!(
+            "warning: {} of speech to train on, the result will be the mean pose: motion that follows the speech needs \
+             about {} minutes ({missing} more)",
+            length(material.train_secs),
+            MINUTES[1]
+        )
+    })
+}
+
 /// Three lines that describe the settings of a new training; `secs_a_step`: measured seconds per step on this machine.
-///
-/// # Errors
-/// Settings that cannot be serialised.
 pub fn lines(of: &GanSettings, material: &TrainingMaterial, secs_a_step: Option<f64>) -> Result<Vec<String>> {
     let values = serde_json::to_value(of)?;
     let (train, held_out) = (length(material.train_secs), length(material.validation_secs));
@@ -246,7 +255,16 @@ pub(super) mod tests {
     use super::*;
     use orator_dataset::config::{AdversarialLoss, BoneLoss, MotionRepresentation, NetworkPreset};
 
-    /// Settings of `recipe` for this many minutes of one speaker.
+    #[test]
+    fn short_speech_gives_a_warning_with_the_missing_minutes() {
+        let warning =
+            |train_secs: f64| mean_pose_warning(&TrainingMaterial { train_secs, validation_secs: 0.0, n_speakers: 1 });
+        let text = warning(28.0).unwrap();
+        assert!(text.contains("will be the mean pose") && text.contains("about 10 minutes"), "{text}");
+        assert!(text.contains(&length(572.0)), "{text}");
+        assert_eq!(warning(60.0), None);
+    }
+
     pub(crate) fn of_minutes(recipe: GanRecipe, minutes: f64) -> GanSettings {
         let material = TrainingMaterial { train_secs: 60.0 * minutes, validation_secs: 60.0, n_speakers: 1 };
         settings(&GanConfig { recipe, ..GanConfig::default() }, &material, InitialWeights::Random).unwrap()

@@ -9,7 +9,6 @@ use orator_base::types::time::FrameRate;
 use orator_dataset::config::{FineMotionReading, SeamState, Seq2seqConfig, Seq2seqSettings, SequenceNetwork, number};
 use serde_json::{Value, json};
 
-/// Value of a key in one reading.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum ReadingValue {
     Number(f64),
@@ -161,6 +160,11 @@ pub fn epoch_length(settings: &Seq2seqSettings, n_segments: usize) -> usize {
     n_segments.div_ceil(settings.batch.max(1)).max(1)
 }
 
+/// Seconds of motion in `n_segments` training segments of `predicted` poses at `fps`.
+pub fn motion_secs(settings: &Seq2seqSettings, n_segments: usize, predicted: usize, fps: FrameRate) -> f64 {
+    fps.secs(n_segments * if settings.stride_frames == 0 { predicted } else { settings.stride_frames })
+}
+
 /// Sets the length of a training with `n_segments` training segments of `predicted` poses at `fps`: an epoch is one
 /// pass over the segments; a validation follows the smallest number of epochs with at least 100 steps.
 ///
@@ -175,7 +179,7 @@ pub fn set_length(
 ) -> Result<()> {
     let per_epoch = epoch_length(settings, n_segments);
     let stride = if settings.stride_frames == 0 { predicted } else { settings.stride_frames };
-    let minutes = fps.secs(n_segments * stride) / 60.0;
+    let minutes = motion_secs(settings, n_segments, predicted, fps) / 60.0;
     settings.epochs = match (requested.epochs.given(), requested.reading) {
         (Some(epochs), _) => epochs,
         // Every frame is in `predicted / stride` segments.

@@ -3,16 +3,13 @@
 //! everything else is stored in the checkpoint.
 
 use super::reading;
-use super::rollout_previous::roll_out_previous;
-use super::segments::SegmentLoader;
-use super::sequence::{PoseSequence, SequenceSplits};
+use super::segments::{PoseSequence, SegmentLoader, SequenceSplits, roll_out_previous};
 use super::source::TrainingSource;
 use super::step::{SequenceLosses, SequenceState, SequenceTrainer};
 use super::validate::{SequenceValidation, ValidationSegments};
 pub use crate::generate::model::BEST;
-use crate::generate::seq2seq::architecture::{self, network_config};
+use crate::generate::seq2seq::architecture::{self, PADDING, UNKNOWN, Vocabulary, network_config};
 use crate::generate::seq2seq::metadata::SequenceMetadata;
-use crate::generate::seq2seq::vocabulary::{PADDING, UNKNOWN, Vocabulary};
 use crate::train::epochs::{self, EpochSchedule, StepReport, TrainingOutcome, ValidatedStep, ValidatedTraining};
 use crate::train::log;
 use crate::train::no_window::{self, NeededFrames};
@@ -114,8 +111,8 @@ pub fn train_with_callback(
     };
     splits.notes.iter().for_each(|note| progress.say(note));
     let train = SegmentLoader::new(splits.train, &trainer.metadata, trainer.settings.stride_frames);
+    let Config { predicted, .. } = trainer.metadata.network;
     if resumed.is_none() {
-        let Config { predicted, .. } = trainer.metadata.network;
         reading::set_length(&mut trainer.settings, requested, train.len(), predicted, source.fps())?;
     } else {
         let per_epoch = reading::epoch_length(&trainer.settings, train.len());
@@ -139,6 +136,8 @@ pub fn train_with_callback(
         source.path(),
         folder.display()
     ));
+    let secs = reading::motion_secs(&trainer.settings, train.len(), predicted, source.fps());
+    no_window::motion_warning(secs).iter().for_each(|warning| progress.say(warning));
     let held_out = SegmentLoader::new(splits.held_out, &trainer.metadata, 0);
     if held_out.is_empty() {
         let cause = match source {
@@ -237,7 +236,6 @@ fn initialise_scales(trainer: &SequenceTrainer, train: &[PoseSequence]) -> Resul
     Ok(baseline.set_scale(&tensor(scales)?, &tensor(noise)?)?)
 }
 
-/// A trainer with its training and validation segments.
 struct SequenceTraining<'a> {
     trainer: &'a mut SequenceTrainer,
     loader: &'a SegmentLoader,

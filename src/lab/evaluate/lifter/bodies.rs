@@ -67,10 +67,12 @@ pub fn table(lifters: &Lifters, sets: &[Set], n_scenes: usize) -> Result<Vec<Bod
         ensure!(!drop.is_empty(), "every take of {set} is too short: expected at least 4 s");
         let mean = mean_pose(&clean);
         let (drop, clean) = (("drop", &drop[..]), ("clean", &clean[..]));
-        let network = |scene: &FilmedScene| Ok(lifters.network.poses(&scene.seen, 1.0)?);
+        let network = |scene: &FilmedScene| Ok(lifters.network.poses(&scene.seen, &[], 1.0)?);
+        let with_hands = |scene: &FilmedScene| Ok(lifters.network.poses(&scene.seen, &scene.hands, 1.0)?);
         rows.extend([
             row(set, "orator lift", drop, |scene| lift(&lifters.complete, scene))?,
             row(set, "network alone", drop, network)?,
+            row(set, "network with hands", drop, with_hands)?,
             row(set, "orator lift", clean, |scene| lift(&lifters.complete, scene))?,
             row(set, "bone-length depth", clean, |scene| Ok(with_bone_depth(scene)))?,
             row(set, "mean depth per joint", clean, |scene| Ok(with_mean_depth(scene, &mean)))?,
@@ -111,7 +113,8 @@ fn lift(lifter: &Lifter, scene: &FilmedScene) -> Result<Vec<Option<Pose>>> {
         }
     }
     let fps = FrameRate::new(FPS as u32, 1);
-    let keypoints = Keypoints { fps, image_size: [1280, 720], body, left_hand: none.clone(), right_hand: none };
+    let keypoints =
+        Keypoints { fps, image_size: [1280, 720], body, left_hand: none.clone(), right_hand: none, hand_depth: None };
     let lifted = lifter.lift_intervals(&keypoints, &[Interval { start: 0, end: n_frames }])?;
     let point = |array: &Array3<f32>, t: usize, j: usize| std::array::from_fn(|k| f64::from(array[[t, j, k]]));
     let pose = |t: usize| {

@@ -215,6 +215,7 @@ pub fn true_keypoints(clip: &RenderedClip) -> Keypoints {
         body: exact(&found.body, &truth.body, &truth.body_visibility),
         left_hand: exact(&found.left_hand, &truth.left_hand, &truth.left_hand_visibility),
         right_hand: exact(&found.right_hand, &truth.right_hand, &truth.right_hand_visibility),
+        hand_depth: found.hand_depth.clone(),
     }
 }
 
@@ -270,6 +271,7 @@ pub mod tests {
             body: found(&body),
             left_hand: found(&left),
             right_hand: found(&right),
+            hand_depth: None,
         };
         let all_visible = |points: usize| Array2::from_elem((n, points), Visibility::Visible);
         let truth = RenderedTruth {

@@ -2,12 +2,12 @@
 //! pose, a T-pose with arms along x, y up, facing z, of an adult of 1.75 m with the reference hand's bones. The files
 //! contain no rest pose; a person's own differs in proportions and by a few degrees, so that only directions are used.
 
+use crate::mocap::smplx::rest_hand;
 use orator_base::math::rotation::Rotation;
 use orator_base::math::vec3::{Vec3, scale, sub};
 use orator_base::motion::fk::Skeleton;
 use orator_base::motion::hand_bones::METRES;
 use orator_base::types::skeleton::Side;
-use orator_formats::mocap::smplx::rest_hand;
 
 /// Number of joints with a rotation.
 pub const N_SMPLX: usize = 55;

@@ -7,7 +7,7 @@ use crate::train::supervised::TrainingTask;
 use anyhow::Result;
 use candle_core::Tensor;
 use orator_base::motion::upper_body::N_POINTS;
-use orator_base::motion::view::body::{BodyView, N_IN, N_OUT};
+use orator_base::motion::view::body::{BodyView, N_BODY_IN, N_IN, N_OUT};
 use orator_nn::Mode;
 use orator_nn::lifter::body::BodyLifter;
 use orator_nn::lifter::temporal::Config;
@@ -15,12 +15,17 @@ use orator_nn::params::Params;
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 use serde_json::{Value, json};
+use std::collections::BTreeMap;
 
+/// Weight of the first convolution, [channels, inputs, width].
+const FIRST_WEIGHT: &str = "body.expand.conv.weight";
 /// Loss weight of each point: nose, arms, hips.
 const WEIGHTS: [f32; N_POINTS] = [1.0, 1.0, 1.2, 1.5, 1.0, 1.2, 1.5, 0.7, 0.7];
-/// Shares of scenes with captured motion and with rendered persons, if available; the rest is procedural motion.
+/// Shares of scenes with captured motion and with rendered persons, if available, and with motion over the reachable
+/// space of the arms; the rest are procedural gestures.
 const CAPTURED: f64 = 0.35;
-const RENDERED: f64 = 0.4;
+const RENDERED: f64 = 0.2;
+const REACH: f64 = 0.25;
 /// Share of the captured scenes in which one arm comes from another take.
 const MIXED: f64 = 0.35;
 /// Smallest and largest number of frames of a scene, and the number of windows cut from it.
@@ -67,7 +72,11 @@ impl BodyLifterTask {
                 }
             }
         }
-        FilmedScene::from_rule(Filming::Training, n_frames, rng)
+        if kind < CAPTURED + RENDERED + REACH {
+            FilmedScene::from_reach(Filming::Training, n_frames, rng)
+        } else {
+            FilmedScene::from_rule(Filming::Training, n_frames, rng)
+        }
     }
 }
 
@@ -120,6 +129,16 @@ impl TrainingTask for BodyLifterTask {
         &self.params
     }
 
+    /// Weights of a network without hands begin with zeros for these.
+    fn initial(&self, mut tensors: BTreeMap<String, Tensor>) -> Result<BTreeMap<String, Tensor>> {
+        if let Some(weight) = tensors.get_mut(FIRST_WEIGHT)
+            && weight.dim(1)? == N_BODY_IN
+        {
+            *weight = weight.pad_with_zeros(1, 0, N_IN - N_BODY_IN)?;
+        }
+        Ok(tensors)
+    }
+
     fn shape_in(&self) -> Vec<usize> {
         vec![N_IN, self.lifter.net.config().receptive_field()]
     }
@@ -139,7 +158,7 @@ impl TrainingTask for BodyLifterTask {
             // Where the shoulders are not visible, which is rare, another scene is drawn.
             let (t, view) = loop {
                 let t = rng.random_range(0..scene.seen.len());
-                match BodyView::around(&scene.seen, t, window, 1.0) {
+                match BodyView::around(&scene.seen, &scene.hands, t, window, 1.0) {
                     Some(_) if scene.disturbed[t] => {}
                     Some(view) => break (t, view),
                     None => scene = self.scene(rng),
@@ -177,7 +196,7 @@ impl TrainingTask for BodyLifterTask {
                 }
                 lines.push(format!(
                     "{set:30} {input}  {}",
-                    of_method(&scenes, |scene| Ok(self.lifter.poses(&scene.seen, 1.0)?))?
+                    of_method(&scenes, |scene| Ok(self.lifter.poses(&scene.seen, &[], 1.0)?))?
                 ));
                 if brief {
                     break;

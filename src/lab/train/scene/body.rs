@@ -2,15 +2,19 @@
 //! outliers and gaps of a detector. The ranges of angles, focal lengths and noise are documented at each draw.
 
 use super::body_motion;
-use super::body_motion::{Proportions, turn};
-use super::hand_shape::normal;
+use super::body_motion::{Proportions, SlowSwing, turn};
+use super::hand_direction;
+use super::hand_shape::{normal, random_rotation};
 use super::jumps;
 use super::noise;
+use super::reach;
 use crate::mocap::upper_body::BodyTake;
+use orator_base::math::rotation::Rotation;
 use orator_base::math::vec3;
 use orator_base::math::vec3::Vec3;
 use orator_base::motion::upper_body::{
-    BodyPoints, L_ELBOW, L_HIP, L_SHOULDER, L_WRIST, MIRROR, N_POINTS, NOSE, Pose, R_HIP, R_SHOULDER, R_WRIST,
+    BodyPoints, HandDirections, L_ELBOW, L_HIP, L_SHOULDER, L_WRIST, MIRROR, N_POINTS, NOSE, Pose, R_HIP, R_SHOULDER,
+    R_WRIST,
 };
 use orator_base::types::skeleton;
 use rand::{Rng, SeedableRng};
@@ -24,12 +28,21 @@ pub const FPS: f64 = 15.0;
 /// direction).
 const MEASURED_NOISE: f64 = 0.7;
 const MEASURED_BIAS: f64 = 0.7;
+/// Share of the captured arms that are moved to other directions in training, and the standard deviation per axis of
+/// the rotations of the arm and, in addition, of the forearm, radians.
+const MOVED: f64 = 0.5;
+const MOVED_BY: [f64; 2] = [0.2, 0.25];
+/// Share of the captured scenes in which the body turns, and the largest angle to either side.
+const TURNING: f64 = 0.3;
+const TURNS_BY: f64 = 0.6;
 
 /// A filmed scene: ground-truth poses in metres and camera axes, and the 2D keypoints.
 #[derive(Clone, Debug)]
 pub struct FilmedScene {
     pub truth: Vec<Pose>,
     pub seen: Vec<BodyPoints>,
+    /// Directions of the hands as a hand model sees them.
+    pub hands: Vec<HandDirections>,
     /// [T]; whether a frame has a gross error (`jumps`); such frames are not training targets.
     pub disturbed: Vec<bool>,
     /// Camera yaw relative to the body's mean front, radians; 0: frontal view.
@@ -73,10 +86,24 @@ impl FilmedScene {
             poses.iter_mut().for_each(|pose| *pose = with_bone_lengths(pose, &bones));
         }
         if training && !unchanged {
-            let glance = turn(rng.random_range(-0.5..0.5), rng.random_range(-0.2..0.2), 0.0);
-            poses.iter_mut().for_each(|pose| pose[NOSE] = glance.turn(pose[NOSE]));
+            move_arms(&mut poses, rng);
+            let [yaw, pitch, roll] = [0.7, 0.3, 0.2].map(|max| SlowSwing::sample(rng, max));
+            let turns_by = if rng.random_bool(TURNING) { TURNS_BY } else { 0.1 };
+            let turning = SlowSwing::sample(rng, turns_by);
+            for (i, pose) in poses.iter_mut().enumerate() {
+                let t = i as f64 / FPS;
+                pose[NOSE] = turn(yaw.at(t), pitch.at(t), roll.at(t)).turn(pose[NOSE]);
+                let body = turn(turning.at(t), 0.0, 0.0);
+                *pose = pose.map(|p| body.turn(p));
+            }
         }
         Some(Self::filmed(poses, filming, rng))
+    }
+
+    /// Films motion over the reachable space of the arms.
+    pub fn from_reach(filming: Filming, n_frames: usize, rng: &mut ChaCha8Rng) -> Self {
+        let poses = reach::motion(rng, n_frames, 1.0 / FPS);
+        Self::filmed(poses, filming, rng)
     }
 
     /// Films procedurally generated motion.
@@ -123,7 +150,9 @@ impl FilmedScene {
         }
         let disturbed =
             if training { jumps::disturb(&mut seen, 0.35 * px_per_metre, rng) } else { vec![false; seen.len()] };
-        Self { truth, seen, disturbed, yaw, neck, focal_px, px_per_metre }
+        // A stream of its own, so that scenes without hands stay as they are.
+        let hands = hand_direction::observed(&truth, 1.0 / FPS, &mut ChaCha8Rng::seed_from_u64(yaw.to_bits()));
+        Self { truth, seen, hands, disturbed, yaw, neck, focal_px, px_per_metre }
     }
 }
 
@@ -233,6 +262,26 @@ fn replace_left_arm(pose: &mut Pose, other: &Pose) {
     let shoulder = pose[L_SHOULDER];
     pose[L_ELBOW] = vec3::add(shoulder, from(L_ELBOW));
     pose[L_WRIST] = vec3::add(shoulder, from(L_WRIST));
+}
+
+/// Rotates arms by a random constant rotation about the shoulder, and forearms by another about the elbow: the dynamics
+/// of the capture in other directions.
+fn move_arms(poses: &mut [Pose], rng: &mut ChaCha8Rng) {
+    for [shoulder, elbow, wrist] in skeleton::ARMS {
+        if !rng.random_bool(MOVED) {
+            continue;
+        }
+        let [arm, fore] = MOVED_BY.map(|std| {
+            let axis = random_rotation(rng).turn([0.0, 0.0, 1.0]);
+            Rotation::about(axis, 3f64.sqrt() * std * normal(rng))
+        });
+        for pose in poses.iter_mut() {
+            let upper = arm.turn(vec3::sub(pose[elbow], pose[shoulder]));
+            let forearm = fore.turn(arm.turn(vec3::sub(pose[wrist], pose[elbow])));
+            pose[elbow] = vec3::add(pose[shoulder], upper);
+            pose[wrist] = vec3::add(pose[elbow], forearm);
+        }
+    }
 }
 
 /// Frames of an evaluation scene (4 s), and the seed of the evaluation scenes.

@@ -213,7 +213,7 @@ impl Swivel {
 }
 
 /// Slow sinusoidal oscillation about a mean.
-struct SlowSwing {
+pub struct SlowSwing {
     mean: f64,
     swing: f64,
     rate: f64,
@@ -221,12 +221,18 @@ struct SlowSwing {
 }
 
 impl SlowSwing {
-    fn sample(rng: &mut ChaCha8Rng, max: f64) -> Self {
+    pub fn sample(rng: &mut ChaCha8Rng, max: f64) -> Self {
         let (mean, swing) = (rng.random_range(-max..max), 0.5 * rng.random_range(0.0..max));
         Self { mean, swing, rate: TAU * rng.random_range(0.05..0.6), phase: rng.random_range(0.0..TAU) }
     }
 
-    fn at(&self, t: f64) -> f64 {
+    /// Oscillation of 0.8 to 3.5 Hz about 0, as in beats.
+    pub fn fast(rng: &mut ChaCha8Rng, max: f64) -> Self {
+        let (swing, phase) = (rng.random_range(0.0..max), rng.random_range(0.0..TAU));
+        Self { mean: 0.0, swing, rate: TAU * rng.random_range(0.8..3.5), phase }
+    }
+
+    pub fn at(&self, t: f64) -> f64 {
         self.mean + self.swing * (self.rate * t + self.phase).sin()
     }
 }

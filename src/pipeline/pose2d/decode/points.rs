@@ -1,5 +1,6 @@
 //! Outputs with one position per keypoint. SimCC (Li et al. 2022): x and y are two classifications over sub-pixel bins
-//! (RTMPose, RTMW, DWPose). Regression: one row of values per point, x and y first, in px of the input, and one score
+//! (RTMPose, RTMW, DWPose). Regression: one row of values per point, x and y first, in px of the input,
+//! then, in rows of three, depth, and one score
 //! for all points (MediaPipe's hand and face).
 
 use anyhow::{Result, bail, ensure};
@@ -62,6 +63,13 @@ pub fn regression(landmarks: &[f32], score: f32, n_points: usize) -> Result<Vec<
     Ok(rows.map(|row| [f64::from(row[0]), f64::from(row[1]), f64::from(score)]).collect())
 }
 
+/// Depths of the points of a regression, in px of the input: the third of three values a row; `None` for rows of other
+/// lengths or values that are not finite.
+pub fn depths(landmarks: &[f32], n_points: usize) -> Option<Vec<f64>> {
+    let fits = n_points > 0 && landmarks.len() == 3 * n_points && landmarks.iter().all(|number| number.is_finite());
+    fits.then(|| landmarks.chunks_exact(3).map(|row| f64::from(row[2])).collect())
+}
+
 /// Score 0..1 from an output that is a probability or a logit.
 pub fn regression_score(number: f32, is_logit: bool) -> f32 {
     if is_logit { 1.0 / (1.0 + (-number).exp()) } else { number }
@@ -88,6 +96,7 @@ mod tests {
     fn regression_accepts_rows_of_any_length() {
         let rows = [1.0, 2.0, 9.0, 3.0, 4.0, 9.0];
         assert_eq!(regression(&rows, 0.5, 2).unwrap(), [[1.0, 2.0, 0.5], [3.0, 4.0, 0.5]]);
+        assert_eq!((depths(&rows, 2), depths(&rows, 3)), (Some(vec![9.0, 9.0]), None));
         assert_eq!(regression(&rows, f32::NAN, 2).unwrap(), [[0.0; 3]; 2]);
         assert!(
             regression(&rows, 0.5, 4).is_err()

@@ -121,7 +121,7 @@ mod tests {
             0 => [x, y, score],
             _ => [x - 20.0 + 10.0 * ((i - 1) / 4) as f64, y - 20.0 - 15.0 * (1 + (i - 1) % 4) as f64, score],
         };
-        Some(DetectedHand { points: std::array::from_fn(point), score, right: None })
+        Some(DetectedHand { points: std::array::from_fn(point), score, right: None, depth: None })
     }
 
     fn body() -> [ScoredPoint; 17] {

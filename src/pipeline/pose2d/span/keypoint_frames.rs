@@ -44,7 +44,11 @@ impl KeypointFrames {
             let numbers = poses().flat_map(part).flat_map(|point| [point.x, point.y, point.score]);
             Array3::from_shape_vec((n_frames, n, 3), numbers.collect())
         };
+        let has_depth = poses().any(|pose| pose.hand_depth.iter().any(Option::is_some));
+        let depths = || poses().flat_map(|pose| pose.hand_depth).flat_map(|hand| hand.unwrap_or([f32::NAN; N_HAND]));
+        let hand_depth = has_depth.then(|| Array3::from_shape_vec((n_frames, 2, N_HAND), depths().collect()));
         let keypoints = Keypoints {
+            hand_depth: hand_depth.transpose()?,
             fps,
             image_size,
             body: points(|pose| &pose.body, N_BODY)?,

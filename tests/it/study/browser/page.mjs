@@ -143,8 +143,8 @@ function touchInput(page) {
 
 const axe = () => readFileSync(packages.resolve("axe-core/axe.min.js"), "utf8");
 
-// Accessibility problems: serious findings of axe-core, pages that must be scrolled horizontally, targets that are too
-// small for touch.
+// Accessibility problems: serious findings of axe-core, pages that must be scrolled horizontally, placeholders
+// without a value, targets that are too small for touch.
 export async function audit(page) {
   if (!(await page.evaluate(() => "axe" in window))) await page.evaluate(axe());
   return page.evaluate(async () => {
@@ -153,6 +153,8 @@ export async function audit(page) {
     const found = serious.map(({ id, nodes }) => `${id}: ${nodes.map(({ html }) => html.slice(0, 120)).join(" | ")}`);
     const { scrollWidth, clientWidth } = document.documentElement;
     if (scrollWidth > clientWidth) found.push(`${scrollWidth} px wide in a window of ${clientWidth}`);
+    const unfilled = document.body.innerText.match(/\{\w+\}/);
+    if (unfilled) found.push(`placeholder without a value: ${unfilled[0]}`);
     for (const node of document.querySelectorAll("button, select, .choices label, .agree, input:not([type=checkbox], [type=radio])")) {
       const { width, height } = node.getBoundingClientRect();
       if (width > 0 && (height < 44 || width < 44)) found.push(`${Math.round(width)} x ${Math.round(height)} px: ${node.outerHTML.slice(0, 120)}`);

@@ -199,10 +199,16 @@ async function participate(browser, seed) {
         await isOpen("main .main");
         await nextStep(() => input.press("main .main"));
       } else if (view.kind === "sound") {
-        await input.press("main button[type=button]");
-        await isOpen("main fieldset");
-        await input.type("#tones", "3");
-        await nextStep(() => input.submit());
+        // After a wrong number, the next one needs another play.
+        for (const tones of options.audit ? ["2", "3"] : ["3"]) {
+          await input.press("main button[type=button]");
+          await isOpen("main fieldset");
+          await input.type("#tones", tones);
+          if (tones === "2") {
+            await input.submit();
+            await page.waitForSelector("main fieldset:disabled");
+          } else await nextStep(() => input.submit());
+        }
       } else if (view.kind === "end") {
         report.code = await page.$eval("#code", (input) => input.value);
         break;

@@ -1,13 +1,13 @@
 //! SMPL-X joint rotations in `.npz` files (BEAT2, EMAGE): `poses` [T, 165], axis-angle in radians, converted to the
 //! finger joints of both hands by forward kinematics of an assumed rest hand.
 
-use crate::npz::Npz;
 use anyhow::Result;
 use orator_base::math::rotation::Rotation;
 use orator_base::math::vec3::{self, Vec3};
 use orator_base::motion::hand_bones::BONES;
 use orator_base::types::pose2d::N_HAND;
 use orator_base::types::skeleton::Side;
+use orator_formats::npz::Npz;
 use std::path::Path;
 
 /// Numbers per frame: 55 joints with an axis-angle vector each.
@@ -93,7 +93,7 @@ mod tests {
         }
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("a.npz");
-        crate::npz::write(&path, |npz| npz.add_array("poses", &poses)).unwrap();
+        orator_formats::npz::write(&path, |npz| npz.add_array("poses", &poses)).unwrap();
         assert!(is_smplx(&path).unwrap());
         let [(_, left), (_, right)] = hands(&path).unwrap();
         for (a, b) in left[0].iter().zip(&right[0]) {
