@@ -1,5 +1,6 @@
 # make demo    the complete pipeline on a synthetic speaker, from a bare machine to a trained model and its motion
 # make demo-study   a user study of that speaker: films, server, scripted participants in a browser, analysis
+# make docs    the guide as HTML pages in target/docs, with pictures of the demo after `make demo`
 # make check   format, clippy and the quick tests: needs neither root nor other programs, takes a few minutes
 # make test    everything CI runs
 # make test-data   the tests that the last `make test` skipped, with the real data and models in ORATOR_DATA
@@ -10,7 +11,7 @@
 SHELL := /bin/bash
 .SHELLFLAGS := -euo pipefail -c
 .DEFAULT_GOAL := build
-.PHONY: spelling test-data setup runtime models readers aligner browser blender validator vrm driver loader build check test prove prove-rule prove-people prove-cluster prove-study demo demo-study clean-demo
+.PHONY: spelling test-data setup runtime models readers aligner browser blender validator vrm driver loader build check test prove prove-rule prove-people prove-cluster prove-study demo demo-study clean-demo docs
 
 TARGET := $(or $(CARGO_TARGET_DIR),target)
 ORATOR := $(TARGET)/release/orator
@@ -107,6 +108,12 @@ STUDY := $(TARGET)/demo-study
 
 demo-study: build browser driver
 	ORATOR=$(ORATOR) .ci/demo-study $(STUDY) 8
+
+# The guide as pages that open from the folder; the pictures of its gallery need a complete demo.
+DOCS := $(TARGET)/docs
+
+docs: build
+	$(LAB) docs $(DOCS) $(if $(wildcard $(DEMO)/evaluation.html),--demo $(DEMO))
 
 clean-demo:
 	rm -rf $(DEMO) $(STUDY) $(TARGET)/demo-test

@@ -6,5 +6,5 @@ pub mod chart;
 pub mod document;
 pub mod node;
 
-pub use document::{Page, Section, jpeg, video};
+pub use document::{Page, Section, html_file, jpeg, page_head, video};
 pub use node::{Node, legend, node, table};
