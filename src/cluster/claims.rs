@@ -24,10 +24,8 @@ const MAX_CHECKED: usize = 32;
 /// First waiting time of a worker. It grows by half each time, up to the interval between two checks for dead workers.
 const FIRST_WAIT: Duration = Duration::from_secs(2);
 
-/// A unit that a worker has claimed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Claim {
-    /// Index of the unit in the plan.
     pub unit: usize,
     /// Epoch of the claim: 1 for the first, one more each time the unit is taken over or retried.
     pub epoch: u32,
@@ -50,7 +48,6 @@ impl Claim {
         format!("{}/{unit:06}.{kind}.{epoch:04}", folder_name(unit / UNITS_PER_FOLDER))
     }
 
-    /// Reads which worker created the claim.
     pub fn read_owner(self, folder: &impl SharedFolder) -> Result<ClaimOwner> {
         let file = self.file("claim");
         let Some(bytes) = folder.read(&file)? else { return Ok(ClaimOwner::NotVisible) };
@@ -71,7 +68,6 @@ impl Claim {
     }
 }
 
-/// Owner that the file of a claim names.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum ClaimOwner {
     /// The file is not visible yet.
@@ -81,7 +77,6 @@ pub enum ClaimOwner {
     Unreadable(String),
 }
 
-/// Content of a claim file.
 #[derive(Serialize, Deserialize)]
 struct ClaimFile {
     worker: String,
@@ -92,7 +87,6 @@ struct ClaimFile {
 /// Result of the work on a unit, the content of an end file.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct UnitEnd {
-    /// Name of the worker that worked on the unit.
     pub worker: String,
     /// Error message; `None` if the unit succeeded.
     pub error: Option<String>,
@@ -105,7 +99,6 @@ pub struct UnitEnd {
 pub struct ClaimState {
     /// Epoch of the last claim; 0 if the unit is free.
     pub epoch: u32,
-    /// Whether the unit ended under that claim.
     pub has_ended: bool,
 }
 
@@ -127,7 +120,6 @@ fn parse_name(name: &str) -> Option<(usize, ClaimState)> {
     Some((unit.parse().ok()?, state)).filter(|_| is_known)
 }
 
-/// Updates the states of the units whose files are in folder `number`.
 fn update_states(states: &mut [ClaimState], folder: &impl SharedFolder, number: usize) -> Result<()> {
     let units = number * UNITS_PER_FOLDER..((number + 1) * UNITS_PER_FOLDER).min(states.len());
     let files = folder.list(&folder_name(number))?;
@@ -137,27 +129,22 @@ fn update_states(states: &mut [ClaimState], folder: &impl SharedFolder, number: 
     Ok(())
 }
 
-/// States of the `n_units` units of a plan.
 pub fn read_states(folder: &impl SharedFolder, n_units: usize) -> Result<Vec<ClaimState>> {
     let mut states = vec![ClaimState::default(); n_units];
     (0..n_units.div_ceil(UNITS_PER_FOLDER)).try_for_each(|number| update_states(&mut states, folder, number))?;
     Ok(states)
 }
 
-/// Answer of [`Claims::next`].
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum NextUnit {
-    /// This worker now owns the unit of the claim.
     Claimed(Claim),
     /// All remaining units are claimed by other workers or need units that have not ended. Ask again after this time.
     Wait(Duration),
     /// Every remaining unit is in `Claims::blocked` or needs a unit that is.
     Blocked,
-    /// Every unit has ended.
     AllEnded,
 }
 
-/// Settings of a worker's claims.
 #[derive(Clone, Debug)]
 pub struct ClaimOptions {
     /// Name of the worker, unique in the plan.
@@ -170,7 +157,6 @@ pub struct ClaimOptions {
     pub retries: bool,
 }
 
-/// The claims of a plan as seen by one worker.
 pub struct Claims<'a, F> {
     folder: &'a F,
     options: ClaimOptions,
@@ -184,9 +170,7 @@ pub struct Claims<'a, F> {
     orphaned: Vec<Claim>,
     /// Foreign files at the path of a claim or an end, by unit.
     blocked: BTreeMap<usize, String>,
-    /// Known owners of claims.
     owners: BTreeMap<Claim, String>,
-    /// Time of the next check for dead workers.
     next_check: Duration,
     /// Waiting time that `next` returned last; zero after a successful claim.
     last_wait: Duration,
@@ -308,7 +292,6 @@ impl<'a, F: SharedFolder> Claims<'a, F> {
         Ok(())
     }
 
-    /// Claims one of the next free units.
     fn claim_free(&mut self) -> Result<Option<Claim>> {
         loop {
             let is_free = |unit: &usize| self.states[*unit].epoch == 0;

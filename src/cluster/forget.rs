@@ -11,9 +11,6 @@ use std::path::{Path, PathBuf};
 
 /// Paths in the work folder to remove: plans that contain one of the terms, with the folders of their workers; worker
 /// folders of earlier plans that contain one; and the folder of excerpts that a killed `orator plan` left.
-///
-/// # Errors
-/// A folder cannot be listed or a file cannot be searched.
 pub fn plans_naming(work: &Path, terms: &[SearchTerm]) -> Result<Vec<PathBuf>> {
     if !work.is_dir() {
         return Ok(Vec::new());

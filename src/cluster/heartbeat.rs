@@ -8,18 +8,15 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::time::Duration;
 
-/// Folder of the heartbeat files.
 pub const WORKERS: &str = "workers";
 
 /// Default time without a beat after which a worker counts as dead.
 pub const DEAD_AFTER: Duration = Duration::from_secs(180);
 
-/// Status that a worker publishes.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Heartbeat {
     /// Counter, incremented at every beat.
     pub beat: u64,
-    /// Host name of the machine.
     pub host: String,
     /// Identifier of the machine or container; empty if unknown.
     pub machine: String,
@@ -29,9 +26,7 @@ pub struct Heartbeat {
     pub started: u64,
     /// Whether the worker exited in order and holds no unit.
     pub ended: bool,
-    /// Number of units done.
     pub n_done: usize,
-    /// Number of units that failed.
     pub n_failed: usize,
     /// Duration of the video in the units done, seconds.
     pub media_secs: f64,
@@ -81,7 +76,6 @@ pub struct BeatWatch {
 }
 
 impl BeatWatch {
-    /// Creates a watcher that runs on `machine`.
     pub fn new(dead_after: Duration, machine: &str) -> Self {
         Self { dead_after, machine: machine.to_owned(), last_beats: BTreeMap::new() }
     }

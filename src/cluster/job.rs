@@ -5,7 +5,6 @@ use super::plan::ClusterPlan;
 use orator_base::stage::artifacts::{StageName, speaker_dir};
 use std::path::{Path, PathBuf};
 
-/// Resource limits of one task.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TaskLimits {
     /// Processor cores.
@@ -23,7 +22,6 @@ impl TaskLimits {
     }
 }
 
-/// Inputs of the job scripts.
 #[derive(Clone, Debug, PartialEq)]
 pub struct JobRequest {
     /// Path of the program on the machines of the cluster.
@@ -34,7 +32,6 @@ pub struct JobRequest {
     pub n_tasks: usize,
     /// Maximum number of tasks that run at the same time.
     pub n_at_once: usize,
-    /// Resource limits of a worker.
     pub worker_limits: TaskLimits,
 }
 

@@ -6,7 +6,6 @@ use super::plan::ClusterPlan;
 use serde_json::{Value, json};
 use std::path::Path;
 
-/// Cluster settings of the manifests.
 #[derive(Clone, Debug, PartialEq)]
 pub struct KubernetesTarget {
     /// Container image with the program.

@@ -76,7 +76,6 @@ pub enum UnitShare {
 }
 
 impl PlannedUnit {
-    /// The unit as the pipeline knows it.
     pub fn unit(&self) -> Unit {
         Unit { speaker: self.speaker.clone(), video: self.video.clone(), source: self.source.clone() }
     }
@@ -237,7 +236,6 @@ impl ClusterPlan {
         path.with_file_name(format!("{stem}-{}", &self.seal[..12]))
     }
 
-    /// One unit for each video.
     pub fn videos(&self) -> Vec<PlannedUnit> {
         self.units.iter().filter(|unit| unit.share == UnitShare::AllStages).cloned().collect()
     }
@@ -298,9 +296,6 @@ impl ClusterPlan {
 
     /// Videos of the plan at `path` that the pipeline does not find; empty if `path` is not a plan with the pipeline's
     /// settings.
-    ///
-    /// # Errors
-    /// The settings cannot be hashed.
     pub fn missing_videos(path: &Path, pipeline: &Pipeline) -> Result<Vec<PlannedUnit>> {
         match Self::read(path) {
             Ok(plan) if plan.settings == settings_hash(pipeline.config())? => plan.missing(pipeline),
@@ -331,7 +326,6 @@ pub fn settings_hash(config: &Config) -> Result<String> {
 
 #[cfg(test)]
 impl PlannedUnit {
-    /// A video of unknown length, for tests.
     pub fn example(speaker: &str, video: &str) -> Self {
         Self {
             speaker: speaker.to_owned(),

@@ -12,7 +12,6 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-/// Summary of the work on a plan.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct PlanProgress {
     pub n_units: usize,
@@ -38,7 +37,6 @@ pub struct PlanProgress {
     pub stopped: Option<String>,
 }
 
-/// Status of one worker.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct WorkerProgress {
     pub worker: String,
@@ -93,7 +91,6 @@ fn reason(error: &str) -> String {
     parts.filter(|part| part != "FILE").collect::<Vec<_>>().join(": ")
 }
 
-/// All workers that have published a heartbeat.
 fn workers(folder: &DiskFolder, dead_after: Duration) -> Result<Vec<WorkerProgress>> {
     let mut names = folder.list(WORKERS)?;
     names.sort();

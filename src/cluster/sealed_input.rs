@@ -18,9 +18,6 @@ pub struct SealedInput {
 
 impl SealedInput {
     /// Records the input; hashes its content unless the hash is cached.
-    ///
-    /// # Errors
-    /// The input cannot be read.
     pub fn new(input: Input, hashes: &HashCache) -> Result<Self> {
         let content = hashes.content(&input.path)?;
         Ok(Self { role: input.role, path: input.path, content })

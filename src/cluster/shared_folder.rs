@@ -24,7 +24,6 @@ pub trait SharedFolder {
     fn replace(&self, name: &str, bytes: &[u8]) -> Result<()>;
 }
 
-/// A folder on a file system.
 #[derive(Clone, Debug)]
 pub struct DiskFolder(pub PathBuf);
 

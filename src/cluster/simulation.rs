@@ -61,7 +61,6 @@ impl SharedFolder for DelayedFolder {
     }
 }
 
-/// A simulated worker.
 struct Simulated<'a> {
     claims: Claims<'a, DelayedFolder>,
     name: String,

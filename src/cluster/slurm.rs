@@ -8,7 +8,6 @@ use std::path::Path;
 /// Seconds before its time limit at which a task receives SIGTERM.
 const NOTICE_SECS: u64 = 120;
 
-/// The scripts of a plan.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SlurmScripts {
     /// Arrays of workers, each within the cluster's size limit.
@@ -20,11 +19,9 @@ pub struct SlurmScripts {
     pub trainings: Vec<String>,
 }
 
-/// Settings shared by all scripts.
 pub struct SlurmSettings<'a> {
     /// The cluster's MaxArraySize.
     pub max_array: usize,
-    /// Folder of the log files.
     pub logs: &'a Path,
     /// Additional `#SBATCH` options (such as a partition or an account).
     pub options: &'a [String],

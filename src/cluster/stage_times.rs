@@ -9,16 +9,13 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-/// Name of the file in the work folder.
 const FILE: &str = "stage_times.json";
 
-/// Times of the stages on one machine.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct StageTimes {
     /// Hash of the program, settings, models and machine that were timed; the times are invalid for any other.
     #[serde(alias = "made_with")]
     pub fingerprint: String,
-    /// Name of the processor.
     pub processor: String,
     /// Number of videos processed in parallel during the measurement.
     pub jobs: usize,
@@ -31,7 +28,6 @@ pub struct StageTimes {
     pub peak_mib: Option<f64>,
 }
 
-/// Cost of a stage for one video.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct StageCost {
     /// Seconds independent of the length of the video, and seconds of work for each second of video.
@@ -69,7 +65,6 @@ impl StageCost {
 }
 
 impl StageTimes {
-    /// Path of the file in a work folder.
     pub fn path(work: &Path) -> PathBuf {
         work.join(FILE)
     }
@@ -79,7 +74,6 @@ impl StageTimes {
         serde_json::from_slice(&std::fs::read(Self::path(work)).ok()?).ok()
     }
 
-    /// Saves the times in a work folder.
     pub fn write(&self, work: &Path) -> Result<()> {
         let mut bytes = serde_json::to_vec_pretty(self)?;
         bytes.push(b'\n');
@@ -135,7 +129,6 @@ impl StageTimes {
     }
 }
 
-/// Work on several videos.
 #[derive(Clone, Copy, Default)]
 struct Workload {
     /// Seconds of work on all videos.

@@ -87,7 +87,6 @@ pub fn measure(
     Ok(StageTimes { fingerprint, processor: processor(), jobs, ..times })
 }
 
-/// Times the stages on excerpts in `folder`.
 fn time_excerpts(
     pipeline: &Pipeline,
     units: &[PlannedUnit],

@@ -10,8 +10,7 @@ use orator_base::stage::artifacts::StageName;
 use orator_base::stage::fingerprint::HashCache;
 use orator_base::stage::progress::Progress;
 use orator_base::stage::runner::{ClaimLost, StageOutcome};
-use orator_base::stage::workdir;
-use orator_base::stage::workdir::NoSpace;
+use orator_base::stage::workdir::{self, NoSpace};
 use orator_pipeline::Pipeline;
 use serde::Serialize;
 use std::collections::{BTreeMap, BTreeSet};
@@ -24,7 +23,6 @@ use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 /// File that stops every worker of a plan; it contains the reason.
 pub const STOP: &str = "stop.txt";
 
-/// Settings of the workers of one process.
 #[derive(Clone, Debug, PartialEq)]
 pub struct WorkerOptions {
     /// Number of units in parallel, each under its own claim.
@@ -41,14 +39,12 @@ pub struct WorkerOptions {
     pub dead_after: Duration,
 }
 
-/// Results of the workers of one process.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct WorkReport {
     /// Number of units done, including those that were up to date.
     pub done: usize,
     /// Number of units done whose stages were all up to date before.
     pub up_to_date: usize,
-    /// Units that failed, each with its error.
     pub failed: Vec<(String, String)>,
     /// Units that had failed in an earlier session and were not processed again, once every unit has ended.
     pub failed_before: Vec<String>,
@@ -148,7 +144,6 @@ fn resume_after_stop(folder: &DiskFolder) -> Result<()> {
     workdir::remove_file(&folder.0.join(STOP))
 }
 
-/// The workers of one process on one plan.
 struct Session<'a> {
     plan: &'a ClusterPlan,
     folder: DiskFolder,
@@ -164,7 +159,6 @@ struct Session<'a> {
 }
 
 impl Session<'_> {
-    /// Runs one worker with its heartbeat.
     fn run(&self, name: &str, first: Heartbeat) -> Result<()> {
         let heartbeat = HeartbeatFile { folder: &self.folder, name, content: Mutex::new(first), begun: self.begun };
         heartbeat.beat()?;
@@ -252,10 +246,6 @@ impl Session<'_> {
         (0..self.plan.units.len()).filter(is_in_shard).collect()
     }
 
-    /// Whether to stop after the current unit.
-    ///
-    /// # Errors
-    /// The reason why all workers must stop.
     fn should_stop(&self) -> Result<bool> {
         if let Some(reason) = read_stop(&self.folder)? {
             bail!("all workers stop: {reason}; free at least 64 MiB of disk space and start them again");
@@ -341,7 +331,6 @@ fn host_of(worker: &str) -> &str {
     worker.rsplitn(4, '-').last().unwrap_or(worker)
 }
 
-/// Heartbeat file of one worker.
 struct HeartbeatFile<'a> {
     folder: &'a DiskFolder,
     name: &'a str,

@@ -3,7 +3,7 @@
 //!
 //! candle's operators are used only where finite differences confirm their gradients (`tests/it/train/operators.rs`
 //! lists them and rejects the others); convolution, batch norm and recurrent layers are implemented here. The layers
-//! of the lifters are channels first; those of the GAN (`conv_block`) are channels last, which avoids unfolding.
+//! of the lifters are channels first; those of the GAN (`gan::generator`) are channels last, which avoids unfolding.
 
 pub mod cpu;
 pub mod gan;

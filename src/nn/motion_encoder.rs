@@ -12,9 +12,7 @@ use candle_nn::Linear;
 use ndarray::{Array2, ArrayView2};
 use serde::{Deserialize, Serialize};
 
-/// Number of frames of a window.
 pub const WINDOW: usize = 34;
-/// Number of values of a code.
 pub const N_CODE: usize = 32;
 /// Windows that share convolutions start at multiples of this many frames.
 pub const STEP: usize = 2;
@@ -28,7 +26,6 @@ const POSITIONS: usize = 12;
 pub const SLOPE: f64 = 0.2;
 const MOMENTUM: f64 = 0.1;
 
-/// Configuration of the network.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Config {
     /// Number of values per frame.
@@ -45,7 +42,6 @@ impl Default for Config {
     }
 }
 
-/// Network that encodes windows.
 pub struct MotionEncoder {
     /// Mean and standard deviation of each value of a frame, [1, n_in, 1]; the input is (x - mean) / std.
     mean: Var,
@@ -71,7 +67,6 @@ pub fn dense(params: &mut Params, prefix: &str, widths: &[usize], last: f64) -> 
     Ok(layers)
 }
 
-/// Applies layers to `x`, each followed by its norm.
 pub fn through<L: Module>(layers: &[(L, BatchNorm)], x: &Tensor, mode: &Mode) -> Result<Tensor> {
     layers.iter().try_fold(x.clone(), |x, (layer, norm)| norm.forward(&layer.forward(&x)?, mode.trains()))
 }

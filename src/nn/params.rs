@@ -23,7 +23,6 @@ pub fn open_device(on_card: bool) -> anyhow::Result<Device> {
     )
 }
 
-/// Initial values of a tensor.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Init {
     Constant(f64),
@@ -63,7 +62,6 @@ impl Params {
         Self { device: device.clone(), ..self }
     }
 
-    /// Device of the tensors.
     pub fn device(&self) -> &Device {
         &self.device
     }
@@ -138,7 +136,6 @@ impl Params {
         self.trainable.values().map(|var| var.elem_count()).sum()
     }
 
-    /// Copies all tensors to the CPU, for saving.
     pub fn tensors(&self) -> Result<BTreeMap<String, Tensor>> {
         let copy = |var: &Var| if var.device().is_cpu() { var.copy() } else { var.to_device(&Device::Cpu) };
         self.all().map(|(name, var)| Ok((name.to_owned(), copy(var)?))).collect()
@@ -166,7 +163,6 @@ impl Params {
     }
 }
 
-/// Returns `n` numbers in -bound..bound.
 fn uniform(seed: u64, name: &str, n: usize, bound: f64) -> Vec<f64> {
     let key = [&seed.to_le_bytes(), name.as_bytes()].concat();
     let mut rng = ChaCha8Rng::from_seed(*blake3::hash(&key).as_bytes());

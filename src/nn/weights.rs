@@ -35,7 +35,6 @@ impl Contents {
         self.tensors.extend(tensors.into_iter().map(|(name, tensor)| (format!("{prefix}{name}"), tensor)));
     }
 
-    /// Serialises the contents.
     pub fn to_bytes(&self) -> anyhow::Result<Vec<u8>> {
         let tensors = self.tensors.iter().map(|(name, tensor)| (name.clone(), tensor));
         checkpoint::to_bytes(&self.facts, tensors)

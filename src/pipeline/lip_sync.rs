@@ -1,5 +1,5 @@
-//! Audio-visual synchrony: whether the voice belongs to the visible mouth, and the offset between audio and video. The
-//! lip opening and the openness of the voice, both high-pass filtered, are correlated over a range of lags.
+//! Audio-visual synchrony: probability that the voice belongs to the visible mouth, and offset between audio and video.
+//! The lip opening and the openness of the voice, both high-pass filtered, are compared over a range of lags.
 
 use orator_base::audio::openness::Openness;
 use orator_base::types::sound::SoundOffset;
@@ -14,7 +14,7 @@ const VOICE_DELAY_SECS: f64 = 0.025;
 const HIGH_PASS_SECS: f64 = 0.7;
 /// Added to the lip opening before its logarithm, so that closed-mouth frames do not dominate.
 const LOG_OFFSET: f32 = 0.1;
-/// Window of a per-frame score in seconds, and the least share of its frames in which mouth and speech are known.
+/// Window around a frame in seconds, and the least share of its frames in which mouth and speech must be known.
 const WINDOW_SECS: f64 = 8.0;
 const MIN_KNOWN_SHARE: f64 = 0.75;
 /// Least duration of known frames, in seconds, for the offset of a complete video.
@@ -22,11 +22,17 @@ const MIN_KNOWN_SECS: f64 = 3.0;
 /// Standard deviation of the log opening below which the score is reduced: the correlation of nearly static lips is
 /// chance.
 const MIN_LIP_DEVIATION: f64 = 0.06;
-/// Lags within this many seconds of the video's lag are searched for a per-frame score; `WIDE_SECS` where that lag is
-/// unreliable and less than `WIDE_BELOW_SECS` could be compared.
-pub const NEAR_SECS: f64 = 0.07;
-const WIDE_SECS: f64 = 0.25;
-const WIDE_BELOW_SECS: f64 = 20.0;
+/// Correlation of lips and own voice that is tested against 0, the correlation with unrelated voices.
+const OWN_CORRELATION: f64 = 0.25;
+/// Independent samples per second: the correlation of unrelated pairs deviates from 0 by 1 / sqrt(9 * seconds).
+const INDEPENDENT_PER_SEC: f64 = 9.0;
+/// Limit of the normalised signals in standard deviations.
+const MAX_DEVIATIONS: f64 = 3.0;
+/// Probability of the own voice before any comparison, and changes between own and other voice per second.
+const PRIOR: f64 = 0.3;
+const CHANGES_PER_SEC: f64 = 0.01;
+/// The prior probability of a lag decreases by a factor of e per this many seconds.
+const LAG_SPREAD_SECS: f64 = 0.1;
 /// Least speech probability of a frame with speech, or loudness in dB where that probability is unknown.
 const SPEECH_SHARE: f32 = 0.4;
 const SPEECH_DB: f32 = -50.0;
@@ -34,7 +40,8 @@ const SPEECH_DB: f32 = -50.0;
 /// Result of comparing lips and voice.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct LipSync {
-    /// Correlation in the window around each frame, -1..1; NaN where mouth or speech is unknown for too long.
+    /// Probability that the voice is that of the visible mouth, 0..1, [T]; NaN where mouth or speech is unknown for too
+    /// long.
     pub score: Vec<f32>,
     /// Offset of the complete video; `None` if too few frames could be compared.
     pub offset: Option<SoundOffset>,
@@ -48,13 +55,7 @@ pub fn is_speech(share: f32, sound_db: f32) -> bool {
 /// Compares the lip opening at `time_secs` (NaN: not visible) with `voice`, over the frames that contain speech.
 pub fn compare(opening: &[f32], time_secs: &[f64], is_speech: &[bool], voice: &Openness, fps: FrameRate) -> LipSync {
     let matched = LipVoiceMatch::new(opening, time_secs, is_speech, voice, fps);
-    let offset = matched.offset();
-    let (middle_secs, near_secs) = match offset {
-        Some(offset) if offset.is_reliable() => (offset.secs, NEAR_SECS),
-        Some(offset) if offset.compared_secs >= WIDE_BELOW_SECS => (0.0, NEAR_SECS),
-        _ => (0.0, WIDE_SECS),
-    };
-    LipSync { score: matched.scores(WINDOW_SECS, middle_secs, near_secs), offset }
+    LipSync { score: matched.own_voice(), offset: matched.offset() }
 }
 
 /// Correlation sums of lips and voice for every lag.
@@ -79,19 +80,26 @@ impl LipVoiceMatch {
         Self { lags: (-N_LAGS..=N_LAGS).map(at_lag).collect(), n_frames: lips.len(), fps }
     }
 
-    /// Correlation in a window of `around_secs` around each frame, at the best lag within `near_secs` of
-    /// `middle_secs`; NaN where mouth or speech is unknown for too long.
-    pub fn scores(&self, around_secs: f64, middle_secs: f64, near_secs: f64) -> Vec<f32> {
-        let around = ((around_secs * self.fps.per_sec()).round() as usize).max(1);
-        let is_tried = |(lag, _): &&(f64, PairSums)| (lag - middle_secs).abs() <= near_secs + 1e-9;
-        let tried: Vec<&PairSums> = self.lags.iter().filter(is_tried).map(|(_, sums)| sums).collect();
-        let score = |t: usize| {
+    /// Probability at each frame that the voice is that of the visible mouth, [T]; NaN where mouth or speech is unknown
+    /// for too long. Each lag is a hypothesis about the complete video, weighted by its likelihood and its prior.
+    pub fn own_voice(&self) -> Vec<f32> {
+        let fps = self.fps.per_sec();
+        let (mut sum, mut total, mut largest) = (vec![0.0_f64; self.n_frames], 0.0_f64, f64::NEG_INFINITY);
+        for (lag, sums) in &self.lags {
+            let (probabilities, evidence) = sums.own_voice(fps);
+            let evidence = evidence - lag.abs() / LAG_SPREAD_SECS;
+            let scale = evidence.max(largest);
+            let (rescale, weight) = ((largest - scale).exp(), (evidence - scale).exp());
+            sum.iter_mut().zip(probabilities).for_each(|(sum, own)| *sum = *sum * rescale + own * weight);
+            (total, largest) = (total * rescale + weight, scale);
+        }
+        let around = ((WINDOW_SECS * fps).round() as usize).max(1);
+        let is_known = |t: usize| {
             let start = t.saturating_sub(around / 2).min(self.n_frames.saturating_sub(around));
             let end = (start + around).min(self.n_frames);
-            let scores = tried.iter().filter_map(|sums| sums.score(start, end, MIN_KNOWN_SHARE * around as f64));
-            scores.fold(f64::NAN, f64::max) as f32
+            self.lags[self.lags.len() / 2].1.n(start, end) >= MIN_KNOWN_SHARE * around as f64
         };
-        (0..self.n_frames).map(score).collect()
+        (0..self.n_frames).map(|t| if is_known(t) { (sum[t] / total) as f32 } else { f32::NAN }).collect()
     }
 
     /// Lag of the largest correlation over all frames; `None` if too few frames could be compared.
@@ -153,6 +161,38 @@ impl PairSums {
     /// Number of known frames in `start..end`.
     fn n(&self, start: usize, end: usize) -> f64 {
         self.0[end][0] - self.0[start][0]
+    }
+
+    /// Probability of the own voice at each frame, and the log-likelihood of all frames relative to an unrelated voice:
+    /// forward-backward algorithm of a hidden Markov model with the states own and other voice.
+    fn own_voice(&self, fps: f64) -> (Vec<f64>, f64) {
+        let [n, x, y, xx, yy, _] = self.0[self.0.len() - 1];
+        let n = n.max(1.0);
+        let deviation = |sum: f64, squares: f64| (squares / n - (sum / n).powi(2)).max(0.0).sqrt();
+        let (lip_deviation, voice_deviation) = (deviation(x, xx).max(MIN_LIP_DEVIATION), deviation(y, yy).max(1e-6));
+        let likelihood_ratio = |pair: &[[f64; 6]]| {
+            let [is_known, lips, voice]: [f64; 3] = std::array::from_fn(|k| pair[1][k] - pair[0][k]);
+            let limited = |value: f64| value.clamp(-MAX_DEVIATIONS, MAX_DEVIATIONS);
+            let product = limited((lips - x / n) / lip_deviation) * limited((voice - y / n) / voice_deviation);
+            let per_sample = OWN_CORRELATION * (product - OWN_CORRELATION / 2.0);
+            (is_known * per_sample * INDEPENDENT_PER_SEC / fps).exp()
+        };
+        let ratios: Vec<f64> = self.0.windows(2).map(likelihood_ratio).collect();
+        let change = (CHANGES_PER_SEC / fps).min(0.5);
+        let after_step = |own: f64| own * (1.0 - change) + (1.0 - own) * change;
+        let (mut probabilities, mut evidence, mut own) = (Vec::with_capacity(ratios.len()), 0.0, PRIOR);
+        for ratio in &ratios {
+            let likelihood = own * ratio + 1.0 - own;
+            evidence += likelihood.ln();
+            probabilities.push(own * ratio / likelihood);
+            own = after_step(own * ratio / likelihood);
+        }
+        let mut later = 0.5;
+        for (own, ratio) in probabilities.iter_mut().zip(&ratios).rev() {
+            *own = *own * later / (*own * later + (1.0 - *own) * (1.0 - later));
+            later = after_step(later * ratio / (later * ratio + 1.0 - later));
+        }
+        (probabilities, evidence)
     }
 
     /// Correlation over the frames `start..end`, scaled down where the lips hardly move; `None` if fewer than `least`
@@ -245,14 +285,41 @@ pub mod tests {
     }
 
     #[test]
-    fn an_unrelated_voice_scores_lower_and_is_not_confident() {
-        let mut n_sure = 0;
+    fn an_unrelated_voice_is_unlikely_and_its_offset_unreliable() {
+        let (mut n_sure, mut n_accepted) = (0, 0);
         for seed in 0..12 {
             let (own, other) = (compared(12.0, true, 0.0, seed), compared(12.0, false, 0.0, seed));
             n_sure += usize::from(other.offset.unwrap().is_reliable());
-            assert!(own.score[60] > other.score[60] + 0.2, "{seed}: {} {}", own.score[60], other.score[60]);
+            n_accepted += usize::from(other.score[60] >= 0.5);
+            assert!(own.score[60] > 0.9, "{seed}: {}", own.score[60]);
         }
+        assert!(n_accepted <= 3, "{n_accepted} of 12 voices of others are accepted");
         assert!(n_sure <= 1, "{n_sure} of 12 voices of others are surely those of the mouth");
+    }
+
+    /// The lips are those of another person from `start` to `end`, seconds.
+    fn partly_unrelated(secs: f64, start: f64, end: f64, seed: u64) -> Vec<f32> {
+        let (own, other) = (Mouth::new(secs, seed), Mouth::new(secs, seed + 500));
+        let outside = own.0.iter().filter(|syllable| syllable[1] < start || syllable[0] >= end);
+        let inside = other.0.iter().filter(|syllable| syllable[0] >= start && syllable[1] < end);
+        let mut syllables: Vec<[f64; 3]> = outside.chain(inside).copied().collect();
+        syllables.sort_by(|a, b| a[0].total_cmp(&b[0]));
+        let (opening, times) = Mouth(syllables).measured(secs, 999, seed);
+        compare(&opening, &times, &vec![true; times.len()], &own.voice(secs, 0.0), FPS).score
+    }
+
+    #[test]
+    fn seconds_without_correlation_are_accepted_and_another_voice_for_long_is_not() {
+        for seed in 0..3 {
+            let score = partly_unrelated(60.0, 27.0, 33.0, seed);
+            assert!(score.iter().all(|own| *own > 0.5), "{seed}: {score:?}");
+        }
+        let scores: Vec<Vec<f32>> = (0..3).map(|seed| partly_unrelated(120.0, 60.0, 120.0, seed)).collect();
+        let rejected = |frames: std::ops::Range<usize>| {
+            scores.iter().flat_map(|score| &score[frames.clone()]).filter(|own| **own < 0.5).count()
+        };
+        let (own, other) = (rejected(0..850), rejected(900..1800));
+        assert!(own < 26 && other > 1_620, "{own} of 2550 own and {other} of 2700 other frames are rejected");
     }
 
     #[test]
@@ -271,7 +338,7 @@ pub mod tests {
         assert!(found.score[..110].iter().all(|score| *score > 0.5) && found.score[200..].iter().all(|s| s.is_nan()));
         let static_lips: Vec<f32> = opening.iter().map(|opening| 0.1 + 0.01 * opening).collect();
         let found = compare(&static_lips, &times, &all, &voice, FPS);
-        assert!(found.score.iter().all(|score| *score < 0.1) && !found.offset.unwrap().is_reliable());
+        assert!(found.score.iter().all(|score| *score < 0.2) && !found.offset.unwrap().is_reliable());
         assert_eq!(compare(&[], &[], &[], &Openness::default(), FPS), LipSync::default());
     }
 }

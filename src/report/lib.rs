@@ -2,7 +2,6 @@
 //! `html`, and contact sheets (`sheet`).
 
 pub mod evaluation;
-pub mod faces;
 pub mod html;
 pub mod preview;
 pub mod sheet;

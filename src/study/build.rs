@@ -22,13 +22,11 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// Summary of a built study.
 #[derive(Clone, Debug, Serialize)]
 pub struct BuiltStudy {
     pub folder: PathBuf,
     /// Combined hash of the seal.
     pub seal: String,
-    /// Whether the study had been built before.
     pub up_to_date: bool,
     pub n_sessions: usize,
     pub n_trials: usize,
@@ -45,7 +43,6 @@ pub struct BuiltStudy {
 /// File that describes the clips, in the folder of their audio.
 const CLIPS_FILE: &str = "clips.json";
 
-/// Clips of a speaker.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct BuiltSpeaker {
     pub name: String,
@@ -141,7 +138,6 @@ fn existing_study(file: &StudyFile, folder: &StudyFolder) -> Result<BuiltStudy> 
     report.built(folder, true, Vec::new())
 }
 
-/// Content of `clips.json`.
 #[derive(Serialize, Deserialize)]
 struct ClipReport {
     /// Loudness of the films, LUFS.
@@ -150,7 +146,6 @@ struct ClipReport {
 }
 
 impl ClipReport {
-    /// Summary of the study in `folder`.
     fn built(self, folder: &StudyFolder, up_to_date: bool, balance: Vec<String>) -> Result<BuiltStudy> {
         let plan: StudyPlan = read_json(&folder.plan())?;
         let key: StudyKey = read_json(&folder.key())?;
@@ -238,7 +233,6 @@ fn clips_dir(folder: &StudyFolder) -> PathBuf {
     folder.dir().join("clips")
 }
 
-/// Folder of the films until all are rendered.
 fn unpublished_films_dir(folder: &StudyFolder) -> PathBuf {
     folder.dir().join(".films")
 }

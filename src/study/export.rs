@@ -5,8 +5,8 @@ use super::file::StudyFile;
 use super::folder::{StudyFolder, read_json};
 use super::plan::{StudyKey, StudyPlan, TaskDesign};
 use super::store::answers::{self, SubmittedAnswer};
+use super::store::database;
 use super::store::participants::{self, PARAMETERS, Participant, Status};
-use super::store::{database, starts};
 use super::vote::{Response, StudyVote, VOTE_COLUMNS};
 use anyhow::{Context, Result};
 use orator_base::stage::workdir;
@@ -20,7 +20,6 @@ use std::path::{Path, PathBuf};
 const PARTICIPANT_COLUMNS: [&str; 8] =
     ["participant", "place", "language", "status", "answers", "failed_checks", "begun_ms", "code"];
 
-/// Format of the tables.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum TableForm {
     /// Comma-separated values; multiple conditions or scores are joined by `|`.
@@ -38,7 +37,6 @@ impl TableForm {
     }
 }
 
-/// Paths and sizes of the tables written.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ExportSummary {
     pub votes: PathBuf,
@@ -67,10 +65,6 @@ pub fn export(folder: &StudyFolder, form: TableForm, out: &Path) -> Result<Expor
     })
 }
 
-/// Participants of a study in order of start time, and all votes.
-///
-/// # Errors
-/// The study has no responses, or one of its files cannot be read.
 pub fn responses(folder: &StudyFolder) -> Result<(Vec<Participant>, Vec<StudyVote>)> {
     let joined = JoinedPlan::read(folder)?;
     let db = database::open_for_reading(&folder.responses())?;
@@ -78,7 +72,7 @@ pub fn responses(folder: &StudyFolder) -> Result<(Vec<Participant>, Vec<StudyVot
     db.execute_batch("BEGIN")?;
     let (all, mut votes) = (participants::all(&db)?, Vec::new());
     for participant in &all {
-        let reloads = starts::reloads(&db, &participant.id)?;
+        let reloads = answers::reloads(&db, &participant.id)?;
         for answer in answers::of(&db, &participant.id)? {
             let reloads = reloads.get(&answer.position).copied().unwrap_or_default();
             votes.push(joined.vote(participant, answer, reloads)?);

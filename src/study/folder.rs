@@ -6,10 +6,6 @@ use serde::Serialize;
 use serde::de::DeserializeOwned;
 use std::path::{Path, PathBuf};
 
-/// Reads a JSON file of a built study.
-///
-/// # Errors
-/// The file cannot be read, or is not valid JSON for `T`.
 pub fn read_json<T: DeserializeOwned>(path: &Path) -> Result<T> {
     let bytes = std::fs::read(path).with_context(|| format!("cannot read {}", path.display()))?;
     serde_json::from_slice(&bytes)
@@ -23,7 +19,6 @@ pub fn write_json(path: &Path, value: &impl Serialize) -> Result<()> {
     workdir::write_file(path, &json)
 }
 
-/// Paths in the folder of a built study.
 #[derive(Clone, Debug)]
 pub struct StudyFolder(PathBuf);
 

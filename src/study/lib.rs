@@ -15,7 +15,6 @@ pub mod power;
 pub mod preregistration;
 pub mod seal;
 pub mod server;
-pub mod simulate;
 pub mod stats;
 pub mod stimuli;
 pub mod store;

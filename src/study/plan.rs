@@ -21,7 +21,6 @@ pub enum TaskDesign {
     Mismatch,
 }
 
-/// Purpose of a trial.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum TrialPhase {
@@ -35,7 +34,6 @@ pub enum TrialPhase {
     AttentionCheck,
 }
 
-/// Plan of a study.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct StudyPlan {
     pub version: u32,
@@ -49,7 +47,6 @@ pub struct StudyPlan {
     pub sessions: Vec<PlannedSession>,
 }
 
-/// Task of a study: a block of trials with one question.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PlannedTask {
     /// Name in the study file; the column `task` of exported responses.
@@ -62,13 +59,11 @@ pub struct PlannedTask {
     pub scale: String,
 }
 
-/// Trials of one participant.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PlannedSession {
     pub trials: Vec<Trial>,
 }
 
-/// One trial, a page of a session.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Trial {
     /// Index into [`StudyPlan::tasks`].
@@ -88,7 +83,6 @@ pub struct StudyKey {
     pub films: BTreeMap<String, FilmContent>,
 }
 
-/// Content of one film.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct FilmContent {
     /// Clip whose speech the film belongs to, `speaker/clip`; the unit of resampling in the analysis.
@@ -108,7 +102,6 @@ pub struct FilmContent {
     pub right: Option<RightAvatar>,
 }
 
-/// Right avatar of a side-by-side film.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct RightAvatar {
     pub condition: String,
@@ -122,7 +115,6 @@ impl FilmContent {
         std::iter::once(self.condition.as_str()).chain(right)
     }
 
-    /// Content of the film of the right avatar alone.
     pub fn right_alone(&self) -> Option<Self> {
         let RightAvatar { condition, motion_of } = self.right.clone()?;
         Some(Self { condition, motion_of, right: None, ..self.clone() })
@@ -136,7 +128,6 @@ impl FilmContent {
     }
 }
 
-/// Audio track of a film.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum FilmSound {

@@ -8,10 +8,8 @@ use orator_base::stage::workdir;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
-/// Version of the file format.
 const VERSION: u32 = 1;
 
-/// Pre-registration of a study.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Preregistration {
     pub version: u32,
@@ -20,7 +18,6 @@ pub struct Preregistration {
     pub title: String,
     /// Target number of participants who complete the study and are not excluded; collection ends when it is reached.
     pub participants: usize,
-    /// Number of planned sessions.
     pub sessions: usize,
     pub tasks: Vec<RegisteredTask>,
     pub hypotheses: Vec<RegisteredHypothesis>,
@@ -28,7 +25,6 @@ pub struct Preregistration {
     pub analysis: AnalysisSettings,
 }
 
-/// Task with its expected number of votes.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RegisteredTask {
     pub name: String,
@@ -39,7 +35,6 @@ pub struct RegisteredTask {
     pub votes: usize,
 }
 
-/// Hypothesis with the statistic that decides it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RegisteredHypothesis {
     pub claim: StudyHypothesis,
@@ -78,10 +73,6 @@ impl Preregistration {
         workdir::write_file(path, &serde_json::to_vec_pretty(self)?)
     }
 
-    /// Reads a pre-registration.
-    ///
-    /// # Errors
-    /// The file is missing, damaged or of another version.
     pub fn read(path: &Path) -> Result<Self> {
         let bytes = std::fs::read(path).with_context(|| {
             format!("cannot read the pre-registration {}; `orator study build` creates it", path.display())
@@ -98,7 +89,6 @@ impl Preregistration {
     }
 }
 
-/// Description of the statistic that decides a hypothesis.
 fn statistic(claim: &StudyHypothesis, design: Option<TaskDesign>, alpha: f64) -> String {
     let error = "with a standard error for crossed participants and clips and a t distribution";
     let share = match design {

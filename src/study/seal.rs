@@ -7,14 +7,11 @@ use orator_base::stage::fingerprint::hash_file;
 use orator_base::stage::workdir;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
-use std::fmt;
-use std::fs;
 use std::path::{Path, PathBuf};
+use std::{fmt, fs};
 
-/// Version of the file format.
 const VERSION: u32 = 1;
 
-/// Hashes of a study's files.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct StudySeal {
@@ -25,7 +22,6 @@ pub struct StudySeal {
     pub files: BTreeMap<String, String>,
 }
 
-/// Differences between the files of a study and its seal.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct SealMismatch {
     pub changed: Vec<String>,
@@ -51,10 +47,6 @@ impl fmt::Display for SealMismatch {
 }
 
 impl StudySeal {
-    /// Hashes the files of a finished study.
-    ///
-    /// # Errors
-    /// A file that is missing or cannot be read.
     pub fn of(folder: &StudyFolder) -> Result<Self> {
         let listed = sealed_files(folder)?;
         if let Some((name, _)) = listed.iter().find(|(_, path)| !path.is_file()) {
@@ -114,10 +106,6 @@ impl StudySeal {
         Ok(seal)
     }
 
-    /// Compares the study's files with the seal.
-    ///
-    /// # Errors
-    /// A file cannot be listed or read.
     pub fn compare(&self, folder: &StudyFolder) -> Result<SealMismatch> {
         let mut mismatch = SealMismatch::default();
         let listed = sealed_files(folder)?;

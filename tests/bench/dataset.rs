@@ -223,7 +223,7 @@ fn loader(args: &Args, dir: &Path, out: &Path) -> Result<LoadingRates> {
     let examples = WindowLoader::load(
         &dataset,
         Split::Train,
-        &orator_gesture::train::gan::speaker_metadata::normalisation(&dataset)?,
+        &orator_gesture::train::gan::speakers::normalisation(&dataset)?,
         64,
         5,
     )?;

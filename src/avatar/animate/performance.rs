@@ -5,6 +5,7 @@ use super::retarget::captured_body::{CapturedBody, CapturedPart};
 use super::rig::constraints::{ClampCounter, Clamps, Constraints};
 use super::rig::rig::{CM, Rig};
 use super::solve::arm::{SolveFilters, rotations};
+use super::solve::hand_fit::with_fitted_hands;
 use super::solve::legs::Legs;
 use super::solve::positions::JointPositions;
 use super::solve::smoothing::Smoothing;
@@ -23,7 +24,7 @@ use serde::Serialize;
 use std::collections::BTreeMap;
 use std::ops::Range;
 
-/// Largest share of clamped finger angles of a clip with usable fingers; clips of real hands have 2 to 10 %.
+/// Largest share of clamped finger angles of a clip with usable fingers; clips of real hands have at most 10 %.
 pub const MAX_FINGER_CLAMPS: f64 = 0.25;
 
 /// Settings of the animation.
@@ -175,8 +176,9 @@ pub struct Performance {
 /// Animates a motion on a rig with its own bone lengths; a `posture` turns head and trunk without moving joints
 /// relative to the neck.
 ///
-/// Joint limits are applied before smoothing, so that a misplaced joint does not distort neighbouring frames, and again
-/// after smoothing and at the output rate, so that they hold in every written frame.
+/// Joint limits are applied before directions are smoothed, so that a misplaced joint does not distort neighbouring
+/// frames, and again after smoothing and at the output rate, so that they hold in every written frame. Noise of hands
+/// is reduced before, since limits would add to the error of noisy fingers; the report counts the input's angles.
 pub fn perform(motion: &Motion, posture: Option<&Posture>, options: &AnimationOptions) -> Performance {
     perform_on(Rig::from_motion(motion), motion, posture, options)
 }
@@ -210,14 +212,18 @@ fn animate(
         clip
     };
     let mut counter = ClampCounter::default();
-    let mut positions = JointPositions::from_motion(motion);
+    let filters = SolveFilters::new(options.smoothing, motion.fps);
+    let mut positions = with_fitted_hands(JointPositions::from_motion(motion), &filters.fingers);
     if options.constraints != Constraints::NONE {
-        let unfiltered = rotations(&positions, &rig, &SolveFilters::new(Smoothing::None, motion.fps));
-        let within = constrained(clip_of(&unfiltered), &mut counter);
+        let limited = |positions: &JointPositions, counter: &mut ClampCounter| {
+            let unfiltered = SolveFilters::new(Smoothing::None, motion.fps);
+            constrained(clip_of(&rotations(positions, &rig, &unfiltered)), counter)
+        };
+        limited(&JointPositions::from_motion(motion), &mut counter);
+        let within = limited(&positions, &mut ClampCounter::default());
         let frames: Vec<Vec<Vec3>> = (0..within.n_frames()).map(|t| within.positions(t)).collect();
         positions = positions.with_positions(|t, joint| scale(frames[t][rig.positions[joint]], 1.0 / CM));
     }
-    let filters = SolveFilters::new(options.smoothing, motion.fps);
     let mut tracks = rotations(&positions, &rig, &filters);
     let face_frames = posture.map(|posture| head::turn(posture, &rig, &filters, &mut tracks));
     if options.yaw == Yaw::Removed {

@@ -125,7 +125,7 @@ impl Rejection {
                 format!("no speech: {:.0} % of the sound is speech, at least {:.0} % are needed", 100.0 * m, 100.0 * t)
             }
             Self::OffScreenSpeaker => {
-                format!("voice of another: the mouth follows the sound with {m:.2}, at least {t:.2} is needed")
+                format!("voice of another: it is the visible mouth's with probability {m:.2}, {t:.2} is needed")
             }
             Self::Static => format!("the picture stands still for {m:.1} s, {t:.1} s are allowed"),
             Self::NoPerson => format!("no person: face and arms score {m:.2} at best, {t:.2} is needed"),

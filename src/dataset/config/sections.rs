@@ -185,13 +185,13 @@ section! {
         min_sound_db: f64 = -50.0 => (-120.0, 0.0, "dBFS"),
         speech: SpeechRule = SpeechRule::Auto,
         min_speech: f64 = 0.4 => (0.0, 1.0, ""),
-        min_lip_sync: f64 = 0.1 => (-1.0, 1.0, ""),
+        min_own_voice: f64 = 0.5 => (0.0, 1.0, ""),
         max_quiet_secs: f64 = 3.0 => (0.0, 60.0, "seconds"),
         min_change: f64 = 0.03 => (0.0, 255.0, "levels of 8-bit colour"),
         #[serde(alias = "max_still_secs")]
         max_static_secs: f64 = 0.5 => (0.0, 1.0, "seconds, the longest gap that lift fills"),
-        min_facing: f64 = 1.0 => (-10.0, 10.0, "neck-nose distances"),
-        max_nose_off: f64 = 1.0 => (0.0, 10.0, "half shoulder widths"),
+        min_facing: f64 = 0.5 => (-10.0, 10.0, "neck-nose distances"),
+        max_nose_off: f64 = 3.0 => (0.0, 10.0, "half shoulder widths"),
         #[serde(alias = "max_people")]
         max_persons: u32 = 5 => (1.0, 255.0, "persons"),
         max_crowd_share: f64 = 0.3 => (0.0, 1.0, ""),

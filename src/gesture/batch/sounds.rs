@@ -10,7 +10,6 @@ use orator_formats::search;
 use std::collections::BTreeMap;
 use std::path::{Component, Path, PathBuf};
 
-/// A sound of a batch.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct BatchSound {
     /// Sound or video file.

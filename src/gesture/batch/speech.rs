@@ -5,25 +5,19 @@ use orator_nn::seq2seq::predict::StateAtSeams;
 use serde::Serialize;
 use std::path::Path;
 
-/// Speech for which motion is to be generated.
 #[derive(Clone, Copy, Debug)]
 pub struct SpeechSource<'a> {
     /// Sound or video file.
     pub audio: &'a Path,
-    /// Transcript file.
     pub transcript: Option<&'a Path>,
     /// Whether a sequence-to-sequence network is requested to carry its decoder state across segments.
     pub carry_state: bool,
-    /// Options of exported figures.
     pub figure: FigureOptions,
 }
 
-/// Report on a motion that was written.
 #[derive(Clone, Debug)]
 pub struct MotionReport {
-    /// Seconds of sound.
     pub secs: f64,
-    /// Frames of motion.
     pub n_frames: usize,
     /// Seconds of computation for the motion, without writing files.
     pub motion_secs: f64,
@@ -33,7 +27,6 @@ pub struct MotionReport {
     pub segments: Option<SegmentFacts>,
 }
 
-/// Details of motion generated segment by segment.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct SegmentFacts {
     /// Initial decoder state of the segments.

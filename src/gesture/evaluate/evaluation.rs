@@ -25,9 +25,6 @@ impl Evaluation {
     /// Reads motion files: `truth` and `prediction` are two files, or two folders whose files have the same names;
     /// `audio` is a sound or a folder of sounds. `fps` is the frame rate of files that do not state one. The motions
     /// are saved in `store`.
-    ///
-    /// # Errors
-    /// Files that do not match or cannot be read.
     pub fn from_files(
         truth: &Path,
         prediction: &Path,

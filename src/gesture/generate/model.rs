@@ -3,7 +3,7 @@
 use super::normalisation::Normalisation;
 use super::representation::Representation;
 use super::seq2seq::metadata::is_sequence_kind;
-use super::variant;
+use super::trained;
 use anyhow::{Context, Result, bail, ensure};
 use ndarray::ArrayView2;
 use orator_base::audio::mel;
@@ -32,7 +32,6 @@ const MAX_WIDTH: usize = 1024;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SpeakerMetadata {
     pub kind: String,
-    /// Name of the speaker.
     pub name: String,
     pub fps: FrameRate,
     pub skeleton: String,
@@ -47,7 +46,6 @@ pub struct SpeakerMetadata {
     pub videos: Vec<TrainedVideo>,
 }
 
-/// A video that a model was trained on.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub struct TrainedVideo {
     pub speaker: String,
@@ -55,7 +53,6 @@ pub struct TrainedVideo {
     pub content: String,
 }
 
-/// Parameters of the spectrogram.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SpectrogramSettings {
     pub rate: u32,
@@ -122,12 +119,11 @@ impl SpeakerMetadata {
     }
 }
 
-/// Choice of speaker and variant for generation.
 #[derive(Clone, Debug, Default)]
 pub struct GenerationChoice {
     /// Name of the speaker; required for networks of several speakers.
     pub speaker: Option<String>,
-    /// Seed of the variant (see `variant`); `None`: the complete network.
+    /// Seed of the variant (see `trained`); `None`: the complete network.
     pub seed: Option<u64>,
 }
 
@@ -138,7 +134,7 @@ pub fn load(path: &Path, choice: &GenerationChoice) -> Result<(SpeakerMetadata, 
     check(&contents.facts["speaker"]).with_context(context)?;
     select_speaker(&mut contents, choice.speaker.as_deref()).with_context(|| path.display().to_string())?;
     if let Some(seed) = choice.seed {
-        variant::vary(&mut contents, GENERATOR, seed).with_context(|| format!("{} has no variants", path.display()))?;
+        trained::vary(&mut contents, GENERATOR, seed).with_context(|| format!("{} has no variants", path.display()))?;
     }
     build(&contents).with_context(context)
 }
@@ -155,7 +151,6 @@ pub fn speakers(facts: &serde_json::Value) -> Result<Vec<SpeakerMetadata>> {
     Ok(all)
 }
 
-/// Reduces a network of several speakers to one speaker.
 fn select_speaker(contents: &mut Contents, name: Option<&str>) -> Result<()> {
     let all = speakers(&contents.facts)?;
     let names = || all.iter().map(|speaker| speaker.name.as_str()).collect::<Vec<_>>().join(", ");

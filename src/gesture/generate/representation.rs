@@ -28,9 +28,6 @@ pub enum Representation {
 impl Representation {
     /// `Bones`, with mean and standard deviation of the unit directions in these poses (from
     /// [`Normalisation::features`]) over the frames in which both ends of the bone are visible.
-    ///
-    /// # Errors
-    /// The first error of `poses`.
     pub fn bones(
         normal: &Normalisation,
         poses: impl Iterator<Item = anyhow::Result<(Array2<f32>, Array2<bool>)>>,
@@ -65,7 +62,6 @@ impl Representation {
         Ok(Self::Bones { mean, std })
     }
 
-    /// Name in the configuration.
     pub fn name(&self) -> &'static str {
         match self {
             Self::Positions => "positions",

@@ -1,10 +1,9 @@
 //! The catalogue of all metrics of a convention, and their computation in two steps: measuring every interval as
 //! additive sums, and computing values from the sum of any intervals. The arithmetic of each metric is in its own file.
 
-use super::convention;
 use super::definition::MetricFamily;
 use super::pair::PairedFrames;
-use super::settings::MetricSettings;
+use super::settings::{self, MetricSettings};
 use super::sums::{self, BlockSums, CostlySums};
 use anyhow::ensure;
 use ndarray::{Array2, ArrayView2};
@@ -20,14 +19,12 @@ pub use super::sums::MetricSums;
 /// rate.
 const N_DIAGNOSTICS: usize = 2;
 
-/// All metrics of one convention.
 pub struct Catalogue {
     metrics: Vec<MetricFamily>,
     definitions: Vec<Definition>,
     fps: FrameRate,
 }
 
-/// Sums of one interval, in total and in blocks.
 #[derive(Clone, Debug, Default)]
 pub struct IntervalSums {
     pub total: MetricSums,
@@ -51,7 +48,7 @@ impl Catalogue {
                 "invalid alpha {alpha} of PCK: expected a number > 0, such as 0.2"
             );
         }
-        let metrics = convention::metrics(settings);
+        let metrics = settings::metrics(settings);
         let mut definitions: Vec<Definition> = metrics.iter().flat_map(|metric| metric.definitions.clone()).collect();
         for definition in &mut definitions {
             definition.parameters["convention"] = serde_json::to_value(settings.convention)?;

@@ -1,13 +1,13 @@
 //! Definition of a metric: name, part of the body, formula and all parameters, with a hash over them; values with
 //! different hashes are not comparable. Also the common structure of all metrics: additive sums, and values computed
-//! from them.
+//! from them. Parts of the body over which metrics are measured.
 
 use super::pair::PairedFrames;
 use super::sums::BlockSums;
+use orator_base::types::skeleton::{L_HAND, L_WRIST, N_JOINTS, NECK, R_HAND, R_SHOULDER, R_WRIST, is_duplicate};
 use serde::Serialize;
 use serde_json::{Map, Value};
 
-/// Direction in which a value is better.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Better {
@@ -19,14 +19,13 @@ pub enum Better {
     Neither,
 }
 
-/// Exact definition of a metric.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Definition {
     /// Name such as `pck_3d`, `mpjpe`, `frechet_pose`.
     pub name: &'static str,
     /// Part of the body. `all`: the 48 joints without the neck, including the two hand roots, which duplicate the
     /// wrists.
-    /// `body`: shoulders, elbows, wrists. `hands`: the 40 finger joints. All parts are in `body_part`.
+    /// `body`: shoulders, elbows, wrists. `hands`: the 40 finger joints. All parts: [`BodyPart`].
     pub part: &'static str,
     /// Unit; `1` for a share or a ratio.
     pub unit: &'static str,
@@ -35,7 +34,6 @@ pub struct Definition {
     pub formula: &'static str,
     /// Condition under which there is no value (NaN).
     pub undefined: &'static str,
-    /// Values of all parameters.
     pub parameters: Value,
 }
 
@@ -97,7 +95,6 @@ type SumValues = Box<dyn Fn(&[f64]) -> Vec<f64> + Send + Sync>;
 pub(crate) struct MetricFamily {
     /// Definitions of `values`, in the same order.
     pub definitions: Vec<Definition>,
-    /// Number of sums.
     pub n_sums: usize,
     pub measure: IntervalMeasure,
     pub values: SumValues,
@@ -132,6 +129,62 @@ impl MetricFamily {
     }
 }
 
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum BodyPart {
+    /// The 48 joints without the neck, including the two hand roots, which duplicate the wrists.
+    All,
+    /// All 49 joints, including the neck, which is static.
+    WithNeck,
+    /// Shoulders, elbows, wrists: joints 1 to 6.
+    Body,
+    /// The 40 finger joints: 8 to 48 without 28.
+    Hands,
+    /// The two wrists: joints 3 and 6.
+    Wrists,
+    /// The 40 finger joints, each measured from the wrist of its own side.
+    FingersFromWrist,
+}
+
+/// A joint, and the joint that its position is relative to (`None`: the neck, at the origin).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct MeasuredPoint {
+    pub joint: usize,
+    pub origin: Option<usize>,
+}
+
+impl BodyPart {
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::All => "all",
+            Self::WithNeck => "all_and_neck",
+            Self::Body => "body",
+            Self::Hands => "hands",
+            Self::Wrists => "wrists",
+            Self::FingersFromWrist => "fingers_from_wrist",
+        }
+    }
+
+    pub fn joints(self) -> Vec<usize> {
+        match self {
+            Self::All => (NECK + 1..N_JOINTS).collect(),
+            Self::WithNeck => (0..N_JOINTS).collect(),
+            Self::Body => (R_SHOULDER..=L_WRIST).collect(),
+            Self::Hands | Self::FingersFromWrist => (L_HAND..N_JOINTS).filter(|joint| !is_duplicate(*joint)).collect(),
+            Self::Wrists => vec![R_WRIST, L_WRIST],
+        }
+    }
+
+    /// Joints of the part with their origins.
+    pub(crate) fn points(self) -> Vec<MeasuredPoint> {
+        let origin = |joint| match self {
+            Self::FingersFromWrist if joint < R_HAND => Some(L_WRIST),
+            Self::FingersFromWrist => Some(R_WRIST),
+            _ => None,
+        };
+        self.joints().into_iter().map(|joint| MeasuredPoint { joint, origin: origin(joint) }).collect()
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -151,5 +204,17 @@ mod tests {
         assert_ne!(one.hash(), Definition { part: "body", ..one.clone() }.hash());
         assert_ne!(one.hash(), Definition { formula: "part", ..one.clone() }.hash());
         assert_eq!((one.hash().len(), one.label()), (16, "pck_3d@0.2 all".into()));
+    }
+
+    #[test]
+    fn parts_have_their_documented_joints() {
+        let n = |part: BodyPart| part.joints().len();
+        assert_eq!(
+            [BodyPart::All, BodyPart::WithNeck, BodyPart::Body, BodyPart::Hands, BodyPart::Wrists].map(n),
+            [48, 49, 6, 40, 2]
+        );
+        let fingers = BodyPart::FingersFromWrist.points();
+        assert!(fingers.contains(&MeasuredPoint { joint: 8, origin: Some(L_WRIST) }));
+        assert!(fingers.contains(&MeasuredPoint { joint: 29, origin: Some(R_WRIST) }));
     }
 }

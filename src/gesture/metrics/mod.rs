@@ -4,14 +4,11 @@
 //! intervals, and computes values from their sums.
 
 pub mod beat;
-pub mod body_part;
 pub mod catalogue;
-pub mod convention;
 pub mod definition;
 pub mod distribution;
 pub mod movement;
 pub mod pair;
-pub mod per_frame;
 pub mod position;
 pub mod settings;
 pub mod space;

@@ -1,17 +1,23 @@
-//! Convention and parameters of the metrics.
+//! Parameters of the metrics, and the table of the metrics of each convention. Numbers of frames that a convention
+//! defines for its own frame rate are converted to seconds, and back to the nearest number of frames of the data; the
+//! definitions state both. Peculiarities of each convention are documented in the guide (`evaluation`).
 
+use super::beat;
+use super::definition::{BodyPart, MetricFamily};
+use super::distribution::frechet_metrics;
+use super::movement::{angles as angles_of_posture, bone_change, cca, derivatives, hellinger};
+use super::position::errors;
+use super::position::pck::{self, PckAxes};
 use orator_base::types::posture::PostureChannel;
 use orator_base::types::time::FrameRate;
 use serde::{Deserialize, Serialize};
 
-/// Settings of the metrics.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct MetricSettings {
     /// Convention whose definitions apply.
     pub convention: Convention,
     /// Tolerances of PCK as shares of the largest extent of the pose, each > 0.
     pub alphas: Vec<f64>,
-    /// Frame rate of all motion.
     pub fps: FrameRate,
     /// Whether errors and speeds are also measured over all 49 joints, including the neck.
     pub with_neck: bool,
@@ -52,4 +58,55 @@ pub enum Convention {
     Trimodal,
     /// Li et al. 2021.
     Aist,
+}
+
+pub(crate) fn metrics(settings: &MetricSettings) -> Vec<MetricFamily> {
+    let fps = settings.fps.per_sec();
+    match settings.convention {
+        Convention::Orator => own(settings),
+        Convention::Speech2gesture => vec![pck::by_frame(&settings.alphas)],
+        Convention::Genea => vec![
+            derivatives::by_interval(derivatives::DerivativeOrder::Acceleration),
+            derivatives::by_interval(derivatives::DerivativeOrder::Jerk),
+            hellinger::genea(settings.has_fingers),
+            cca::metric(if settings.has_fingers { BodyPart::WithNeck } else { BodyPart::Body }),
+        ],
+        Convention::Emage => vec![frechet_metrics::l1div(BodyPart::All), beat::emage(fps)],
+        Convention::Trimodal => {
+            vec![errors::maje(fps), errors::acceleration_by_coordinate(), beat::trimodal(fps)]
+        }
+        Convention::Aist => vec![beat::aist(fps)],
+    }
+}
+
+fn own(settings: &MetricSettings) -> Vec<MetricFamily> {
+    let parts = [BodyPart::All, BodyPart::Body, BodyPart::Hands];
+    let mut measured =
+        vec![BodyPart::All, BodyPart::Body, BodyPart::Hands, BodyPart::Wrists, BodyPart::FingersFromWrist];
+    if settings.with_neck {
+        measured.push(BodyPart::WithNeck);
+    }
+    let mut all = vec![pck::metric(&[PckAxes::Xyz, PckAxes::Xy], &parts, &settings.alphas)];
+    if settings.with_neck {
+        all.push(pck::neck_in_box(&settings.alphas));
+    }
+    all.extend(measured.iter().map(|part| errors::l1(*part)));
+    all.extend(measured.iter().map(|part| errors::mpjpe(*part)));
+    all.extend(parts.iter().map(|part| errors::p_mpjpe(*part)));
+    all.extend(measured.iter().map(|part| errors::acceleration(*part)));
+    for order in derivatives::DerivativeOrder::ALL {
+        all.extend(measured.iter().map(|part| derivatives::metric(order, *part)));
+    }
+    all.extend(parts.iter().map(|part| hellinger::metric(*part)));
+    all.extend(parts.iter().map(|part| frechet_metrics::l1div(*part)));
+    all.extend(parts.iter().map(|part| frechet_metrics::pairwise(*part)));
+    all.push(bone_change::metric());
+    all.push(beat::metric(settings.fps.per_sec()));
+    all.push(frechet_metrics::poses(BodyPart::All));
+    all.push(frechet_metrics::poses(BodyPart::Body));
+    all.push(frechet_metrics::basis());
+    all.push(frechet_metrics::embedding());
+    all.push(cca::metric(BodyPart::Body));
+    all.extend(settings.channels.iter().flat_map(|channel| angles_of_posture::metrics(*channel)));
+    all
 }

@@ -42,7 +42,6 @@ impl CostlySums {
         }
     }
 
-    /// All sums as f64.
     pub(crate) fn row(&self) -> Vec<f64> {
         (0..self.len()).map(|i| self.at(i)).collect()
     }
@@ -84,17 +83,14 @@ impl BlockSums {
         Self { n_frames, width, rows: vec![start; n * width] }
     }
 
-    /// Number of blocks.
     pub(crate) fn n(&self) -> usize {
         self.rows.len().checked_div(self.width).unwrap_or(0)
     }
 
-    /// Index of the block of frame `t`.
     pub(crate) fn of(&self, t: usize) -> usize {
         (t * self.n() / self.n_frames.max(1)).min(self.n().saturating_sub(1))
     }
 
-    /// Sums of the block of frame `t`.
     pub(crate) fn at(&mut self, t: usize) -> &mut [f64] {
         let block = self.of(t);
         self.row(block)

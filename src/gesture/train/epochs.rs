@@ -1,8 +1,7 @@
 //! Training loop that selects the best step by validation: optimiser steps, a validation after each epoch, and periodic
 //! checkpoints. A stop request takes effect after the current step, with a checkpoint.
 
-use super::log::MetricsLog;
-use super::progress_log::ProgressLog;
+use super::log::{MetricsLog, ProgressLog};
 use super::resume::last_checkpoint;
 use crate::generate::model::BEST;
 use anyhow::{Context, Result, bail};
@@ -33,7 +32,6 @@ pub struct StepReport {
 
 /// A network in training with its data and its validation.
 pub trait ValidatedTraining {
-    /// Metrics of a validation.
     type Validation: Serialize;
 
     /// Name of the speaker, and section of the configuration.
@@ -70,7 +68,6 @@ pub struct ValidatedStep {
     pub best_step: usize,
 }
 
-/// Result of a training.
 #[derive(Clone, Debug)]
 pub struct TrainingOutcome<V> {
     /// Completed steps over all runs of this training.
@@ -86,7 +83,6 @@ pub struct TrainingOutcome<V> {
     pub n_words: usize,
     /// Share of the step time spent waiting for the batch, 0..1; validation and checkpoints do not count.
     pub waiting: f64,
-    /// Validation of the newest checkpoint.
     pub validation: V,
     pub newest: PathBuf,
     /// Checkpoint with the best score.
@@ -213,9 +209,7 @@ fn is_over(training: &mut impl ValidatedTraining) -> bool {
 #[derive(Clone, Debug, thiserror::Error)]
 #[error("stopped after step {step} of {steps}{}", self.checkpoint())]
 pub struct StoppedTraining {
-    /// Completed steps.
     pub step: usize,
-    /// Steps of the complete training.
     pub steps: usize,
     /// Checkpoint of this step; `None` if no step was completed.
     pub newest: Option<PathBuf>,

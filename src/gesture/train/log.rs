@@ -1,20 +1,22 @@
 //! Log of a training: `metrics.jsonl`, one JSON object with a `step` per line, and the same values as an event file for
 //! TensorBoard. A resumed training drops the lines after its checkpoint's step, so both files are identical to those of
-//! an uninterrupted training.
+//! an uninterrupted training. Progress lines are printed at least twice a minute and after every twentieth of the
+//! steps.
 
 use anyhow::{Context, Result};
 use orator_base::stage::workdir;
+use orator_base::text::duration;
 use orator_formats::tfevents;
 use serde::Serialize;
 use serde_json::{Value, json};
 use std::fs::{File, OpenOptions};
 use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
 
 /// Name of the JSON lines file in the folder of a training.
 pub const FILE: &str = "metrics.jsonl";
 
-/// An open log, to which lines are appended.
 pub struct MetricsLog {
     lines: AppendedFile,
     events: Option<AppendedFile>,
@@ -39,7 +41,6 @@ impl MetricsLog {
         Ok(Self { lines: AppendedFile::open(path, accepted.as_bytes())?, events: None })
     }
 
-    /// Appends a line to both files.
     pub fn write(&mut self, line: &Value) -> Result<()> {
         let text = line.to_string();
         self.lines.add(format!("{text}\n").as_bytes())?;
@@ -81,7 +82,6 @@ fn step_of(line: &Value) -> u64 {
     line["step"].as_u64().unwrap_or(u64::MAX)
 }
 
-/// A file opened for appending.
 struct AppendedFile {
     path: PathBuf,
     file: File,
@@ -96,6 +96,49 @@ impl AppendedFile {
 
     fn add(&mut self, bytes: &[u8]) -> Result<()> {
         self.file.write_all(bytes).with_context(|| format!("cannot write {}", self.path.display()))
+    }
+}
+
+/// Longest time between two lines, checked after each step.
+const MAX_SILENCE: Duration = Duration::from_secs(30);
+/// Minimum number of lines of a complete training, if it has at least that many steps.
+const MIN_LINES: usize = 20;
+
+/// Decides when a progress line is due, and measures the speed and the remaining time of the current run.
+pub struct ProgressLog {
+    first_step: usize,
+    steps: usize,
+    start: Instant,
+    last_logged_step: usize,
+    last_logged: Instant,
+}
+
+impl ProgressLog {
+    /// Starts the clock of a run that continues after step `first_step` of a training of `steps` steps in total.
+    pub fn new(first_step: usize, steps: usize) -> Self {
+        let now = Instant::now();
+        Self { first_step, steps, start: now, last_logged_step: first_step, last_logged: now }
+    }
+
+    /// Mean steps per second of this run up to `step`; validation and checkpoints between the steps count.
+    pub fn per_sec(&self, step: usize) -> f64 {
+        (step - self.first_step) as f64 / self.start.elapsed().as_secs_f64().max(1e-9)
+    }
+
+    /// Progress line after `step`, or `None` if none is due; `summary` lists the losses of the step.
+    pub fn line(&mut self, step: usize, summary: &str) -> Option<String> {
+        if !self.is_due(step, self.last_logged.elapsed()) {
+            return None;
+        }
+        (self.last_logged_step, self.last_logged) = (step, Instant::now());
+        let (steps, speed) = (self.steps, self.per_sec(step));
+        let left = duration(steps.saturating_sub(step) as f64 / speed.max(1e-9));
+        Some(format!("step {step} of {steps}: {summary}, {speed:.2} steps/s, {left} left"))
+    }
+
+    fn is_due(&self, step: usize, silence: Duration) -> bool {
+        let parts = |step: usize| step * MIN_LINES / self.steps.max(1);
+        silence >= MAX_SILENCE || parts(step) > parts(self.last_logged_step)
     }
 }
 
@@ -123,5 +166,16 @@ mod tests {
         read(folder.path())?.iter().try_for_each(|line| uninterrupted.write(line))?;
         assert_eq!(bytes(folder.path(), tfevents::FILE)?, bytes(other.path(), tfevents::FILE)?);
         Ok(())
+    }
+
+    #[test]
+    fn a_line_is_due_every_twentieth_of_the_steps_or_half_a_minute() {
+        let log = ProgressLog::new(100, 900);
+        let soon = Duration::from_secs(29);
+        assert!(!log.is_due(134, soon) && log.is_due(135, soon) && log.is_due(101, MAX_SILENCE));
+        let mut short = ProgressLog::new(0, 12);
+        let lines: Vec<String> = (1..=12).filter_map(|step| short.line(step, "L1 0.5")).collect();
+        assert_eq!(lines.len(), 12);
+        assert!(lines[2].starts_with("step 3 of 12: L1 0.5, ") && lines[11].ends_with(", 0 s left"), "{lines:?}");
     }
 }

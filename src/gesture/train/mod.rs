@@ -9,6 +9,5 @@ pub mod gan;
 pub mod log;
 pub mod no_window;
 pub mod optim;
-pub mod progress_log;
 pub mod resume;
 pub mod seq2seq;

@@ -3,7 +3,6 @@
 
 use std::ops::Range;
 
-/// Geometry of a convolution along one axis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ConvAxis {
     pub n_in: usize,

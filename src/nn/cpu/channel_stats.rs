@@ -19,7 +19,6 @@ pub struct ChannelMoments {
 }
 
 impl ChannelMoments {
-    /// Measures rows of `n_channels`.
     pub fn measure<T: Scalar>(values: &[T], n_channels: usize) -> Self {
         let mut all = Self::default();
         for block in values.chunks(row_multiple(BLOCK, n_channels)) {
@@ -117,7 +116,6 @@ fn sums_of_squares<T: Scalar, const N: usize>(block: &[T], n_channels: usize, fi
     sums
 }
 
-/// Sums each channel.
 pub fn sums<T: Scalar>(values: &[T], n_channels: usize) -> Vec<f64> {
     let sum_task = |task: &[T]| {
         let (mut sums, mut block_total) = (vec![0.0; n_channels], vec![T::zero(); n_channels]);
@@ -192,7 +190,6 @@ impl<T: Scalar> Norm<T> {
         y
     }
 
-    /// Gradient before the activation, from `grad` after it.
     #[inline(always)]
     fn before_activation<const N: usize>(&self, z: &[T; N], grad: &[T; N], scale: &[T; N], shift: &[T; N]) -> [T; N] {
         let mut before_activation = [T::zero(); N];

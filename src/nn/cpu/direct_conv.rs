@@ -6,7 +6,7 @@
 
 use super::axis::{AxisWindows, ConvAxis};
 use super::kernel::{MAX_ROWS, TileSteps};
-use super::packed_weights::{PackedWeights, StepBlock, WeightOrder};
+use super::packed_matrix::{PackedWeights, StepBlock, WeightOrder};
 use super::spin_pool::parallel_for;
 use super::tensor::{Scalar, SharedOutputPtr, scratch, written};
 use std::ops::Range;
@@ -73,7 +73,6 @@ pub fn forward<T: Scalar>(
     }
 }
 
-/// Number of chunks of a forward pass.
 pub fn n_chunks(s: &ConvSizes) -> usize {
     forward_pass(s).chunks().len()
 }
@@ -88,7 +87,6 @@ fn forward_pass(s: &ConvSizes) -> ConvPass {
     }
 }
 
-/// Computes the gradient of the input.
 pub fn gradient_of_input<T: Scalar>(s: &ConvSizes, weight: &[T], grad: &[T]) -> Vec<T> {
     assert!(grad.len() == s.len_out() && weight.len() == s.len_weight());
     let zeros = vec![T::zero(); s.n_in];
@@ -127,7 +125,6 @@ struct ConvPass {
 }
 
 impl ConvPass {
-    /// Memory order of the weights for this pass.
     fn order(&self, per_column: usize, per_channel: usize) -> WeightOrder {
         let [rows, columns] = &self.windows;
         let kernel_offsets = rows

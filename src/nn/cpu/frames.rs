@@ -16,7 +16,6 @@ pub struct FrameInterpolation {
 }
 
 impl FrameInterpolation {
-    /// Number of frames of the result.
     pub fn n_out(&self) -> usize {
         self.of.len()
     }

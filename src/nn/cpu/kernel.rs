@@ -26,7 +26,6 @@ pub struct TileSteps {
     pub right: usize,
 }
 
-/// Tile loop for one processor type.
 #[derive(Clone, Copy)]
 pub struct TileKernel<T> {
     /// Number of values in a vector.
@@ -40,7 +39,6 @@ pub struct TileKernel<T> {
     pub run: unsafe fn(&TileJob<T>, usize, usize),
 }
 
-/// Calls the tile with the given number of rows.
 macro_rules! rows {
     ($job:ident, $n_rows:ident, $tile:ident, $vectors:literal) => {
         match $n_rows {

@@ -19,7 +19,6 @@ pub mod direct_conv;
 pub mod frames;
 pub mod kernel;
 pub mod packed_matrix;
-pub mod packed_weights;
 pub mod spin_pool;
 pub mod tensor;
 pub mod vectorised;

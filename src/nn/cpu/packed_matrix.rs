@@ -1,8 +1,11 @@
-//! A matrix in the memory order in which the tiles of `kernel` read it, for repeated multiplication: a recurrent layer
-//! multiplies its weights with a few rows at every step of a sequence, too few to pack them every time.
+//! Matrices in the memory order in which the tiles of `kernel` read them: one for repeated multiplication (a recurrent
+//! layer multiplies its weights with a few rows at every step of a sequence, too few to pack them every time), and the
+//! weights of a convolution with their products with positions of a padded copy.
 
 use super::kernel::{MAX_ROWS, TileJob, TileKernel, TileSteps, panels};
-use super::tensor::Scalar;
+use super::spin_pool::parallel_for;
+use super::tensor::{LANES, Scalar, SharedOutputPtr, aligned, written};
+use std::ops::Range;
 
 /// Columns are padded with zeros to a multiple of this number.
 pub const COLUMNS: usize = 16;
@@ -73,6 +76,171 @@ impl<T: Scalar> PackedMatrix<T> {
             }
         }
     }
+}
+
+/// Weights in tile order: consecutive panels of columns; each panel has one row per summation step.
+pub struct PackedWeights<T> {
+    pub data: Vec<T>,
+    pub panels: Vec<WeightPanel>,
+}
+
+pub struct WeightPanel {
+    /// Start of its data, its first column, and its number of columns; the rest of its width is zero.
+    start: usize,
+    first: usize,
+    n: usize,
+    n_vectors: usize,
+    /// Width of the panel, including the padding.
+    pub columns: usize,
+}
+
+/// Memory order of the weights of a pass: the weight of column `o`, channel `c` and the pass's kernel offset `i` is at
+/// `o * per_column + c * per_channel + kernel_offsets[i]`; the summation steps iterate over the channels within each
+/// offset.
+pub struct WeightOrder {
+    pub n_columns: usize,
+    pub per_column: usize,
+    pub n_channels: usize,
+    pub per_channel: usize,
+    pub kernel_offsets: Vec<usize>,
+}
+
+/// Number of values of a column that are read together: complete cache lines.
+const AT_ONCE: usize = 128;
+/// Number of channels per task.
+const CHANNELS: usize = 64;
+
+impl<T: Scalar> PackedWeights<T> {
+    pub fn pack(weight: &[T], order: &WeightOrder) -> Self {
+        let WeightOrder { n_columns, per_column, n_channels, per_channel, kernel_offsets } = order;
+        let (kernel, mut start) = (T::kernel(), 0);
+        let panels = panels(&kernel, *n_columns).into_iter().map(|(first, n_vectors)| {
+            let columns = n_vectors * kernel.lanes;
+            let panel = WeightPanel { start, first, n: columns.min(n_columns - first), n_vectors, columns };
+            start += columns * kernel_offsets.len() * n_channels;
+            panel
+        });
+        let mut panels: Vec<WeightPanel> = panels.collect();
+        let max_offset = kernel_offsets.iter().copied().max().unwrap_or(0);
+        let n_at_once = (AT_ONCE / kernel_offsets.len().max(1)).max(1);
+        // Values that are adjacent in memory are read together: the channels of a column, or the columns of a channel.
+        let of_columns = per_column < per_channel;
+        let (per_line, per_position) =
+            if of_columns { (*per_channel, *per_column) } else { (*per_column, *per_channel) };
+        let pack = |data: SharedOutputPtr<T>, panel: &WeightPanel, channels: Range<usize>| {
+            let mut lines = Vec::new();
+            for first in channels.clone().step_by(n_at_once) {
+                let some = first..channels.end.min(first + n_at_once);
+                let (n_lines, in_line) = if of_columns { (some.len(), panel.n) } else { (panel.n, some.len()) };
+                let corner = panel.first * per_column + first * per_channel;
+                let length = (in_line - 1) * per_position + max_offset + 1;
+                lines.clear();
+                for n in 0..n_lines {
+                    lines.extend_from_slice(&weight[corner + n * per_line..][..length]);
+                }
+                let (from_channel, from_column) =
+                    if of_columns { (length, per_position) } else { (per_position, length) };
+                for channel in some.clone() {
+                    for (i, kernel_offset) in kernel_offsets.iter().enumerate() {
+                        let row = &lines[(channel - first) * from_channel + kernel_offset..];
+                        let step = i * n_channels + channel;
+                        // SAFETY: only this task writes this step's row of this panel.
+                        let to = unsafe {
+                            std::slice::from_raw_parts_mut(data.at(panel.start + step * panel.columns), panel.columns)
+                        };
+                        let (inside, outside) = to.split_at_mut(panel.n);
+                        let row = &row[..(panel.n - 1) * from_column + 1];
+                        for (column, to) in inside.iter_mut().enumerate() {
+                            *to = row[column * from_column];
+                        }
+                        outside.fill(T::zero());
+                    }
+                }
+            }
+        };
+        let tasks: Vec<(&WeightPanel, Range<usize>)> = panels
+            .iter()
+            .flat_map(|panel| {
+                // A phase of a gradient may have no kernel offset.
+                let starts = (0..*n_channels).step_by(CHANNELS).filter(|_| !kernel_offsets.is_empty());
+                starts.map(move |start| (panel, start..(*n_channels).min(start + CHANNELS)))
+            })
+            .collect();
+        let n_numbers = start;
+        let mut first = 0;
+        // SAFETY: the tasks together write every row of every panel; this thread writes the padding before and after
+        // them.
+        let data = unsafe {
+            written(n_numbers + LANES, |data: SharedOutputPtr<T>| {
+                first = aligned(data.at(0));
+                (0..first).chain(first + n_numbers..n_numbers + LANES).for_each(|i| data.at(i).write(T::zero()));
+                let data = data.from(first);
+                parallel_for(tasks.len(), |task| pack(data, tasks[task].0, tasks[task].1.clone()));
+            })
+        };
+        panels.iter_mut().for_each(|panel| panel.start += first);
+        Self { data, panels }
+    }
+}
+
+impl WeightPanel {
+    /// Adds the products of one block of steps to the sums at every position, or to `begin`, one value per column, if
+    /// the block is the first.
+    ///
+    /// # Safety
+    /// The positions, extended by the block, lie inside `left` and `to`, and no other thread writes there.
+    pub unsafe fn multiply<T: Scalar>(
+        &self,
+        right: &[T],
+        left: &[T],
+        positions: &[(usize, usize)],
+        to: SharedOutputPtr<T>,
+        begin: Option<&[T]>,
+        block: &StepBlock,
+    ) {
+        let kernel = T::kernel();
+        let begin = begin.map(|begin| begin[self.first..][..self.n].as_ptr());
+        let right = right[self.start + block.right..].as_ptr();
+        for tile in positions.chunks(MAX_ROWS) {
+            let of = |row: usize| tile[row.min(tile.len() - 1)];
+            // SAFETY: guaranteed by the caller.
+            let to: [*mut T; MAX_ROWS] = std::array::from_fn(|row| unsafe { to.at(of(row).1 + self.first) });
+            let mut job = TileJob {
+                rows: std::array::from_fn(|row| left.as_ptr().wrapping_add(of(row).0 + block.left)),
+                from: to.map(|to| begin.unwrap_or(to)),
+                to,
+                right,
+                outer: block.outer,
+                inner: block.inner,
+            };
+            // SAFETY: guaranteed by the caller; if the panel is wider than its columns, the sums are kept in a local
+            // buffer.
+            unsafe {
+                if self.n == self.columns {
+                    (kernel.run)(&job, tile.len(), self.n_vectors);
+                    continue;
+                }
+                let mut local = [[T::zero(); 64]; MAX_ROWS];
+                for (local, from) in local.iter_mut().zip(&job.from).take(tile.len()) {
+                    local.as_mut_ptr().copy_from_nonoverlapping(*from, self.n);
+                }
+                job.to = local.each_mut().map(|row| row.as_mut_ptr());
+                job.from = job.to.map(<*mut T>::cast_const);
+                (kernel.run)(&job, tile.len(), self.n_vectors);
+                for (local, position) in local.iter().zip(&to).take(tile.len()) {
+                    position.copy_from_nonoverlapping(local.as_ptr(), self.n);
+                }
+            }
+        }
+    }
+}
+
+/// A block of summation steps: offsets of its factors, and its loops.
+pub struct StepBlock {
+    pub left: usize,
+    pub right: usize,
+    pub outer: TileSteps,
+    pub inner: TileSteps,
 }
 
 #[cfg(test)]

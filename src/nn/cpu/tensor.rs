@@ -2,8 +2,7 @@
 //! Every function gives identical bits for any number of threads: work is divided into pieces of fixed size, and each
 //! value is summed by one thread in a fixed order.
 
-use super::kernel;
-use super::kernel::TileKernel;
+use super::kernel::{self, TileKernel};
 use super::vectorised::exp_f32;
 use candle_core::{CpuStorage, DType, Layout, Result, Storage, Tensor, WithDType};
 use rayon::prelude::*;
@@ -20,7 +19,6 @@ pub const GRAIN: usize = 16 * 1024;
 /// Number types of the operators: f32 for training, f64 for gradient checks.
 pub trait Scalar: WithDType {
     fn pool() -> &'static LocalKey<RefCell<Vec<Vec<Self>>>>;
-    /// Tile loop of the current processor.
     fn kernel() -> TileKernel<Self>;
     /// e^x; in f32 an approximation that allows vectorised loops.
     fn fast_exp(self) -> Self;
@@ -49,9 +47,6 @@ real!(f32, kernel::of_f32, exp_f32);
 real!(f64, kernel::of_f64, f64::exp);
 
 /// Returns the values of a contiguous tensor inside an operator.
-///
-/// # Errors
-/// The tensor is not contiguous; callers guarantee that it is.
 pub fn slice<'a, T: Scalar>(storage: &'a CpuStorage, layout: &Layout) -> Result<&'a [T]> {
     let Some((start, end)) = layout.contiguous_offsets() else {
         candle_core::bail!("expected a contiguous tensor, found strides {:?}", layout.stride());
@@ -69,10 +64,6 @@ pub fn read<T: Scalar, R>(tensor: &Tensor, f: impl FnOnce(&[T]) -> Result<R>) ->
     }
 }
 
-/// Returns whether the number type is f64.
-///
-/// # Errors
-/// It is neither f32 nor f64.
 pub fn is_f64(dtype: DType) -> Result<bool> {
     match dtype {
         DType::F32 => Ok(false),
@@ -119,7 +110,6 @@ impl<'a, T> Matrix<'a, T> {
         Self { data: self.data, row_stride: self.column_stride, column_stride: self.row_stride }
     }
 
-    /// View of the part from this row and column on.
     fn at(self, row: usize, column: usize) -> Self {
         Self { data: &self.data[row * self.row_stride + column * self.column_stride..], ..self }
     }

@@ -145,7 +145,6 @@ fn attend_body<T: Scalar>(state: &[T], keys: &[T], weights: &mut [T], context: &
     }
 }
 
-/// Inputs of the backward pass of an attention.
 #[derive(Clone, Copy)]
 pub struct Attended<'a, T> {
     pub state: &'a [T],

@@ -16,7 +16,6 @@ const AT_ONCE: usize = 32;
 /// Number of input channels per task.
 const CHANNELS: usize = 11 * MAX_ROWS;
 
-/// Computes the gradient of the weight.
 pub fn gradient_of_weight<T: Scalar>(s: &ConvSizes, x: &[T], grad: &[T]) -> Vec<T> {
     assert!(x.len() == s.len_in() && grad.len() == s.len_out());
     // Only runs along the second axis are contiguous in memory, so a single axis is moved there.

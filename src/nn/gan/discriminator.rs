@@ -1,7 +1,7 @@
 //! The motion discriminator: a patch network on the frame-to-frame differences of normalised poses that scores about
 //! every fourth frame as real or generated (Ginosar et al. 2019).
 
-use super::conv_block::{ConvBlock, MOMENTUM, SLOPE};
+use super::generator::{ConvBlock, MOMENTUM, SLOPE};
 use crate::ops::conv2d::Conv;
 use crate::ops::resize;
 use crate::params::Params;
@@ -44,26 +44,4 @@ impl Discriminator {
 pub fn motion(poses: &Tensor) -> Result<Tensor> {
     let n = poses.dim(2)?.saturating_sub(1);
     poses.narrow(2, 1, n)? - poses.narrow(2, 0, n)?
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::ops::gradcheck::{pattern, worst};
-    use candle_core::DType;
-
-    #[test]
-    fn size_is_the_published_one_and_gradients_are_correct() -> Result<()> {
-        let mut params = Params::with_dtype(2, DType::F64);
-        let net = Discriminator::new(&mut params, 144)?;
-        assert_eq!(params.n_parameters(), 202_945);
-        let poses = pattern(&[2, 144, 64], 0.0)?;
-        assert_eq!(net.forward(&motion(&poses)?, true)?.dims(), [2, 1, 16]);
-
-        let mut params = Params::with_dtype(2, DType::F64);
-        let net = Discriminator::new(&mut params, 3)?;
-        let error = worst(&[pattern(&[2, 3, 16], 4.0)?], |v| net.forward(&motion(&v[0])?, true))?;
-        assert!(error < 1e-5, "{error}");
-        Ok(())
-    }
 }

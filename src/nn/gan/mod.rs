@@ -1,7 +1,6 @@
 //! The networks of the speech-to-gesture GAN: audio encoder and motion UNet (`generator`) with speaker-specific layers
 //! (`speaker_layer`), motion discriminator, and the generator run in chunks (`streaming`).
 
-pub mod conv_block;
 pub mod discriminator;
 pub mod generator;
 pub mod speaker_layer;

@@ -12,10 +12,8 @@ use serde::{Deserialize, Serialize};
 
 /// Prefix of the network's tensors in a weights file.
 pub const NAME: &str = "hand";
-/// Kind of a weights file.
 pub const KIND: &str = "hand-lifter";
 
-/// Configuration of the network.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Config {
     /// Number of inputs of a hand: 21 x (x, y, visible).

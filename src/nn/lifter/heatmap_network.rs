@@ -1,11 +1,12 @@
 //! Hand lifter of Zimmermann & Brox 2017 (section 4.3): score maps of the 21 points and the hand's side to a hand in a
 //! canonical frame (`PosePrior`) and the rotation of that frame (`ViewPoint`). The built-in weights are those of the
-//! perceptron on coordinates (`hand`), which needs 300 times less computation.
+//! perceptron on coordinates (`hand`), which needs 300 times less computation. Convolutions are matrix products: the
+//! input patch of every output pixel becomes a row.
 
-use super::conv3x3::Conv3x3;
 use super::hand;
 use super::score_maps::{Crop, MAP_SIZE, N_MAPS, assembled, score_maps};
 use crate::Mode;
+use crate::cpu::axis::ConvAxis;
 use crate::ops::dropout::dropout;
 use crate::params::{Init, Params};
 use candle_core::{D, Device, Module, Result, Tensor};
@@ -15,18 +16,15 @@ use orator_base::types::skeleton::Side;
 
 /// Prefix of the network's tensors in a weights file.
 pub const NAME: &str = hand::NAME;
-/// Kind of a weights file.
 pub const KIND: &str = "hand-heatmap-lifter";
 /// Number of parameters of both networks.
 pub const N_PARAMETERS: usize = 1_637_279 + 2_238_403;
-/// Number of score maps, one per point.
 const MAPS: usize = 21;
 /// Batch size when lifting.
 const BATCH: usize = 64;
 /// Enlargement of the crop when lifting; the mean of the training's range.
 const CROP_SCALE: f64 = 1.1;
 
-/// Both networks.
 pub struct HeatmapLifter {
     pose_prior: Tower,
     view_point: Tower,
@@ -96,9 +94,6 @@ impl HeatmapLifter {
 
     /// Lifts hands of one side: wrist at 0, image axes, middle proximal phalanx about 1 long; `None` where too few
     /// points are visible. Left hands are mirrored for the networks.
-    ///
-    /// # Errors
-    /// An error of the tensor library.
     pub fn lift(&self, seen: &[HandPoints], side: Side) -> Result<Vec<Option<HandJoints>>> {
         let flip = if side == Side::Left { -1.0 } else { 1.0 };
         let mirrored: Vec<HandPoints> = seen.iter().map(|s| s.map(|p| p.map(|[x, y]| [flip * x, y]))).collect();
@@ -154,6 +149,49 @@ pub fn rotation(vectors: &Tensor) -> Result<Tensor> {
     Tensor::cat(&entries, 1)
 }
 
+/// `<name>.weight` [O, C, 3, 3] (Glorot uniform) and `<name>.bias` [O] (1e-4).
+pub struct Conv3x3 {
+    weight: Tensor,
+    bias: Tensor,
+    stride: usize,
+}
+
+impl Conv3x3 {
+    pub fn new(params: &mut Params, name: &str, n_in: usize, n_out: usize, stride: usize) -> Result<Self> {
+        let (weight, bias) = params.layer(name, &[n_out, n_in, 3, 3], Init::Glorot, Init::Constant(1e-4))?;
+        Ok(Self { weight, bias, stride })
+    }
+
+    /// [B, H, W, C] to [B, ceil(H / stride), ceil(W / stride), O].
+    pub fn forward(&self, x: &Tensor) -> Result<Tensor> {
+        let (batch, height, width, n_in) = x.dims4()?;
+        let n_out = self.bias.dim(0)?;
+        let [down, across] = [height, width].map(|n| ConvAxis::same(n, 3, self.stride));
+        let input_indices = Tensor::new(input_indices(batch, down, across), x.device())?;
+        let patches =
+            x.reshape((batch * height * width, n_in))?.index_select(&input_indices, 0)?.reshape(((), 9 * n_in))?;
+        let weight = self.weight.permute((2, 3, 1, 0))?.contiguous()?.reshape((9 * n_in, n_out))?;
+        patches.matmul(&weight)?.broadcast_add(&self.bias)?.reshape((batch, down.n_out, across.n_out, n_out))
+    }
+}
+
+/// Indices of the 3 x 3 input pixels of each output pixel, row by row; `u32::MAX`, which selects zeros, outside the
+/// image.
+fn input_indices(batch: usize, down: ConvAxis, across: ConvAxis) -> Vec<u32> {
+    let at = |axis: ConvAxis, out: usize, offset: usize| {
+        (out * axis.stride + offset).checked_sub(axis.pad).filter(|at| *at < axis.n_in)
+    };
+    let mut input_indices = Vec::with_capacity(batch * down.n_out * across.n_out * 9);
+    for (b, row) in (0..batch).flat_map(|b| (0..down.n_out).map(move |row| (b, row))) {
+        for (column, offset) in (0..across.n_out).flat_map(|column| (0..9).map(move |offset| (column, offset))) {
+            let (y, x) = (at(down, row, offset / 3), at(across, column, offset % 3));
+            let index = y.zip(x).map(|(y, x)| ((b * down.n_in + y) * across.n_in + x) as u32);
+            input_indices.push(index.unwrap_or(u32::MAX));
+        }
+    }
+    input_indices
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -186,6 +224,29 @@ mod tests {
             let axes = Rotation::about(vec3::scale(v, 1.0 / vec3::norm(v)), vec3::norm(v)).axes();
             assert!((0..9).all(|k| (m[k] - axes[k % 3][k / 3]).abs() < 1e-6), "{m:?}");
         }
+        Ok(())
+    }
+
+    #[test]
+    fn gradients_are_right_at_even_and_odd_sizes() -> Result<()> {
+        for (height, width, stride) in [(4, 5, 1), (4, 6, 2), (5, 3, 2)] {
+            let inputs = [pattern(&[2, height, width, 2], 1.0)?, pattern(&[3, 2, 3, 3], 2.0)?, pattern(&[3], 3.0)?];
+            let error =
+                worst(&inputs, |v| Conv3x3 { weight: v[1].clone(), bias: v[2].clone(), stride }.forward(&v[0]))?;
+            assert!(error < 1e-7, "{height} x {width}, stride {stride}: {error}");
+        }
+        Ok(())
+    }
+
+    #[test]
+    fn stride_two_pads_at_the_end_only() -> Result<()> {
+        let mut params = Params::with_dtype(0, DType::F64);
+        let conv = Conv3x3::new(&mut params, "c", 1, 1, 2)?;
+        let x = pattern(&[1, 4, 4, 1], 0.0)?;
+        let y = conv.forward(&x)?.flatten_all()?.to_vec1::<f64>()?;
+        let (x, w) = (x.flatten_all()?.to_vec1::<f64>()?, conv.weight.flatten_all()?.to_vec1::<f64>()?);
+        let first: f64 = (0..9).map(|k| w[k] * x[k / 3 * 4 + k % 3]).sum();
+        assert!((y[0] - first - 1e-4).abs() < 1e-12 && y.len() == 4);
         Ok(())
     }
 }

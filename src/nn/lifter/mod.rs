@@ -2,7 +2,6 @@
 //! lifters on coordinates and on score maps.
 
 pub mod body;
-pub mod conv3x3;
 pub mod hand;
 pub mod heatmap_network;
 pub mod score_maps;

@@ -2,8 +2,7 @@
 //! crop centred on the middle knuckle, and the canonical frame of a hand. Points are in this crate's order: the
 //! paper's points 11, 12 and 20 are 10, 9 and 17 here.
 
-use orator_base::math::vec3;
-use orator_base::math::vec3::Vec3;
+use orator_base::math::vec3::{self, Vec3};
 use orator_base::motion::view::hand::{HandJoints, HandPoints};
 use orator_base::types::pose2d::N_HAND;
 

@@ -12,7 +12,6 @@ use serde::{Deserialize, Serialize};
 /// Initial weight of a new batch in the running statistics; training lowers it with `set_momentum`.
 const MOMENTUM: f64 = 0.1;
 
-/// Configuration of the network.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Config {
     /// Number of inputs per frame, for instance 2 per keypoint.

@@ -29,7 +29,6 @@ impl Affine {
         Ok(Self { weight, bias, relu: false })
     }
 
-    /// Applies a ReLU to the output.
     pub fn with_relu(self) -> Self {
         Self { relu: true, ..self }
     }
@@ -74,7 +73,6 @@ fn sizes(x: &[usize], weight: &[usize], n_bias: usize) -> Result<AffineSizes> {
     }
 }
 
-/// Number of rows per chunk.
 fn chunk(n: usize) -> usize {
     n.div_ceil(MAX_CHUNKS).max(MIN_CHUNK_ROWS).next_multiple_of(ROWS)
 }

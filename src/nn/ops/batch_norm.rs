@@ -11,7 +11,6 @@ use candle_core::{Device, Result, Shape, Tensor, Var};
 use rayon::prelude::*;
 use std::sync::{Arc, OnceLock};
 
-/// Mean and variance per channel.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Statistics {
     pub mean: Vec<f64>,
@@ -82,7 +81,6 @@ impl BatchNorm {
         Ok(y)
     }
 
-    /// Returns the running statistics.
     pub fn running(&self) -> Result<Statistics> {
         let values = |var: &Var| var.to_dtype(candle_core::DType::F64)?.to_vec1();
         Ok(Statistics { mean: values(&self.running_mean)?, variance: values(&self.running_var)? })

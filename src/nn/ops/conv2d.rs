@@ -4,10 +4,9 @@
 use super::fallback;
 use super::operator::{CpuOperator, CustomOperator, Gradients, Operand};
 use crate::cpu::axis::ConvAxis;
-use crate::cpu::channel_stats;
 use crate::cpu::direct_conv::{self, ConvSizes};
 use crate::cpu::tensor::Scalar;
-use crate::cpu::weight_gradient;
+use crate::cpu::{channel_stats, weight_gradient};
 use crate::params::{Init, Params};
 use candle_core::{Result, Shape, Tensor};
 
@@ -35,7 +34,6 @@ fn sizes(x: &Tensor, weight: &Tensor, axis: impl Fn(usize, usize) -> ConvAxis) -
     Ok(ConvSizes { batch, n_in, n_out, axes })
 }
 
-/// Shape of the output for an input of rank `rank`.
 pub fn shape_out(s: &ConvSizes, rank: usize) -> Shape {
     let [rows, columns] = s.axes;
     match rank {
@@ -71,7 +69,6 @@ impl Conv {
     }
 }
 
-/// Convolves tensors of these sizes, on any device.
 pub fn conv(x: &Tensor, weight: &Tensor, bias: &Tensor, sizes: ConvSizes) -> Result<Tensor> {
     if !x.device().is_cpu() {
         return fallback::conv(x, weight, bias, &sizes);

@@ -3,9 +3,8 @@
 //! stores two values per position: the input of the norm, and the result.
 
 use super::batch_norm::{BatchNorm, Statistics};
-use super::conv2d;
-use super::fallback;
 use super::operator::{CpuOperator, CustomOperator, Gradients, Operand};
+use super::{conv2d, fallback};
 use crate::cpu::channel_stats::{ChannelMoments, Norm};
 use crate::cpu::direct_conv::{self, ConvSizes};
 use crate::cpu::tensor::Scalar;

@@ -73,9 +73,6 @@ pub fn max_difference(
 
 /// Checks that the result of `f` on f32 inputs of these shapes and the gradient of input `which` are bitwise identical
 /// for one and for three threads.
-///
-/// # Errors
-/// They differ.
 pub fn check_thread_independence(
     shapes: &[&[usize]],
     which: usize,

@@ -5,7 +5,6 @@ use crate::cpu::tensor::{Scalar, is_f64, read, slice};
 use candle_core::backend::BackendStorage;
 use candle_core::{CpuStorage, CustomOp3, Layout, Result, Shape, Tensor};
 
-/// An input tensor of an operator.
 pub struct Operand<'a, T> {
     pub values: &'a [T],
     pub dims: &'a [usize],
@@ -16,17 +15,11 @@ pub struct Operand<'a, T> {
 /// Gradients of the three operands; `None`: not required.
 pub type Gradients<T> = Result<[Option<Vec<T>>; 3]>;
 
-/// An operator on three tensors.
 pub trait CpuOperator: Send + Sync {
     const NAME: &'static str;
 
-    /// Computes the result and its shape.
-    ///
-    /// # Errors
-    /// The shapes of the operands do not match.
     fn forward<T: Scalar>(&self, operands: [Operand<T>; 3]) -> Result<(Vec<T>, Shape)>;
 
-    /// Computes the gradients of the operands from `grad`, the gradient of the result `y`.
     fn backward<T: Scalar>(&self, operands: [Operand<T>; 3], y: &[T], grad: &[T]) -> Gradients<T>;
 }
 

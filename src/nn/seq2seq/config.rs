@@ -10,7 +10,6 @@ pub const SCORE_BLOCKS: RangeInclusive<usize> = 2..=6;
 /// Sizes and dropout rates. The defaults are those of the authors' code.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Config {
-    /// Number of values per pose.
     pub pose: usize,
     /// Number of audio features per frame.
     pub audio: usize,
@@ -108,7 +107,6 @@ impl Config {
     }
 }
 
-/// Input batch of segments.
 #[derive(Clone, Debug)]
 pub struct Segment {
     /// Audio features [B, predicted + context - 1, audio], starting with the context of the first predicted pose.

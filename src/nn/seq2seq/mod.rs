@@ -5,7 +5,6 @@
 pub mod adversarial;
 pub mod autoencoder;
 pub mod config;
-pub mod decoder;
 pub mod encoders;
 pub mod networks;
 pub mod predict;

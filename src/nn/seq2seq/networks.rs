@@ -1,8 +1,7 @@
 //! The networks with encoders and the common decoder: `WordsSeq2Seq` (network A) and `ContextSeq2Seq` (network B).
 
 use super::config::{Config, Segment};
-use super::decoder::Decoder;
-use super::encoders::{ContextEncoder, FrameEncoder, WordEncoder};
+use super::encoders::{ContextEncoder, Decoder, FrameEncoder, WordEncoder};
 use super::predict::{GesturePredictor, TruePoses};
 use crate::Mode;
 use crate::ops::affine::Affine;
@@ -14,7 +13,6 @@ use candle_core::{Module, Result, Tensor};
 trait EncodesAndDecodes: Send + Sync {
     fn parts(&self) -> (&Config, &Decoder);
 
-    /// Returns the encoded sequences, the audio first.
     fn encoded(&self, segment: &Segment, mode: &mut Mode) -> Result<Vec<Tensor>>;
 }
 
@@ -128,7 +126,6 @@ impl EncodesAndDecodes for ContextSeq2Seq {
         (&self.config, &self.decoder)
     }
 
-    /// Returns the states over the frames of the segment.
     fn encoded(&self, segment: &Segment, mode: &mut Mode) -> Result<Vec<Tensor>> {
         self.config.check(segment)?;
         let Some(words) = &segment.words else {
@@ -160,7 +157,6 @@ mod tests {
         Config { hidden: 6, vocabulary: 4, word: 3, word_hidden: 3, ..sizes }
     }
 
-    /// Values of two samples.
     fn values(shape: [usize; 2], phase: f64) -> Result<Tensor> {
         pattern(&[2, shape[0], shape[1]], phase)?.to_dtype(DType::F32)
     }

@@ -57,7 +57,7 @@ impl Stage for LiftStage {
     }
 
     fn version(&self) -> u32 {
-        10
+        11
     }
 
     fn settings(&self, _unit: &Unit) -> serde_json::Value {

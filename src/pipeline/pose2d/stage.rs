@@ -63,7 +63,7 @@ impl Stage for Pose2dStage {
     }
 
     fn version(&self) -> u32 {
-        9
+        10
     }
 
     fn cost(&self) -> u32 {

@@ -20,7 +20,7 @@ pub struct Measures {
     pub sound_db: Vec<f32>,
     /// Share of speech in the seconds around the frame, 0..1; NaN if speech is detected by loudness only.
     pub speech: Vec<f32>,
-    /// Correlation of the visible mouth with the voice in the seconds around the frame, -1..1.
+    /// Probability that the voice is that of the visible mouth, 0..1.
     pub lip_sync: Vec<f32>,
     /// Mean change of the picture since the previous frame, in 8-bit steps.
     pub frame_difference: Vec<f32>,

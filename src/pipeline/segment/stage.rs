@@ -50,7 +50,7 @@ impl Stage for SegmentStage {
     }
 
     fn version(&self) -> u32 {
-        8
+        9
     }
 
     fn settings(&self, _unit: &Unit) -> serde_json::Value {

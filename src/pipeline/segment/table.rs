@@ -91,7 +91,7 @@ pub fn frame_rules(rules: &config::SegmentConfig) -> [FrameRule; 16] {
         row(Rejection::NoSound, |m| &m.sound, AtLeast(0.5), none),
         row(Rejection::Quiet, |m| &m.sound_db, AtLeast(rules.min_sound_db), quiet),
         row(Rejection::NoSpeech, |m| &m.speech, AtLeast(rules.min_speech), quiet),
-        row(Rejection::OffScreenSpeaker, |m| &m.lip_sync, AtLeast(rules.min_lip_sync), quiet),
+        row(Rejection::OffScreenSpeaker, |m| &m.lip_sync, AtLeast(rules.min_own_voice), quiet),
         secs(row(Rejection::Static, |m| &m.frame_difference, AtLeast(rules.min_change), still)),
         row(Rejection::NoPerson, |m| &m.person, score, body),
         row(Rejection::Small, |m| &m.shoulder_px, AtLeast(rules.min_shoulder_px), body),

@@ -1,14 +1,12 @@
 //! Charts of an evaluation: the share of correct keypoints of each joint, drawn on a body and two hands, and the
 //! distributions of speed and jerk of prediction and ground truth.
 
-use crate::html::chart::dots::{ChartDot, dots};
-use crate::html::chart::histogram::Counts;
-use crate::html::chart::profile;
+use crate::html::chart::histogram::{self, Counts};
+use crate::html::chart::scale::{ChartDot, dots};
 use crate::html::{Node, legend, node};
 use ndarray::ArrayView3;
 use orator_base::text::number;
-use orator_base::types::skeleton;
-use orator_base::types::skeleton::{L_HAND, L_WRIST, N_JOINTS, NECK, R_HAND, R_SHOULDER, is_duplicate};
+use orator_base::types::skeleton::{self, L_HAND, L_WRIST, N_JOINTS, NECK, R_HAND, R_SHOULDER, is_duplicate};
 use orator_gesture::evaluate::clips::clips::{EvalClip, EvalClips};
 use orator_gesture::evaluate::table::table::Table;
 
@@ -128,7 +126,7 @@ pub fn speeds(clips: &EvalClips) -> Vec<Node> {
             number(ground_truth.quantile(0.5)),
             number(predicted.quantile(0.5))
         );
-        profile::card(title, unit, &[("truth", &ground_truth), ("predicted", &predicted)], medians)
+        histogram::card(title, unit, &[("truth", &ground_truth), ("predicted", &predicted)], medians)
     };
     let about = "Distributions of the values. Heights are proportional to the square root of the share, so that rare \
                  values stay visible; the last bin includes all larger values. Dashed lines: medians.";
@@ -154,7 +152,6 @@ fn derivative<'a>(
     })
 }
 
-/// Legend of ground truth and prediction colours.
 pub fn colour_legend() -> Node {
     legend([("line truth", "ground truth"), ("line predicted", "prediction")])
 }

@@ -3,4 +3,3 @@
 pub mod charts;
 pub mod page;
 pub mod player;
-pub mod table;

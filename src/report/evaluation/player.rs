@@ -3,20 +3,19 @@
 //! total, and motion is in whole millimetres, which bounds the size of the page.
 
 use super::charts::colour_legend;
-use crate::html::chart::tracks::{Track, tracks};
+use crate::html::chart::timeline::{Track, tracks};
 use crate::html::{Node, node};
 use anyhow::Result;
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
 use ndarray::ArrayView3;
 use orator_base::text::clock;
-use orator_base::types::skeleton;
-use orator_base::types::skeleton::{L_WRIST, N_JOINTS, R_WRIST, is_duplicate};
+use orator_base::types::skeleton::{self, L_WRIST, N_JOINTS, R_WRIST, is_duplicate};
 use orator_base::types::sound::{SAMPLE_RATE, Sound};
 use orator_formats::wav;
 use orator_gesture::evaluate::clips::clips::{EvalClip, EvalClips};
 use orator_gesture::evaluate::table::table::Table;
-use orator_gesture::metrics::beat::consistency;
+use orator_gesture::metrics::beat;
 use serde_json::{Value, json};
 use std::ops::Range;
 
@@ -143,7 +142,7 @@ fn tracks_of(clip: &EvalClip, frames: Range<usize>, fps: f64, samples: Option<&[
     let (mut lines, mut marks) = (Vec::new(), Vec::new());
     for (class, joints) in both {
         let speeds: Vec<f64> = frames.clone().map(|t| wrist_speed(clip, joints, &frames, t, fps)).collect();
-        marks.push((class, consistency::minima(&speeds, order).into_iter().map(|i| i as f64 / fps).collect()));
+        marks.push((class, beat::minima(&speeds, order).into_iter().map(|i| i as f64 / fps).collect()));
         lines.push((class, speeds.iter().enumerate().map(|(i, speed)| [i as f64 / fps, *speed]).collect()));
     }
     all.push(Track { name: "wrist speed".to_owned(), lines, marks: Vec::new() });
@@ -176,7 +175,6 @@ fn wrist_speed(clip: &EvalClip, joints: ArrayView3<f32>, frames: &Range<usize>, 
 }
 
 impl Excerpt {
-    /// Data for the page's script.
     pub fn data(&self) -> Value {
         json!({
             "secs": self.secs,
@@ -201,7 +199,6 @@ pub fn bones() -> Vec<[usize; 3]> {
     (0..N_JOINTS).filter(|joint| !is_duplicate(*joint)).filter_map(bone).collect()
 }
 
-/// Player, with the charts below it.
 pub fn body(excerpts: &[Excerpt], table: &Table) -> Vec<Node> {
     if excerpts.is_empty() {
         return vec![

@@ -1,6 +1,10 @@
-//! HTML elements. Text and attribute values are escaped only here, and only `Node` writes markup, so no user text can
-//! become markup.
+//! HTML elements, and documents of them: head, navigation, sections, and the style and script shared by all pages. Text
+//! and attribute values are escaped only here, and only `Node` writes markup, so no user text can become markup. A page
+//! does not refer to other files, and its content security policy forbids loading any.
 
+use base64::Engine as _;
+use base64::engine::general_purpose::STANDARD;
+use serde_json::Value;
 use std::fmt::{self, Display, Write as _};
 
 /// Element with its attributes and content.
@@ -69,7 +73,6 @@ impl Node {
         self.attr("id", name)
     }
 
-    /// Appends text.
     pub fn text(mut self, content: impl Display) -> Self {
         self.inner.push_str(&escape(&content.to_string()));
         self
@@ -102,6 +105,88 @@ impl Display for Node {
     }
 }
 
+const STYLE: &str = include_str!("page.css");
+const SCRIPT: &str = include_str!("page.js");
+const POLICY: &str =
+    "default-src 'none'; img-src data:; media-src data:; style-src 'unsafe-inline'; script-src 'unsafe-inline'";
+
+pub struct Page {
+    pub title: String,
+    /// Sentence under the title.
+    pub lead: String,
+    pub sections: Vec<Section>,
+    /// Style of this page, after the shared one.
+    pub style: &'static str,
+    /// Script of this page, after the shared one.
+    pub script: &'static str,
+    /// Data for the script (element `data`).
+    pub data: Value,
+}
+
+pub struct Section {
+    /// Anchor: letters and dashes only.
+    pub id: &'static str,
+    pub title: &'static str,
+    pub body: Vec<Node>,
+}
+
+impl Page {
+    pub fn html(&self) -> String {
+        let links =
+            self.sections.iter().map(|section| node("a").attr("href", format!("#{}", section.id)).text(section.title));
+        let sections = self.sections.iter().map(|section| {
+            let title = node("h2").text(section.title);
+            node("section").id(section.id).child(title).children(section.body.iter().cloned())
+        });
+        // In JSON, `<` occurs only inside strings, where the escape is equivalent; it cannot close the script element.
+        let data = self.data.to_string().replace('<', "\\u003c");
+        let top = node("header")
+            .child(node("h1").text(&self.title))
+            .child(node("p").class("lead").text(&self.lead))
+            .child(node("nav").attr("aria-label", "Sections").children(links));
+        let body = node("body")
+            .child(node("a").class("skip").attr("href", "#main").text("Skip to content"))
+            .child(top)
+            .child(node("main").id("main").children(sections))
+            .child(node("div").id("tip").attr("role", "status").flag("hidden"))
+            .child(node("script").attr("type", "application/json").id("data").verbatim(&data))
+            .child(node("script").verbatim(SCRIPT).verbatim(self.script));
+        html_file(page_head(&self.title, self.style), body)
+    }
+}
+
+/// Head of a page, with the shared style followed by `style`.
+pub fn page_head(title: &str, style: &'static str) -> Node {
+    node("head")
+        .child(node("meta").attr("charset", "utf-8"))
+        .child(node("meta").attr("http-equiv", "Content-Security-Policy").attr("content", POLICY))
+        .child(node("meta").attr("name", "viewport").attr("content", "width=device-width, initial-scale=1"))
+        .child(node("meta").attr("name", "color-scheme").attr("content", "light dark"))
+        .child(node("title").text(title))
+        .child(node("style").verbatim(STYLE).verbatim(style))
+}
+
+/// Text of a file with this head and body.
+pub fn html_file(head: Node, body: Node) -> String {
+    format!("<!doctype html>\n{}\n", node("html").attr("lang", "en").child(head).child(body))
+}
+
+/// Embedded JPEG image of `width` x `height` px, loaded lazily, with `description` as its alternative text.
+pub fn jpeg(bytes: &[u8], [width, height]: [usize; 2], description: &str) -> Node {
+    node("img")
+        .attr("src", format!("data:image/jpeg;base64,{}", STANDARD.encode(bytes)))
+        .attr("width", width)
+        .attr("height", height)
+        .attr("alt", description)
+        .attr("loading", "lazy")
+}
+
+/// Embedded MP4 video with controls and a description.
+pub fn video(bytes: &[u8], description: &str) -> Node {
+    let source = format!("data:video/mp4;base64,{}", STANDARD.encode(bytes));
+    node("video").flag("controls").attr("src", source).attr("aria-label", description).attr("style", "max-width: 100%")
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -113,5 +198,19 @@ mod tests {
         assert_eq!(shown.matches('<').count(), 3, "{shown}");
         assert!(shown.starts_with("<p title=\"&lt;/p&gt;") && shown.ends_with("&amp; &#39;y&#39;<br></p>"), "{shown}");
         assert!(!shown.contains("\"x\""));
+    }
+
+    #[test]
+    fn elements_are_balanced_and_data_cannot_close_the_script() {
+        let section = Section { id: "a", title: "A & b", body: vec![node("p").text("x < y")] };
+        let data = serde_json::json!({ "name": "</script><b>" });
+        let title = "\"<i>\"".to_owned();
+        let page = Page { title, lead: String::new(), sections: vec![section], style: "", script: "", data }.html();
+        for name in ["html", "head", "body", "script", "style", "section", "main", "header", "nav", "div"] {
+            let opened = page.matches(&format!("<{name}>")).count() + page.matches(&format!("<{name} ")).count();
+            assert_eq!(opened, page.matches(&format!("</{name}>")).count(), "{name}");
+        }
+        assert!(!page.contains("<i>") && !page.contains("<b>") && page.contains("href=\"#a\""));
+        assert!(!page.contains("http://") && !page.contains("https://"));
     }
 }

@@ -4,8 +4,7 @@
 use anyhow::{Context, Result};
 use ndarray::ArrayView2;
 use orator_avatar::animate::draw::figure::{FigureView, INK, PAPER, draw_pose, mix};
-use orator_avatar::animate::draw::overlay;
-use orator_avatar::animate::draw::overlay::ImageTransform;
+use orator_avatar::animate::draw::overlay::{self, ImageTransform};
 use orator_base::types::image::Image;
 use orator_base::types::pose2d::Keypoints;
 use orator_media::ffmpeg::frames::FrameReader;
@@ -19,7 +18,6 @@ const PX_PER_METRE: f32 = 270.0;
 const NECK_PX: [f32; 2] = [CELL_PX as f32 / 2.0, 125.0];
 /// Side of the crop relative to the extent of the keypoints.
 const MARGIN: f32 = 1.15;
-/// Maximum magnification of a frame.
 const MAX_MAGNIFICATION: f32 = 4.0;
 
 /// Square crop of the video that all frame cells of a clip show.
@@ -58,7 +56,6 @@ impl SheetCrop {
     }
 }
 
-/// Viewpoint of a 3D cell.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum CellView {
     Front,

@@ -6,11 +6,8 @@ use serde_json::Value;
 /// Maximum number of points of a curve; neighbouring points of a longer one are averaged.
 const MAX_POINTS: usize = 240;
 
-/// Parsed log of a training run.
 pub struct TrainingLog<'a> {
-    /// Log lines of training steps.
     steps: Vec<&'a Value>,
-    /// Log lines of validations.
     pub epochs: Vec<&'a Value>,
     /// Log line of the validation with the best (smallest) score.
     pub best: Option<&'a Value>,
@@ -108,7 +105,6 @@ pub fn metrics<'v>(validation: &'v Value, of: &str) -> [&'v Value; 2] {
     [&validation[of], &validation[format!("mean_pose_{of}")]]
 }
 
-/// Curve of a value in log lines.
 fn curve(lines: &[&Value], name: &str, colour: usize, value: impl Fn(&Value) -> Option<f64>) -> ChartLine {
     let points = lines.iter().filter_map(|line| Some([line["step"].as_f64()?, value(line)?]));
     ChartLine { name: name.to_owned(), colour, points: thinned(&points.collect::<Vec<_>>()) }

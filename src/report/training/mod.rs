@@ -2,5 +2,4 @@
 
 pub mod charts;
 pub mod live;
-pub mod page;
 pub mod strip;

@@ -5,12 +5,10 @@ use super::thresholds::THRESHOLDS;
 use crate::html::chart::histogram::{Counts, ThresholdLine, histogram};
 use crate::html::{Node, node};
 use orator_base::stage::ledger::Ledger;
-use orator_base::text::counted;
-use orator_base::text::percent;
+use orator_base::text::{counted, percent};
 use orator_dataset::config::Settings;
 use orator_pipeline::segment::Measures;
 
-/// Measure of a frame or of an accepted interval.
 pub struct Measure {
     /// Name of the array in `measures.npz`, or `BONES` or `LENGTHS`.
     name: &'static str,
@@ -42,7 +40,7 @@ const LENGTHS: &str = "interval_secs";
 const ROWS: [Measure; 18] = [
     row("sound_db", "Loudness", "dBFS", [-100.0, 0.0], 50, "min_sound_db"),
     row("speech", "Share of speech", "", UNIT_RANGE, 50, "min_speech"),
-    row("lip_sync", "Correlation of mouth and voice", "", [-1.0, 1.0], 50, "min_lip_sync"),
+    row("lip_sync", "Probability that the visible mouth speaks", "", UNIT_RANGE, 50, "min_own_voice"),
     row("still", "Picture change", "levels (8-bit)", [0.0, 4.0], 80, "min_change"),
     row("person", "Highest score of face and arms", "", UNIT_RANGE, 40, "joint_score"),
     row("shoulder_px", "Distance between the shoulders", "px", [0.0, 600.0], 60, "min_shoulder_px"),
@@ -52,7 +50,7 @@ const ROWS: [Measure; 18] = [
         "nose_off",
         "Horizontal distance from nose to neck",
         "\u{d7} half shoulder width",
-        [0.0, 3.0],
+        [0.0, 4.0],
         60,
         "max_nose_off",
     ),
@@ -82,7 +80,6 @@ impl Measure {
     }
 }
 
-/// Histograms of all measures.
 pub struct MeasureCounts(Vec<Counts>);
 
 impl MeasureCounts {
@@ -90,7 +87,6 @@ impl MeasureCounts {
         Self(ROWS.iter().map(|row| Counts::new(row.ends[0], row.ends[1], row.n_bins)).collect())
     }
 
-    /// All measures with their counts.
     pub fn all(&self) -> impl Iterator<Item = (&'static Measure, &Counts)> {
         ROWS.iter().zip(&self.0)
     }
@@ -101,7 +97,6 @@ impl MeasureCounts {
         }
     }
 
-    /// Counts the frames of a video.
     pub fn add_frames(&mut self, measures: &Measures) {
         for (name, values) in measures.arrays() {
             self.add(name, values.iter().map(|value| f64::from(*value)));
@@ -113,13 +108,11 @@ impl MeasureCounts {
         self.add(BONES, bone_change.iter().map(|value| f64::from(*value)));
     }
 
-    /// Counts the accepted intervals of a video.
     pub fn add_intervals(&mut self, ledger: &Ledger) {
         self.add(LENGTHS, ledger.accepted.iter().map(|accepted| accepted.end_secs - accepted.start_secs));
     }
 }
 
-/// Section with a card for each measure.
 pub fn distributions(measures: &MeasureCounts, settings: &Settings, per_sec: f64) -> Vec<Node> {
     let about = "All frames of all videos, including rejected ones. Values below a minimum or above a maximum have \
                  another colour. Bar heights are proportional to the square root of the share, so that rare values stay \

@@ -1,30 +1,31 @@
-//! Collection of all data of the report in a single pass over the videos. Only the summary of a video with its ledger
-//! stays in memory.
+//! Collection of all data of the report in a single pass over the videos. Only the summary of a video stays in memory,
+//! with its ledger after the last completed stage, or the reason why there is none.
 
 use super::distributions::MeasureCounts;
 use super::movement::MovementCounts;
+use super::sliders::{AcceptedByThreshold, JudgedVideo, open_frames};
 use super::thresholds::THRESHOLDS;
-use super::video::VideoSummary;
-use super::what_if::{AcceptedByThreshold, JudgedVideo, open_frames};
+use super::timelines::WAITING;
 use super::worst::Worst;
 use crate::preview::{MAX_PREVIEWS, MotionPreview};
 use anyhow::{Context, Result, ensure};
 use orator_base::stage::Unit;
-use orator_base::stage::artifacts::Artifact;
+use orator_base::stage::artifacts::{Artifact, StageName, dir};
+use orator_base::stage::ledger::Ledger;
 use orator_base::stage::progress::Progress;
+use orator_base::stage::record::Failure;
 use orator_base::types::interval::Intervals;
 use orator_dataset::config::Settings;
 use orator_dataset::config::videos::Videos;
-use orator_formats::joints_npz;
 use orator_formats::media_json::MediaInfo;
 use orator_formats::npz::Npz;
+use orator_formats::{joints_npz, sound_offset_json};
 use orator_pipeline::segment::Measures;
 use std::path::Path;
 
-/// Data of a report.
 pub struct ReportData {
     pub videos: Vec<VideoSummary>,
-    /// Results of `what_if` by video; `None`: the video has no measures.
+    /// Accepted seconds by threshold (`sliders`) of each video; `None`: the video has no measures.
     pub accepted: Vec<Option<AcceptedByThreshold>>,
     pub measures: MeasureCounts,
     pub movement: MovementCounts,
@@ -68,7 +69,7 @@ pub fn gather(settings: &Settings, videos: &[Videos], n_pictures: usize, progres
 }
 
 impl ReportData {
-    /// Adds the measures of a video; unreadable data becomes a note. Returns the results of `what_if`.
+    /// Adds the measures of a video; unreadable data becomes a note. Returns its accepted seconds by threshold.
     fn add(&mut self, settings: &Settings, video: &mut VideoSummary) -> Option<AcceptedByThreshold> {
         let rules = &settings.segment;
         let (work, unit) = (&settings.work.dir, video.unit.clone());
@@ -147,4 +148,105 @@ fn motion(work: &Path, unit: &Unit) -> Result<(orator_base::types::pose3d::Motio
     let intervals =
         serde_json::from_slice(&bytes).with_context(|| format!("{} is not a list of intervals", path.display()))?;
     Ok((joints_npz::read(&Artifact::Joints.path(work, unit))?, intervals))
+}
+
+#[derive(Clone, Debug)]
+pub struct VideoSummary {
+    pub unit: Unit,
+    /// File name.
+    pub file: String,
+    /// Ledger of the video; empty if its length is unknown.
+    pub ledger: Ledger,
+    /// Whether the lift stage has finished.
+    pub is_lifted: bool,
+    pub has_failed: bool,
+    /// Notes on missing data and on properties of the file, a sentence each.
+    pub notes: Vec<String>,
+    /// Local folder names and their replacements on the page.
+    folders: [(String, &'static str); 2],
+}
+
+impl VideoSummary {
+    /// Reads the state of `unit` from the folder `work`; unreadable data becomes a note.
+    pub fn read(work: &Path, unit: &Unit) -> Self {
+        let file = unit.source.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        let folders = [(work, "work"), (unit.source.parent().unwrap_or(work), "")];
+        let folders = folders.map(|(folder, name)| (folder.display().to_string(), name));
+        let mut video = Self {
+            unit: unit.clone(),
+            file,
+            ledger: Ledger::default(),
+            is_lifted: false,
+            has_failed: false,
+            notes: Vec::new(),
+            folders,
+        };
+        if !unit.source.exists() {
+            video.note("The video file is missing: no pictures available.");
+        }
+        if let Ok(media) = MediaInfo::read(&Artifact::MediaInfo.path(work, unit)) {
+            media.notes().iter().for_each(|remark| video.note(&format!("File: {remark}.")));
+            if let Some(reason) = media.not_judged() {
+                video.note(&format!("Created {reason}."));
+            }
+        }
+        if let Some(offset) = sound_offset_json::read(&Artifact::SoundOffset.path(work, unit)).ok().flatten()
+            && offset.is_reportable()
+        {
+            video.note(&format!("Measured by lip sync: the {offset}."));
+        }
+        let failure = StageName::OF_VIDEOS
+            .into_iter()
+            .find_map(|stage| Some((stage, Failure::read(&dir(work, stage, unit))?.error)));
+        if let Some((stage, error)) = failure {
+            video.mark_unavailable(work, stage.as_str(), &error);
+            return video;
+        }
+        for file in [Artifact::LiftLedger, Artifact::SegmentLedger] {
+            let path = file.path(work, unit);
+            if !path.exists() {
+                continue;
+            }
+            match Ledger::read(&path) {
+                Ok(ledger) => {
+                    (video.ledger, video.is_lifted) = (ledger, file == Artifact::LiftLedger);
+                    if !video.is_lifted {
+                        video.note("Not lifted yet: the rules on bones have not been applied.");
+                    }
+                    return video;
+                }
+                Err(error) => video.note(&format!("{error:#}")),
+            }
+        }
+        video.mark_unavailable(work, WAITING, "not processed yet: run `orator run`");
+        video
+    }
+
+    /// Marks all seconds as failed in `stage` or, for `WAITING`, as not processed yet.
+    fn mark_unavailable(&mut self, work: &Path, stage: &str, error: &str) {
+        let media = MediaInfo::read(&Artifact::MediaInfo.path(work, &self.unit));
+        let secs = media.ok().map(|media| media.duration_secs).filter(|secs| *secs > 0.0);
+        self.ledger = secs.map_or_else(Ledger::default, |secs| Ledger::failed(secs, stage, error));
+        self.has_failed = stage != WAITING;
+        match stage {
+            WAITING => self.note("Not processed yet: run `orator run`."),
+            _ => self.note(&format!("The stage {stage} failed: {error}")),
+        }
+        if secs.is_none() {
+            self.note("The length is unknown; the video is not included in the totals.");
+        }
+    }
+
+    /// Adds a note with local folder names replaced.
+    pub fn note(&mut self, text: &str) {
+        let text = self.folders.iter().fold(text.to_owned(), |text, (folder, name)| {
+            if name.is_empty() { text.replace(&format!("{folder}/"), "") } else { text.replace(folder, name) }
+        });
+        self.notes.push(text);
+    }
+
+    /// Anchor of the video's timeline on the page.
+    pub fn anchor(&self) -> String {
+        format!("video-{}-{}", self.unit.speaker, self.unit.video)
+    }
 }

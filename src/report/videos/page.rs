@@ -1,21 +1,20 @@
-//! Report page on the videos of speakers.
+//! Report page on the videos of speakers, with its section of pictures of the worst frames.
 
 use super::distributions::distributions;
-use super::gallery::{Pictures, gallery};
-use super::gather::{ReportData, gather};
-use super::summary;
-use super::summary::ReportTotals;
-use super::{motion, pictures, sliders, timelines};
-use crate::faces;
-use crate::html::{Page, Section};
+use super::gather::{ReportData, VideoSummary, gather};
+use super::summary::{self, ReportTotals};
+use super::worst::{self, Moment, MomentThumbnail, Worst};
+use super::{movement, sliders, timelines};
+use crate::html::{Node, Page, Section, jpeg, node};
 use crate::preview;
 use orator_base::stage::progress::Progress;
-use orator_base::text::counted;
+use orator_base::stage::rejection::Rejection;
+use orator_base::text::{clock, counted};
 use orator_dataset::config::Settings;
 use orator_dataset::config::videos::Videos;
 use serde_json::json;
+use std::collections::BTreeMap;
 
-/// Request for a report.
 pub struct ReportRequest<'a> {
     pub settings: &'a Settings,
     pub videos: &'a [Videos],
@@ -23,11 +22,9 @@ pub struct ReportRequest<'a> {
     pub n_pictures: usize,
 }
 
-/// Report as a page and as data.
 pub struct ReportPage {
     pub html: String,
     pub sums: ReportTotals,
-    /// Totals as JSON.
     pub facts: serde_json::Value,
 }
 
@@ -59,7 +56,7 @@ fn draw(settings: &Settings, gathered: &mut ReportData, progress: &dyn Progress)
     for number in request {
         let video = &mut gathered.videos[number];
         task.detail(&video.unit.video);
-        match pictures::thumbnails(&settings.work.dir, &video.unit, number, &gathered.worst) {
+        match worst::thumbnails(&settings.work.dir, &video.unit, number, &gathered.worst) {
             Ok(pictures) => found.extend(pictures.into_iter().map(|(frames, picture)| ((number, frames), picture))),
             Err(error) => video.note(&format!("No pictures available: {error:#}")),
         }
@@ -81,7 +78,7 @@ fn page(request: &ReportRequest, gathered: &ReportData, pictures: &Pictures, sum
     if n_speech_model.1 > 0 {
         reasons.push(summary::speech(*n_speech_model));
     }
-    let persons = faces::section(request.settings, request.videos);
+    let persons = preview::faces(request.settings, request.videos);
     let persons = (!persons.is_empty()).then(|| section("persons", "Persons", persons));
     let mut page = Page {
         title: format!("Report on {}", names.join(", ")),
@@ -99,7 +96,7 @@ fn page(request: &ReportRequest, gathered: &ReportData, pictures: &Pictures, sum
             section("thresholds", "Thresholds", sliders::sliders(accepted, rules)),
             section("frames", "Worst frames", gallery(worst, pictures, videos)),
             section("distributions", "Distributions", distributions(measures, request.settings, per_sec)),
-            section("motion", "Motion", motion::motion(movement)),
+            section("motion", "Motion", movement::motion(movement)),
         ],
         style: include_str!("page.css"),
         script: include_str!("page.js"),
@@ -109,4 +106,48 @@ fn page(request: &ReportRequest, gathered: &ReportData, pictures: &Pictures, sum
         page.sections.insert(3, persons);
     }
     page
+}
+
+pub type Pictures = BTreeMap<(usize, Vec<usize>), MomentThumbnail>;
+
+pub fn gallery(worst: &Worst, pictures: &Pictures, videos: &[VideoSummary]) -> Vec<Node> {
+    if worst.rules.is_empty() {
+        return vec![
+            node("p").class("empty").text("No rejected intervals, or pictures were disabled with `--pictures 0`."),
+        ];
+    }
+    let about = "For each rule, the rejected intervals that violate it most, each at its worst frame with the detected \
+                 keypoints. Two pictures side by side are consecutive frames.";
+    let mut shown = vec![node("p").text(about)];
+    for ((_, reason, unit), moments) in &worst.rules {
+        let swatch = node("span").class(format!("swatch {}", timelines::class(reason)));
+        let measured = if unit.is_empty() { String::new() } else { format!(", threshold in {unit}") };
+        let about = format!("{}{measured}", counted(moments.len(), "interval"));
+        let title = node("h3")
+            .class("rule")
+            .child(swatch)
+            .child(node("span").text(Rejection::label(reason)))
+            .child(node("small").text(about));
+        let cards = moments.iter().filter_map(|moment| Some(card(moment, videos.get(moment.video)?, pictures)));
+        shown.push(node("div").class("gallery").child(title).child(node("div").class("shots").children(cards)));
+    }
+    shown
+}
+
+fn card(moment: &Moment, video: &VideoSummary, pictures: &Pictures) -> Node {
+    let at = format!("{} at {}", video.file, clock(moment.secs));
+    let shown = match pictures.get(&(moment.video, moment.frames.clone())) {
+        Some(found) => jpeg(&found.jpeg, found.size, &format!("{at}: {}", moment.description)),
+        None => node("p").class("empty nopicture").text("Picture not available."),
+    };
+    let link = node("a").attr("href", format!("#{}", video.anchor())).text(at);
+    let description = if moment.frame_value.is_empty() {
+        moment.description.clone()
+    } else {
+        format!("{}; {}", moment.description, moment.frame_value)
+    };
+    node("figure")
+        .class(if moment.frames.len() > 1 { "card shot pair" } else { "card shot" })
+        .child(shown)
+        .child(node("figcaption").child(link).child(node("small").text(description)))
 }

@@ -1,15 +1,12 @@
 //! First sections of the report: totals, seconds by reason, and a table of videos.
 
-use super::reasons;
-use super::reasons::WAITING;
-use super::video::VideoSummary;
-use crate::html;
-use crate::html::{Node, legend, node};
+use super::gather::VideoSummary;
+use super::timelines::{self, WAITING};
+use crate::html::{self, Node, legend, node};
 use orator_base::stage::artifacts::{StageName, dir, speaker_dir};
 use orator_base::stage::record::Record;
 use orator_base::stage::rejection::Rejection;
-use orator_base::text::counted;
-use orator_base::text::{length, percent};
+use orator_base::text::{counted, length, percent};
 use orator_base::types::split::Split;
 use orator_dataset::INFO;
 use orator_dataset::config::Settings;
@@ -17,7 +14,6 @@ use orator_dataset::config::videos::Videos;
 use orator_dataset::info::{DatasetInfo, DatasetVideo};
 use std::collections::BTreeMap;
 
-/// Total seconds over all videos.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ReportTotals {
     /// All footage.
@@ -28,7 +24,6 @@ pub struct ReportTotals {
     pub waiting: f64,
     /// By reason.
     pub rejected: BTreeMap<String, f64>,
-    /// Number of accepted intervals.
     pub n_accepted: usize,
 }
 
@@ -101,8 +96,9 @@ type Part<'a> = (&'a str, String, f64, &'static str);
 
 /// Section with a bar for each reason, the longest first.
 pub fn by_reason(sums: &ReportTotals) -> Vec<Node> {
-    let of_reason =
-        |(reason, secs): (&'_ String, &f64)| (reason.clone(), reasons::class(reason), *secs, reasons::heading(reason));
+    let of_reason = |(reason, secs): (&'_ String, &f64)| {
+        (reason.clone(), timelines::class(reason), *secs, timelines::heading(reason))
+    };
     let mut rejected: Vec<_> = sums.rejected.iter().map(of_reason).collect();
     rejected.sort_by(|a, b| b.2.total_cmp(&a.2).then(a.0.cmp(&b.0)));
     let mut parts: Vec<Part> = vec![("accepted", "accepted".to_owned(), sums.accepted, "usable for the dataset")];
@@ -169,10 +165,9 @@ pub fn table(videos: &[VideoSummary], splits: &VideoSplits) -> Vec<Node> {
         let mut rejected: Vec<(String, f64)> = ledger.rejected_secs().into_iter().collect();
         rejected.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
         let longest = rejected.iter().take(3);
-        let why =
-            legend(longest.map(|(reason, secs)| {
-                (reasons::class(reason), format!("{} {}", Rejection::label(reason), length(*secs)))
-            }));
+        let why = legend(longest.map(|(reason, secs)| {
+            (timelines::class(reason), format!("{} {}", Rejection::label(reason), length(*secs)))
+        }));
         let state = match ledger.failed.first() {
             Some(failed) if failed.stage == WAITING => node("span").text("not processed"),
             Some(failed) => node("span").text(format!("failed at {}", failed.stage)),

@@ -5,14 +5,12 @@ use orator_dataset::config::SegmentConfig;
 /// Number of steps between the ends of a grid.
 const N_STEPS: u32 = 20;
 
-/// Threshold with its grid of values.
 pub struct ThresholdGrid {
     /// Key in `[segment]`.
     pub key: &'static str,
     pub description: &'static str,
     /// Unit; empty for a score or share in 0..1 and for a count that the description names.
     pub unit: &'static str,
-    /// Ends of the grid.
     pub low: f64,
     pub high: f64,
     pub get: fn(&SegmentConfig) -> f64,
@@ -47,11 +45,10 @@ macro_rules! row {
     };
 }
 
-/// All thresholds with sliders.
 pub const THRESHOLDS: [ThresholdGrid; 19] = [
     row!(min_sound_db, "minimum loudness of the second around a frame", "dBFS", -90.0, -10.0),
     row!(min_speech, "minimum share of speech in the 4 s around a frame", "", 0.0, 1.0),
-    row!(min_lip_sync, "minimum correlation of mouth and voice in the 8 s around a frame", "", -0.5, 0.5),
+    row!(min_own_voice, "minimum probability that the voice is that of the visible mouth", "", 0.0, 1.0),
     row!(max_quiet_secs, "longest accepted pause in speech", "s", 0.0, 10.0),
     row!(
         min_change,
@@ -95,7 +92,6 @@ impl ThresholdGrid {
         (grid, at)
     }
 
-    /// Copy of `rules` with this threshold at `value`.
     pub fn with(&self, rules: &SegmentConfig, value: f64) -> SegmentConfig {
         let mut other = rules.clone();
         (self.set)(&mut other, value);

@@ -2,10 +2,10 @@
 
 use super::exclusion::exclude;
 use super::methods::methods;
-use super::number_format::counted;
 use super::registration::{Registration, judge};
 use super::result::{StatisticSettings, StudyAnalysis, TaskAnalysis};
 use super::task::task;
+use super::text::counted;
 use super::votes::read::VotesRead;
 use crate::file::{HypothesisKind, StudyHypothesis};
 use crate::preregistration::RegisteredHypothesis;

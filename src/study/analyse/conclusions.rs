@@ -1,8 +1,8 @@
 //! Conclusions: sentences on what the votes of a task show and what they do not show.
 
-use super::number_format::{counted, p_value, percent, percents, points};
 use super::result::{PairAnalysis, ShareAnalysis, ShareMeasure, StatisticSettings, TaskAnalysis, TestOutcome};
 use super::statistic::StatisticMethod;
+use super::text::{counted, p_value, percent, percents, points};
 use crate::plan::TaskDesign;
 
 /// Maximum number of pairs with individual sentences.
@@ -51,7 +51,6 @@ fn share_sentence(share: &ShareAnalysis, settings: &StatisticSettings) -> String
     )
 }
 
-/// Sentence that explains a conclusion, with its p values.
 fn conclusion_sentence(share: &ShareAnalysis) -> String {
     let p = share.statistics.crossed_p().map(p_value).unwrap_or_default();
     let test = share.statistics.equivalence(StatisticMethod::Crossed);

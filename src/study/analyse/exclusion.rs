@@ -19,7 +19,6 @@ pub struct ExclusionSummary {
     pub rules: Vec<ExclusionCount>,
 }
 
-/// Effect of one rule alone.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ExclusionCount {
     pub rule: String,
@@ -32,7 +31,6 @@ pub struct ExclusionCount {
     pub unknown: Option<String>,
 }
 
-/// Exclusion rule with the field that it needs.
 struct ExclusionTest<'r> {
     description: String,
     field: &'static str,
@@ -111,7 +109,6 @@ fn tests_of_rules<'v>(rules: &ExclusionRules, votes: &'v [StudyVote]) -> Vec<Exc
 }
 
 impl ExclusionSummary {
-    /// Whether any vote was excluded.
     pub fn any_excluded(&self) -> bool {
         self.n_votes_analysed < self.n_votes
     }

@@ -1,9 +1,9 @@
 //! Generates a paragraph for the methods section of a paper from an analysis: plain text with citations in parentheses.
 
 use super::exclusion::{ExclusionCount, ExclusionSummary};
-use super::number_format::{counted, list, p_value, percent, percents, points};
 use super::result::{ShareMeasure, StudyAnalysis, TaskAnalysis};
 use super::statistic::StatisticMethod;
+use super::text::{counted, list, p_value, percent, percents, points};
 use crate::plan::TaskDesign;
 use orator_base::text::number;
 use std::fmt::Write as _;
@@ -11,7 +11,6 @@ use std::fmt::Write as _;
 /// References, one per line: the citation as used in the text, and the full reference.
 const SOURCES: &str = include_str!("sources.txt");
 
-/// Methods paragraph with its list of references.
 pub fn methods(analysis: &StudyAnalysis) -> String {
     let mut text = participants(analysis);
     text += &exclusions(&analysis.exclusions);
@@ -164,7 +163,6 @@ fn registration_status(analysis: &StudyAnalysis) -> String {
     }
 }
 
-/// Sentences with the headline statistics.
 fn results(analysis: &StudyAnalysis) -> String {
     let mut text = String::new();
     for task in &analysis.tasks {
@@ -181,17 +179,12 @@ fn results(analysis: &StudyAnalysis) -> String {
             let equivalence = statistics.equivalence(StatisticMethod::Crossed).map(|test| {
                 format!("; equivalence within \u{b1}{} percentage points: {}", points(test.bound), p_value(test.p))
             });
-            let chosen = match share.measure {
-                ShareMeasure::GeneratedChosen => "generated motion chosen",
-                ShareMeasure::MatchedChosen => "matching motion chosen",
-                ShareMeasure::Correct => "correct",
-                ShareMeasure::JudgedReal => "judged real",
-            };
             let _ = write!(
                 text,
-                "{}, {}: {chosen} in {} of the votes [{}], {statistic}{}{adjusted}{}. ",
+                "{}, {}: {} in {} of the votes [{}], {statistic}{}{adjusted}{}. ",
                 task.task,
                 super::conclusions::scope(share),
+                share.measure.name(),
                 percent(share.share),
                 percents(interval),
                 p_value(test.p),

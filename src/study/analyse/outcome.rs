@@ -25,7 +25,6 @@ impl<'v> Numbering<'v> {
         numbering
     }
 
-    /// Numeric vote with this score.
     pub fn vote(&self, vote: &StudyVote, score: f64) -> ClipVote {
         let clip = (vote.speaker.as_str(), vote.clip.as_str());
         ClipVote {
@@ -53,7 +52,6 @@ pub fn name_pairs<S: AsRef<str>>(names: &[S]) -> impl Iterator<Item = [&str; 2]>
     names.iter().enumerate().flat_map(|(k, a)| names[k + 1..].iter().map(move |b| [a.as_ref(), b.as_ref()]))
 }
 
-/// Vote with a binary outcome.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BinaryVote<'v> {
     /// Score 1 for success, otherwise 0.
@@ -120,7 +118,6 @@ pub fn clip_shares(votes: &[BinaryVote], numbering: &Numbering) -> Vec<ClipShare
     numbering.clips.iter().filter_map(share).collect()
 }
 
-/// Conditions in alphabetical order.
 pub fn conditions(votes: &[&StudyVote]) -> Vec<String> {
     let names: BTreeSet<&str> = votes.iter().flat_map(|vote| &vote.conditions).map(String::as_str).collect();
     names.into_iter().map(str::to_owned).collect()
@@ -143,7 +140,6 @@ pub fn differences(votes: &[&StudyVote], numbering: &Numbering, [first, second]:
     votes.iter().filter_map(one).collect()
 }
 
-/// Scores of one condition.
 pub fn scores(votes: &[&StudyVote], numbering: &Numbering, condition: &str) -> Vec<ClipVote> {
     let one = |vote: &&StudyVote| {
         let index = vote.conditions.iter().position(|name| name == condition)?;

@@ -15,7 +15,6 @@ pub struct Registration {
     pub title: String,
     /// Combined hash of the sealed study; `None` if the seal is broken.
     pub seal: Option<String>,
-    /// Notes on the validity of the registration.
     pub notes: Vec<String>,
     pub hypotheses: Vec<RegisteredHypothesis>,
     pub exclusion: ExclusionRules,
@@ -25,9 +24,6 @@ pub struct Registration {
 impl Registration {
     /// Reads the registration of a study folder. If the seal is broken, a note names the files that differ, and
     /// nothing counts as registered: the hypotheses may have been written after the data were seen.
-    ///
-    /// # Errors
-    /// The pre-registration is missing or damaged.
     pub fn of_folder(folder: &StudyFolder) -> Result<Self> {
         let registered = Preregistration::read(&folder.preregistration())?;
         let mismatch = match StudySeal::read(folder) {
@@ -97,7 +93,6 @@ fn judged_claims(task: &mut TaskAnalysis, claim: &StudyHypothesis, level: f64) -
     task.shares.iter_mut().filter(|share| is_about(share, claim, has_conditions)).map(judged).collect()
 }
 
-/// Description of a hypothesis.
 fn describe_claim(claim: &StudyHypothesis) -> String {
     let speakers = match (claim.per_speaker, claim.kind) {
         // Differences between conditions are estimated over all speakers only.

@@ -8,7 +8,6 @@ use crate::file::AnalysisSettings;
 use crate::plan::TaskDesign;
 use serde::Serialize;
 
-/// Analysis of a study.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct StudyAnalysis {
     pub version: u32,
@@ -21,22 +20,18 @@ pub struct StudyAnalysis {
     /// Rows of the source that are not valid votes.
     pub rejected: Vec<RejectedRow>,
     pub exclusions: ExclusionSummary,
-    /// Outcome of each registered hypothesis.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub hypotheses: Vec<JudgedHypothesis>,
     pub tasks: Vec<TaskAnalysis>,
-    /// Analyses of the tasks without exclusions.
     pub without_exclusions: Vec<TaskAnalysis>,
     pub notes: Vec<String>,
     /// Paragraph for the methods section of a paper.
     pub methods: String,
 }
 
-/// Registered hypothesis with its outcome.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct JudgedHypothesis {
     pub task: String,
-    /// Description of the hypothesis.
     pub claim: String,
     /// Registered statistic.
     pub statistic: String,
@@ -65,7 +60,6 @@ impl JudgedClaim {
     }
 }
 
-/// Settings of an analysis.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct StatisticSettings {
     /// Confidence level of the intervals.
@@ -75,7 +69,6 @@ pub struct StatisticSettings {
     /// Number of sign-flip draws and of bootstrap draws of participants; 0 skips both.
     pub n_draws: usize,
     pub seed: u64,
-    /// Whether mixed models are fitted.
     pub with_models: bool,
 }
 
@@ -87,7 +80,6 @@ impl StatisticSettings {
 }
 
 impl From<&AnalysisSettings> for StatisticSettings {
-    /// Converts registered settings.
     fn from(registered: &AnalysisSettings) -> Self {
         let AnalysisSettings { alpha, resamples, seed } = *registered;
         Self { confidence: 1.0 - alpha, n_draws: resamples, seed, ..Self::default() }
@@ -100,7 +92,6 @@ impl Default for StatisticSettings {
     }
 }
 
-/// Analysis of a task.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct TaskAnalysis {
     pub task: String,
@@ -151,6 +142,17 @@ pub enum ShareMeasure {
     JudgedReal,
 }
 
+impl ShareMeasure {
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::GeneratedChosen => "generated motion chosen",
+            Self::MatchedChosen => "matching motion chosen",
+            Self::Correct => "correct",
+            Self::JudgedReal => "judged real",
+        }
+    }
+}
+
 /// Proportion of votes, compared with chance where chance is defined.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ShareAnalysis {
@@ -184,7 +186,6 @@ impl ShareAnalysis {
     }
 }
 
-/// Proportion of the votes about one clip.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ClipShare {
     pub speaker: String,
@@ -194,7 +195,6 @@ pub struct ClipShare {
     pub share: f64,
 }
 
-/// Scores of a condition.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ScoreAnalysis {
     pub condition: String,
@@ -209,7 +209,6 @@ pub struct ScoreAnalysis {
     pub statistics: StatisticSet,
 }
 
-/// Comparison of two conditions.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct PairAnalysis {
     pub first: String,
@@ -231,7 +230,6 @@ pub struct PairAnalysis {
     pub conclusion: TestOutcome,
 }
 
-/// Bradley-Terry strength of a condition.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct StrengthEstimate {
     pub condition: String,
@@ -256,7 +254,6 @@ pub struct ModelEstimate {
     pub sd_clips: f64,
 }
 
-/// Outcome of a headline test and its equivalence test.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum TestOutcome {
@@ -301,7 +298,6 @@ impl TaskAnalysis {
         shares.chain(scores).chain(self.pairs.iter().map(|pair| &pair.statistics))
     }
 
-    /// All tests of the task.
     pub fn tests(&self) -> impl Iterator<Item = &TestResult> {
         self.statistic_sets().flat_map(|set| &set.tests).chain(&self.overall)
     }

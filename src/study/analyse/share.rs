@@ -6,15 +6,12 @@ use super::statistic::{StatisticMethod, StatisticSet, TestResult};
 use crate::stats::cluster::crossed::crossed_estimate;
 use crate::stats::cluster::sign_flips::{SideBlock, side_p, sign_flip_p};
 use crate::stats::cluster::votes::{ClipVote, participant_estimate, participant_sd};
-use crate::stats::equivalence::Equivalence;
 use crate::stats::glmm::fit::MixedLogit;
-use crate::stats::proportion::BinomialCount;
+use crate::stats::proportion::{BinomialCount, Equivalence};
 use std::collections::BTreeMap;
 
-/// Proportion of successes by guessing.
 pub const CHANCE: f64 = 0.5;
 
-/// Votes of one proportion.
 #[derive(Clone, Debug)]
 pub struct ShareCell<'v> {
     pub measure: ShareMeasure,
@@ -57,7 +54,6 @@ pub fn share(cell: &ShareCell, settings: &StatisticSettings) -> ShareAnalysis {
     analysis
 }
 
-/// Adds the methods that account for participants and clips.
 fn add_clustered(found: &mut StatisticSet, cell: &ShareCell, votes: &[ClipVote], settings: &StatisticSettings) {
     let confidence = settings.confidence;
     if let Some(estimate) = found.ok_or_record(StatisticMethod::Crossed, crossed_estimate(votes)) {
@@ -77,7 +73,6 @@ fn add_clustered(found: &mut StatisticSet, cell: &ShareCell, votes: &[ClipVote],
     }
 }
 
-/// Adds the methods that treat votes as independent.
 fn add_naive(found: &mut StatisticSet, n_successes: u64, n_votes: u64, settings: &StatisticSettings) {
     let Some(count) = found.ok_or_record(StatisticMethod::Binomial, BinomialCount::new(n_successes, n_votes)) else {
         return;
@@ -133,7 +128,7 @@ fn mixed_model(votes: &[ClipVote], found: &mut StatisticSet, confidence: f64) ->
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::simulate::{CrossedDesign, CrossedEffects, crossed_votes};
+    use crate::power::{CrossedDesign, CrossedEffects, crossed_votes};
 
     #[test]
     fn the_share_of_a_simulated_study_is_found() {

@@ -1,11 +1,10 @@
 //! Statistics of an analysis: intervals, tests and equivalence tests of one quantity by several methods, each with its
 //! origin, and those that could not be computed.
 
-use crate::stats::equivalence::Equivalence;
 use crate::stats::estimate::{ConfidenceInterval, StatisticsError, StudentEstimate, holm};
+use crate::stats::proportion::Equivalence;
 use serde::Serialize;
 
-/// Method of a statistic.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum StatisticMethod {
@@ -41,7 +40,6 @@ impl StatisticMethod {
         matches!(self, Self::WilcoxonVotes | Self::Median | Self::Wilson | Self::Binomial)
     }
 
-    /// Display name.
     pub fn name(self) -> &'static str {
         match self {
             Self::Crossed => "participants and clips crossed",
@@ -77,7 +75,6 @@ impl StatisticOrigin {
     }
 }
 
-/// Confidence interval.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct IntervalEstimate {
     #[serde(flatten)]
@@ -108,7 +105,6 @@ impl TestResult {
         Self { origin: StatisticOrigin::new(method), statistic: None, degrees_of_freedom: None, p, adjusted_p: None }
     }
 
-    /// Test of an estimate against `expected`.
     pub fn of_estimate(method: StatisticMethod, estimate: &StudentEstimate, expected: f64) -> Self {
         Self {
             statistic: Some(estimate.statistic(expected)),
@@ -243,7 +239,6 @@ impl StatisticSet {
     }
 }
 
-/// Interval and test of one method.
 pub struct StatisticRow<'s> {
     pub origin: StatisticOrigin,
     pub interval: Option<ConfidenceInterval>,

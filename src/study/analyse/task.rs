@@ -4,11 +4,10 @@ use super::conclusions::conclusions;
 use super::outcome::{
     BinaryVote, Numbering, binary, clip_shares, conditions, differences, measure, name_pairs, scores,
 };
-use super::pair::{overall, pairs, score_table, single_pairs};
+use super::pair::{overall, pairs, score_table, single_pairs, strengths};
 use super::result::{ShareAnalysis, ShareMeasure, StatisticSettings, TaskAnalysis};
 use super::share::{ShareCell, conclude, share};
 use super::statistic::{StatisticMethod, adjust};
-use super::strength::strengths;
 use crate::plan::TaskDesign;
 use crate::stats::cluster::votes::ClipVote;
 use crate::stats::estimate::StatisticsError;

@@ -1,9 +1,14 @@
-//! Scheduler of one speaker's clips for one task: assigns clips to sessions, each with a comparison and a screen
-//! arrangement. Also the random streams of a design.
+//! Clips of a design: the number per speaker that it needs so that no clip is repeated in a session, their allocation
+//! to purposes, and the scheduler of one speaker's clips for one task, which assigns clips to sessions, each with a
+//! comparison and a screen arrangement. Latin squares in which every item occurs equally often in every position and
+//! after every other item (Williams 1949), and the random streams of a design.
 
+use crate::file::{ClipReuse, StudyFile};
+use anyhow::{Result, ensure};
 use rand::SeedableRng;
 use rand::seq::SliceRandom;
 use rand_chacha::ChaCha8Rng;
+use std::collections::BTreeMap;
 
 /// Random stream of one purpose: a change to the draws of one purpose does not affect the others.
 pub(super) fn stream(seed: u64, purpose: &str) -> ChaCha8Rng {
@@ -79,10 +84,159 @@ fn lcm(a: usize, b: usize) -> usize {
     a / x * b
 }
 
+/// Rows of a carry-over-balanced Latin square of `n` items: `n` rows, or twice as many for an odd `n`.
+pub(super) fn williams(n: usize) -> Vec<Vec<usize>> {
+    // First row 0, 1, n - 1, 2, n - 2, ...: the differences of neighbours are all distinct modulo n.
+    let first: Vec<usize> =
+        (0..n).map(|position| if position % 2 == 1 { position / 2 + 1 } else { (n - position / 2) % n }).collect();
+    let mut rows: Vec<Vec<usize>> = (0..n).map(|shift| first.iter().map(|item| (item + shift) % n).collect()).collect();
+    if n % 2 == 1 && n > 1 {
+        let mirrored: Vec<Vec<usize>> = rows.iter().map(|row| row.iter().rev().copied().collect()).collect();
+        rows.extend(mirrored);
+    }
+    rows
+}
+
+/// Rows of a square, one per session in random order; every row is used once before any repeats.
+pub struct SquareRows {
+    square: Vec<Vec<usize>>,
+    order: Vec<usize>,
+    n_assigned: usize,
+    rng: ChaCha8Rng,
+}
+
+impl SquareRows {
+    pub fn new(n: usize, rng: ChaCha8Rng) -> Self {
+        let square = williams(n);
+        Self { order: (0..square.len()).collect(), square, n_assigned: 0, rng }
+    }
+
+    pub fn n_rows(&self) -> usize {
+        self.square.len()
+    }
+
+    pub fn next_row(&mut self) -> usize {
+        let n_rows = self.square.len().max(1);
+        if self.n_assigned.is_multiple_of(n_rows) {
+            self.order.shuffle(&mut self.rng);
+        }
+        self.n_assigned += 1;
+        self.order.get((self.n_assigned - 1) % n_rows).copied().unwrap_or(0)
+    }
+
+    /// Row with this index, modulo the number of rows.
+    pub fn row(&self, number: usize) -> &[usize] {
+        self.square.get(number % self.square.len().max(1)).map_or(&[], Vec::as_slice)
+    }
+}
+
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ClipNeeds {
+    pub reuse: ClipReuse,
+    /// Clips for the sound check and the practice trial.
+    pub practice: usize,
+    pub checks: usize,
+    pub training: Vec<usize>,
+    pub main: Vec<usize>,
+}
+
+impl ClipNeeds {
+    /// Minimum numbers for a study file; trials are divided evenly among its speakers.
+    pub fn of(file: &StudyFile) -> Self {
+        let share = |n: usize| n.div_ceil(file.speaker.len().max(1));
+        Self {
+            reuse: file.clips.reuse,
+            practice: 1,
+            checks: share(file.attention_checks),
+            training: file.task.iter().map(|task| share(task.training)).collect(),
+            main: file.task.iter().map(|task| share(task.trials)).collect(),
+        }
+    }
+
+    /// Total number of clips that each speaker needs.
+    pub fn total(&self) -> usize {
+        let of_tasks = |needs: &[usize]| match self.reuse {
+            ClipReuse::Never => needs.iter().sum::<usize>(),
+            ClipReuse::OtherTasks => needs.iter().copied().max().unwrap_or(0),
+        };
+        self.practice + self.checks + of_tasks(&self.training) + of_tasks(&self.main)
+    }
+
+    /// Checks that each speaker has enough clips.
+    ///
+    /// # Errors
+    /// Speakers have too few clips; the error names them, the number needed and remedies.
+    pub fn check(&self, file: &StudyFile, clips: &BTreeMap<String, Vec<String>>) -> Result<()> {
+        let n_clips = |name: &String| clips.get(name).map_or(0, Vec::len);
+        let few = file.speaker.iter().filter(|speaker| n_clips(&speaker.name) < self.total());
+        let few: Vec<String> = few.map(|speaker| format!("{} has {}", speaker.name, n_clips(&speaker.name))).collect();
+        let tasks = file.task.iter().zip(self.main.iter().zip(&self.training));
+        let tasks = tasks.map(|(task, (main, training))| format!("{main} + {training} for {}", task.name));
+        let tasks: Vec<String> = tasks.collect();
+        let remedy = match (self.reuse, Self { reuse: ClipReuse::OtherTasks, ..self.clone() }.total()) {
+            (ClipReuse::Never, fewer) if fewer < self.total() => {
+                format!(", or reuse = \"other-tasks\" in [clips], which needs {fewer}")
+            }
+            _ => String::new(),
+        };
+        ensure!(
+            few.is_empty(),
+            "{} clips per speaker are needed so that no clip is repeated in a session (trials and training: {}; \
+             attention checks: {}; practice: {}), but {}: use more recordings, shorter clips (seconds in [clips]), \
+             fewer trials{remedy}",
+            self.total(),
+            tasks.join(", "),
+            self.checks,
+            self.practice,
+            few.join(", ")
+        );
+        Ok(())
+    }
+}
+
+/// Names of one speaker's clips, by purpose.
+#[derive(Clone, Debug)]
+pub struct SharedClips {
+    pub practice: Vec<String>,
+    pub checks: Vec<String>,
+    pub training: Vec<Vec<String>>,
+    pub main: Vec<Vec<String>>,
+}
+
+impl SharedClips {
+    /// Allocates `clips`, which must be at least as many as needed; surplus clips go to the main trials in proportion to
+    /// their number.
+    pub fn new(needs: &ClipNeeds, mut clips: Vec<String>) -> Self {
+        let n_surplus = clips.len().saturating_sub(needs.total());
+        let mut take = |n: usize| clips.drain(..n.min(clips.len())).collect::<Vec<String>>();
+        let (practice, checks) = (take(needs.practice), take(needs.checks));
+        let n_tasks = needs.main.len();
+        match needs.reuse {
+            ClipReuse::Never => {
+                let training = needs.training.iter().map(|n| take(*n)).collect();
+                let total: usize = needs.main.iter().sum::<usize>().max(1);
+                // Rounding the cumulative share of each task makes the shares add up to all surplus clips.
+                let mut n_before = 0;
+                let main = needs.main.iter().map(|n| {
+                    let given = n_surplus * n_before / total;
+                    n_before += n;
+                    take(n + n_surplus * n_before / total - given)
+                });
+                Self { practice, checks, training, main: main.collect() }
+            }
+            ClipReuse::OtherTasks => {
+                let training = take(needs.training.iter().copied().max().unwrap_or(0));
+                let main = take(usize::MAX);
+                Self { practice, checks, training: vec![training; n_tasks], main: vec![main; n_tasks] }
+            }
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::collections::{BTreeMap, BTreeSet};
+    use std::collections::BTreeSet;
 
     proptest::proptest! {
         #[test]
@@ -117,5 +271,22 @@ mod tests {
                 }
             }
         }
+    }
+
+    #[test]
+    fn positions_and_neighbours_are_balanced() {
+        for n in 1..12 {
+            let rows = williams(n);
+            let (mut positions, mut neighbours) = (BTreeMap::new(), BTreeMap::new());
+            for row in &rows {
+                row.iter().enumerate().for_each(|at| *positions.entry(at).or_insert(0) += 1);
+                row.windows(2).for_each(|pair| *neighbours.entry((pair[0], pair[1])).or_insert(0) += 1);
+            }
+            assert_eq!((positions.len(), neighbours.len()), (n * n, n * (n - 1)));
+            assert!(positions.values().all(|count| count * n == rows.len()), "{n}: {rows:?}");
+            assert!(neighbours.values().all(|count| count * n == rows.len()), "{n}: {rows:?}");
+        }
+        assert_eq!(williams(1), [[0]]);
+        assert!(williams(0).is_empty());
     }
 }

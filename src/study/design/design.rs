@@ -1,9 +1,7 @@
 //! Designs a study from its file and its clips.
 
-use super::clip_needs::{ClipNeeds, SharedClips};
-use super::clip_scheduler::{ClipScheduler, stream};
+use super::clip_scheduler::{ClipNeeds, ClipScheduler, SharedClips, SquareRows, stream};
 use super::designer::{Designer, numbers};
-use super::latin_square::SquareRows;
 use super::task_design::{TaskBalance, TaskDesigner};
 use crate::file::StudyFile;
 use crate::plan::{FilmContent, PlannedTask, StudyPlan};
@@ -11,10 +9,8 @@ use anyhow::Result;
 use rand::seq::SliceRandom;
 use std::collections::BTreeMap;
 
-/// Version of the plan file format.
 const VERSION: u32 = 1;
 
-/// Plan of a study and the balance of its votes.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DesignedStudy {
     pub plan: StudyPlan,
@@ -124,7 +120,6 @@ mod tests {
         StudyFile::read(Path::new(&path)).unwrap()
     }
 
-    /// Asserts the invariants of every design.
     fn check(file: &StudyFile, designed: &DesignedStudy, films: &Films) {
         let plan = &designed.plan;
         assert_eq!(plan.sessions.len(), file.n_sessions());

@@ -1,9 +1,7 @@
 //! Builds sessions one after another: task blocks with practice, training and main trials, and attention checks among
 //! the main trials.
 
-use super::clip_needs::SharedClips;
-use super::clip_scheduler::{ClipScheduler, stream};
-use super::latin_square::SquareRows;
+use super::clip_scheduler::{ClipScheduler, SharedClips, SquareRows, stream};
 use super::task_design::{AssignedTrial, TaskBalance, TaskDesigner, assign, right_response};
 use crate::file::{FilmLayout, StudyCondition, StudyFile, StudyTask, TaskOrder};
 use crate::plan::{FilmContent, FilmSound, PlannedSession, Trial, TrialPhase};
@@ -13,7 +11,6 @@ use rand::Rng;
 use rand::seq::SliceRandom;
 use rand_chacha::ChaCha8Rng;
 
-/// State of a design between sessions.
 pub(super) struct Designer<'a> {
     pub file: &'a StudyFile,
     /// Allocated clips, by speaker.
@@ -83,7 +80,6 @@ impl Designer<'_> {
         Ok(PlannedSession { trials })
     }
 
-    /// Training trials of a task in a session.
     fn training(&mut self, at: usize, session: usize) -> Result<Vec<Trial>> {
         let assigned = self.tasks[at].training(session);
         let trial = |trial: AssignedTrial| {
@@ -173,7 +169,6 @@ impl Designer<'_> {
     }
 }
 
-/// Audio track of the films of a task.
 fn film_sound(task: &StudyTask) -> FilmSound {
     if task.sound { FilmSound::Speech } else { FilmSound::Silence }
 }

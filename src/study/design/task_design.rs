@@ -1,16 +1,13 @@
 //! Design of one task over all sessions: the comparisons of its trials, their correct responses, its clip schedulers, the
 //! order of its trials, and the balance of votes over its cells.
 
-use super::clip_needs::SharedClips;
-use super::clip_scheduler::{AssignedClip, ClipScheduler, stream};
-use super::latin_square::SquareRows;
+use super::clip_scheduler::{AssignedClip, ClipScheduler, SharedClips, SquareRows, stream};
 use crate::file::{StudyCondition, StudyFile, StudyTask};
 use crate::plan::TaskDesign;
 use crate::vote::{Response, ScreenSide};
 use std::collections::{BTreeMap, VecDeque};
 use std::fmt;
 
-/// Conditions compared in one trial.
 pub(super) type ComparedConditions<'a> = Vec<&'a StudyCondition>;
 
 /// Comparisons of a task, each of which gets an equal share of the trials. With single films the real condition is as
@@ -55,7 +52,6 @@ pub struct AssignedTrial {
     pub assigned: AssignedClip,
 }
 
-/// State of a task between sessions.
 pub struct TaskDesigner<'a> {
     pub task: &'a StudyTask,
     pub comparisons: Vec<ComparedConditions<'a>>,
@@ -101,12 +97,10 @@ impl<'a> TaskDesigner<'a> {
         }
     }
 
-    /// Practice trial of a session.
     pub fn practice(&mut self, session: usize) -> Vec<AssignedTrial> {
         assign(&mut self.practice, 1, session)
     }
 
-    /// Training trials of a session.
     pub fn training(&mut self, session: usize) -> Vec<AssignedTrial> {
         assign(&mut self.training, self.task.training, session + self.number)
     }
@@ -155,7 +149,6 @@ pub struct TaskBalance {
 }
 
 impl TaskBalance {
-    /// Balance without votes.
     pub fn new(designer: &TaskDesigner, n_clips: &[usize]) -> Self {
         let of_speaker = |(speaker, n): (usize, &usize)| (0..*n).map(move |clip| (speaker, clip)).collect::<Vec<_>>();
         let clips = n_clips.iter().enumerate().flat_map(of_speaker);

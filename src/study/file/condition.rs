@@ -3,7 +3,6 @@
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
-/// Condition of a study.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "WrittenCondition", into = "WrittenCondition")]
 pub struct StudyCondition {
@@ -65,7 +64,6 @@ enum ConditionKind {
     Files,
 }
 
-/// Condition as written in the study file.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct WrittenCondition {

@@ -3,7 +3,7 @@
 use super::layers::{self, StudyPreset};
 use super::rules;
 use super::study_file::{StudyFile, fill_defaults};
-use crate::pages::page_texts::text_keys;
+use crate::pages::assets::text_keys;
 use anyhow::{Context, Result};
 use orator_base::input;
 use orator_base::stage::workdir;
@@ -16,7 +16,6 @@ use std::path::{Path, PathBuf};
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-/// Documented example of a study file.
 pub const EXAMPLE: &str = include_str!("example.toml");
 
 impl StudyFile {

@@ -2,7 +2,7 @@
 
 use super::condition::{ConditionSource, StudyCondition};
 use super::study_file::{FilmLayout, HypothesisKind, StudyFile, StudyHypothesis, StudyTask};
-use crate::pages::page_texts::text_keys;
+use crate::pages::assets::text_keys;
 use crate::plan::TaskDesign;
 use orator_dataset::config::file::did_you_mean;
 use std::collections::BTreeSet;

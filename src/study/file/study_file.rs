@@ -41,7 +41,6 @@ pub struct StudyFile {
     /// Whether the training trials of all tasks precede the analysed trials of the first task.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub training_first: bool,
-    /// Attention checks per session.
     #[serde(default = "two")]
     pub attention_checks: usize,
     #[serde(default)]
@@ -88,7 +87,6 @@ fn english() -> Vec<String> {
     vec!["en".to_owned()]
 }
 
-/// Order of the tasks in a session.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum TaskOrder {
@@ -99,7 +97,6 @@ pub enum TaskOrder {
     Written,
 }
 
-/// Settings for cutting and allocating clips.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct ClipSettings {
@@ -127,7 +124,6 @@ pub enum ClipReuse {
     OtherTasks,
 }
 
-/// Settings of the films.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct FilmSettings {
@@ -186,7 +182,6 @@ pub struct StudySpeaker {
     /// Folder of a dataset with speech and natural motion.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub dataset: Option<PathBuf>,
-    /// Split of the dataset.
     #[serde(default = "test_split")]
     pub split: Split,
     /// Glob pattern of sound files with speech only.
@@ -221,7 +216,6 @@ pub struct StudyTask {
     /// Whether films may be replayed.
     #[serde(default)]
     pub replay: bool,
-    /// Whether the films have sound.
     #[serde(default = "yes")]
     pub sound: bool,
     /// Scale of the sliders: `human-likeness` or `appropriateness`; empty for other designs.
@@ -265,7 +259,6 @@ pub struct AnalysisSettings {
     pub alpha: f64,
     /// Number of sign-flip draws and of bootstrap draws of participants.
     pub resamples: usize,
-    /// Seed of these draws.
     pub seed: u64,
 }
 
@@ -275,7 +268,6 @@ impl Default for AnalysisSettings {
     }
 }
 
-/// Hypothesis about one task.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct StudyHypothesis {
@@ -284,7 +276,6 @@ pub struct StudyHypothesis {
     /// The two conditions that the hypothesis compares; if empty, every pair of the task.
     #[serde(default)]
     pub conditions: Vec<String>,
-    /// Whether each speaker is tested separately.
     #[serde(default)]
     pub per_speaker: bool,
     /// Equivalence bound on either side of chance, percentage points.
@@ -292,7 +283,6 @@ pub struct StudyHypothesis {
     pub points: Option<f64>,
 }
 
-/// Claim of a hypothesis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum HypothesisKind {

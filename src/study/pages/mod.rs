@@ -2,4 +2,3 @@
 //! without libraries; nothing is loaded from other hosts, and there are no inline scripts or styles.
 
 pub mod assets;
-pub mod page_texts;

@@ -4,12 +4,10 @@
 use super::answer::{check, fails_check, feedback};
 use super::reply::{ApiError, JsonBody, bearer_token, header_text, json_reply, not_found, unauthorized};
 use super::secret::{completion_code, is_attempt, participant_id};
-use super::served_study::ServedStudy;
-use super::study_server::App;
+use super::study_server::{App, ServedStudy};
 use crate::plan::TrialPhase;
-use crate::store::answers::{self, RecordOutcome, SubmittedAnswer, TrialTerms, record};
+use crate::store::answers::{self, RecordOutcome, SubmittedAnswer, TrialStart, TrialTerms, record};
 use crate::store::participants::{self, BeginOutcome, NewParticipant, PARAMETERS, Participant, Status};
-use crate::store::starts::{self, TrialStart};
 use crate::vote::Response;
 use axum::body::Body;
 use axum::extract::{FromRequestParts, Path, Request, State};
@@ -187,7 +185,7 @@ pub async fn start(
     if !is_attempt(&start.load) {
         return Err(ApiError::bad_request("The field load must be 32 hexadecimal digits."));
     }
-    let known = app.store.write(move |db| starts::record(db, &id, session, &start)).await?;
+    let known = app.store.write(move |db| answers::record_start(db, &id, session, &start)).await?;
     if known { Ok(json_reply(&json!({ "known": true }))) } else { Err(unknown()) }
 }
 

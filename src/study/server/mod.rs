@@ -3,13 +3,9 @@
 
 pub mod answer;
 pub mod api;
-pub mod clock;
 pub mod host;
 pub mod limits;
 pub mod listen;
-pub mod peer_limit;
 pub mod reply;
 pub mod secret;
-pub mod served_study;
 pub mod study_server;
-pub mod write_timeout;

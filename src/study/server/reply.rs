@@ -1,7 +1,7 @@
 //! Requests and replies: JSON bodies, bearer tokens, errors as a sentence with a status, and the headers of every
 //! reply.
 
-use crate::store::writer::NotStored;
+use crate::store::database::NotStored;
 use axum::body::Bytes;
 use axum::extract::{FromRequest, Request};
 use axum::http::header::{self, HeaderName};
@@ -29,7 +29,6 @@ pub const HEADERS: [(HeaderName, &str); 7] = [
     ),
 ];
 
-/// Error reply with a sentence for the client.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ApiError {
     pub status: StatusCode,
@@ -113,12 +112,10 @@ pub fn text_reply(content_type: &'static str, text: &'static str) -> HttpRespons
     ([(header::CONTENT_TYPE, content_type), (header::CACHE_CONTROL, "no-cache")], text).into_response()
 }
 
-/// Reply for unknown paths.
 pub async fn not_found() -> ApiError {
     ApiError::new(StatusCode::NOT_FOUND, "This address does not exist.")
 }
 
-/// Reply for unsupported methods of a path.
 pub async fn method_not_allowed() -> ApiError {
     ApiError::new(StatusCode::METHOD_NOT_ALLOWED, "This address does not accept the method of the request.")
 }
@@ -142,10 +139,6 @@ impl<T: DeserializeOwned, S: Send + Sync> FromRequest<S> for JsonBody<T> {
     }
 }
 
-/// Token of the header `Authorization: Bearer TOKEN`.
-///
-/// # Errors
-/// The header is missing or malformed.
 pub fn bearer_token(headers: &HeaderMap) -> Result<&str, ApiError> {
     let token = header_text(headers, header::AUTHORIZATION).and_then(|text| text.strip_prefix("Bearer "));
     token.ok_or_else(unauthorized)

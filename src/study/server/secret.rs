@@ -18,9 +18,6 @@ const TOKEN_BYTES: usize = 4 + ID_BYTES + blake3::OUT_LEN;
 const CODE_LETTERS: &[u8; 32] = b"ABCDEFGHJKLMNPQRSTUVWXYZ23456789";
 
 /// Cryptographically secure random bytes.
-///
-/// # Errors
-/// `/dev/urandom` cannot be read.
 pub fn random<const N: usize>() -> Result<[u8; N]> {
     let mut bytes = [0; N];
     let read = File::open("/dev/urandom").and_then(|mut source| source.read_exact(&mut bytes));

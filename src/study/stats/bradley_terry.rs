@@ -12,7 +12,6 @@ use rand::Rng;
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 
-/// Maximum number of Newton steps.
 const MAX_STEPS: usize = 100;
 /// Maximum proportion of bootstrap draws without finite strengths.
 const MAX_FAILED_DRAWS: f64 = 0.05;

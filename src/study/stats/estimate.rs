@@ -23,18 +23,15 @@ pub enum StatisticsError {
     Unconnected { what: &'static str },
 }
 
-/// Returns an error if `found` is less than `min`.
 pub fn at_least(what: &'static str, min: usize, found: usize) -> Result<(), StatisticsError> {
     if found < min { Err(StatisticsError::TooFew { what, min, found }) } else { Ok(()) }
 }
 
-/// Returns an error if `value` is outside `range` or NaN.
 pub fn within(what: &'static str, value: f64, range: RangeInclusive<f64>) -> Result<(), StatisticsError> {
     let (min, max) = (*range.start(), *range.end());
     if range.contains(&value) { Ok(()) } else { Err(StatisticsError::OutOfRange { what, value, min, max }) }
 }
 
-/// Returns an error if a value is NaN or infinite.
 pub fn finite(what: &'static str, values: &[f64]) -> Result<(), StatisticsError> {
     if values.iter().all(|value| value.is_finite()) { Ok(()) } else { Err(StatisticsError::NotFinite { what }) }
 }

@@ -1,13 +1,11 @@
 //! Compares statistics with scipy, statsmodels and krippendorff (`fixtures/reference/study_stats.py`).
 
-use super::equivalence::Equivalence;
 use super::estimate::{StudentEstimate, holm};
-use super::proportion::BinomialCount;
+use super::proportion::{BinomialCount, Equivalence};
 use super::rank::{MeasurementScale, alpha, friedman, median_interval, signed_rank};
 use serde::de::DeserializeOwned;
 use serde_json::Value;
 
-/// Golden cases of a statistic.
 fn cases(statistic: &str) -> Vec<Value> {
     let golden: Value =
         serde_json::from_str(include_str!("../../../fixtures/reference/study_stats_golden.json")).unwrap();

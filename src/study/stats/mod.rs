@@ -6,7 +6,6 @@
 
 pub mod bradley_terry;
 pub mod cluster;
-pub mod equivalence;
 pub mod estimate;
 pub mod glmm;
 pub mod proportion;

@@ -1,7 +1,9 @@
-//! Proportions of independent trials: Wilson and exact intervals, exact binomial test. Votes of one participant or
-//! about one clip are not independent; use `cluster` for those.
+//! Proportions of independent trials: Wilson and exact intervals, exact binomial test; votes of one participant or
+//! about one clip are not independent, use `cluster` for those. Equivalence by two one-sided tests (TOST, Schuirmann
+//! 1987), with a bound fixed before the data are seen: a non-significant difference does not show equivalence.
 
-use super::estimate::{ConfidenceInterval, StatisticsError, at_least, tail, within};
+use super::estimate::{ConfidenceInterval, StatisticsError, StudentEstimate, at_least, tail, within};
+use serde::Serialize;
 use statrs::distribution::{Beta, Binomial, ContinuousCDF, Discrete, DiscreteCDF, Normal};
 
 /// Relative tolerance within which outcomes count as equally likely as the observed one (as in scipy's `binomtest`).
@@ -90,7 +92,6 @@ impl BinomialCount {
     }
 }
 
-/// Probability of at least `outcome` successes.
 fn tail_from(distribution: &Binomial, outcome: u64) -> f64 {
     outcome.checked_sub(1).map_or(1.0, |before| distribution.sf(before))
 }
@@ -103,6 +104,62 @@ fn partition_point(mut low: u64, mut high: u64, holds: impl Fn(u64) -> bool) -> 
         if holds(middle) { high = middle } else { low = middle + 1 }
     }
     low
+}
+
+/// Significance level of each one-sided test.
+const LEVEL: f64 = 0.05;
+
+/// Result of two one-sided tests.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Equivalence {
+    /// Equivalence bound, in the unit of the estimate: 0.05 is 5 percentage points of a proportion.
+    pub bound: f64,
+    /// Larger of the two one-sided p values.
+    pub p: f64,
+    /// 90 % interval of the value; inside the bounds if and only if the test passes.
+    #[serde(flatten)]
+    pub interval: ConfidenceInterval,
+}
+
+impl Equivalence {
+    /// Tests at 5 % whether the true value of `estimate` is less than `bound` away from `expected`.
+    ///
+    /// # Errors
+    /// `bound` is not positive.
+    pub fn of_estimate(estimate: &StudentEstimate, expected: f64, bound: f64) -> Result<Self, StatisticsError> {
+        within("bound", bound, f64::MIN_POSITIVE..=f64::MAX)?;
+        let above = estimate.upper_tail(estimate.statistic(expected - bound));
+        let below = estimate.upper_tail(-estimate.statistic(expected + bound));
+        Ok(Self { bound, p: above.max(below), interval: estimate.interval(1.0 - 2.0 * LEVEL)? })
+    }
+
+    /// Exact binomial version for independent trials; both bounds must lie between 0 and 1.
+    ///
+    /// # Errors
+    /// A bound is outside 0 to 1.
+    pub fn of_count(count: &BinomialCount, expected: f64, bound: f64) -> Result<Self, StatisticsError> {
+        within("bound", bound, f64::MIN_POSITIVE..=1.0)?;
+        let p = count.at_least(expected - bound)?.max(count.at_most(expected + bound)?);
+        Ok(Self { bound, p, interval: count.exact(1.0 - 2.0 * LEVEL)? })
+    }
+
+    /// Whether equivalence within the bound is significant at 5 %.
+    pub fn passes(&self) -> bool {
+        self.p < LEVEL
+    }
+}
+
+/// Number of independent votes for which two one-sided tests at 5 % pass with probability `power` if the true
+/// proportion is one half: (z(0.95) + z((1 + power) / 2))^2 / (4 bound^2), rounded up.
+///
+/// # Errors
+/// `bound` is outside 1e-6 to 0.5, or `power` is outside 0 to below 1.
+pub fn votes_needed(bound: f64, power: f64) -> Result<u64, StatisticsError> {
+    within("bound", bound, 1e-6..=0.5)?;
+    within("power", power, 0.0..=1.0 - f64::EPSILON)?;
+    let normal = Normal::standard();
+    let z = normal.inverse_cdf(1.0 - LEVEL) + normal.inverse_cdf((1.0 + power) / 2.0);
+    Ok((z * z / (4.0 * bound * bound)).ceil() as u64)
 }
 
 #[cfg(test)]
@@ -131,5 +188,38 @@ mod tests {
         assert!((all.test(0.5).unwrap() - 2.0 * 0.5f64.powi(20)).abs() < 1e-18);
         assert!(BinomialCount::new(0, 0).is_err() && BinomialCount::new(3, 2).is_err());
         assert!(none.test(f64::NAN).is_err() && none.test(1.5).is_err() && none.wilson(0.0).is_err());
+    }
+
+    /// 1,050 of 2,000 votes, the pooled counts of Rebol, Guetl and Pietroszek 2021, section 4.5.
+    #[test]
+    fn pooled_votes_of_the_paper_are_equivalent_to_chance() {
+        let count = BinomialCount::new(1050, 2000).unwrap();
+        let exact = |bound| Equivalence::of_count(&count, 0.5, bound).unwrap();
+        assert!((exact(0.10).p / 6.51e-12 - 1.0).abs() < 0.01 && exact(0.10).passes(), "{}", exact(0.10).p);
+        assert!((exact(0.05).p - 0.0131).abs() < 5e-5 && exact(0.05).passes(), "{}", exact(0.05).p);
+        assert!(!exact(0.03).passes());
+        let estimate = StudentEstimate::new(0.525, (0.525f64 * 0.475 / 2000.0).sqrt(), f64::INFINITY).unwrap();
+        let asymptotic = Equivalence::of_estimate(&estimate, 0.5, 0.05).unwrap();
+        assert!((asymptotic.p - 0.0126).abs() < 5e-5, "{}", asymptotic.p);
+    }
+
+    #[test]
+    fn votes_for_equivalence_follow_the_formula() {
+        assert_eq!([0.05, 0.10].map(|bound| votes_needed(bound, 0.9).unwrap()), [1083, 271]);
+        assert!(votes_needed(0.0, 0.9).is_err() && votes_needed(0.05, 1.0).is_err());
+    }
+
+    /// The interval is inside the bounds exactly where the test passes.
+    #[test]
+    fn interval_and_p_value_agree() {
+        for value in [0.47, 0.5, 0.52, 0.529, 0.531, 0.56] {
+            let estimate = StudentEstimate::new(value, 0.012, 39.0).unwrap();
+            let test = Equivalence::of_estimate(&estimate, 0.5, 0.05).unwrap();
+            let inside = test.interval.low > 0.45 && test.interval.high < 0.55;
+            assert_eq!(inside, test.passes(), "{value}");
+        }
+        let estimate = StudentEstimate::new(0.5, 0.01, 9.0).unwrap();
+        assert!(Equivalence::of_estimate(&estimate, 0.5, f64::NAN).is_err());
+        assert!(Equivalence::of_count(&BinomialCount::new(1, 2).unwrap(), 0.95, 0.1).is_err());
     }
 }

@@ -6,7 +6,6 @@
 use super::estimate::{ConfidenceInterval, StatisticsError, at_least, finite, tail};
 use statrs::distribution::{Binomial, ChiSquared, ContinuousCDF, DiscreteCDF, Normal};
 
-/// Result of a rank test.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RankTest {
     /// Wilcoxon: the smaller of the rank sums of positive and negative differences. Friedman: chi-squared.

@@ -18,7 +18,6 @@ pub(super) const MAX_HIDDEN: f64 = 0.25;
 /// Minimum proportion of speech in a clip.
 const MIN_SPEECH: f64 = 0.3;
 
-/// Clip of a speaker's speech.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct StudyClip {
     /// Name `segment-frame`, unique per speaker.
@@ -36,7 +35,6 @@ pub struct StudyClip {
 }
 
 impl StudyClip {
-    /// Whether the clip starts and ends in a pause.
     pub fn ends_in_pauses(&self) -> bool {
         self.cut_db <= GRADES[2].0
     }
@@ -58,7 +56,6 @@ pub struct CutSpeech {
     pub rejected: Vec<RejectedSegment>,
 }
 
-/// Candidate for a clip.
 struct CutCandidate {
     start: usize,
     cut_db: f32,

@@ -15,9 +15,7 @@ use orator_media::ffmpeg::write::encode::{VideoWriter, has_h264};
 use orator_media::opencv::draw;
 use std::path::Path;
 
-/// Camera of the films with one avatar.
 const CAMERA: FilmCamera = FilmCamera::Front;
-/// Frame rate of side-by-side films.
 const SIDE_BY_SIDE_FPS: FrameRate = FrameRate::new(30, 1);
 /// Key derivation context of the film names.
 const NAME_CONTEXT: &str = "orator study 2026 names of films";
@@ -46,7 +44,6 @@ pub fn stage(layout: FilmLayout, shown: &[&Performance], size: [usize; 2]) -> Op
     }
 }
 
-/// Content of a film.
 pub struct FilmScene<'a> {
     /// Performances of the avatars at the film's rate and of equal length, left to right.
     pub performances: &'a [Performance],
@@ -118,9 +115,6 @@ impl FilmScene<'_> {
     }
 
     /// Writes the mp4 directly to `path`, not atomically.
-    ///
-    /// # Errors
-    /// The film has no avatar or cannot be written.
     pub fn write(&self, path: &Path) -> Result<()> {
         let first = self.performances.first().context("the film has no avatar")?;
         let fps = first.clip.fps;
@@ -138,7 +132,6 @@ impl FilmScene<'_> {
     }
 }
 
-/// Draws the number on a plate in the centre of the picture.
 fn draw_number(image: &mut Image, number: u16) -> Result<()> {
     let text = number.to_string();
     let digits = DIGIT_HEIGHT * image.height as f32;

@@ -1,8 +1,7 @@
 //! Speakers with their clips, the performance of each condition for each clip, and the clips' sounds at equal loudness:
 //! everything that is rendered into films.
 
-use super::common_motion::{CommonBody, CommonVisibility};
-use super::condition_motion::{ConditionModels, ShownMotion, motions, sound_of};
+use super::condition_motion::{CommonBody, CommonVisibility, ConditionModels, ShownMotion, motions, sound_of};
 use super::cut::{CutSpeech, MAX_HIDDEN, StudyClip, cut};
 use super::film::{self, FilmScene};
 use super::speaker_source::SpeakerSource;
@@ -46,7 +45,6 @@ pub struct CutSpeaker {
     pub tones: Option<Sound>,
 }
 
-/// Speaker whose films can be rendered.
 pub struct FilmedSpeaker {
     clips: Vec<StudyClip>,
     sounds: Vec<Sound>,
@@ -56,7 +54,6 @@ pub struct FilmedSpeaker {
     performances: BTreeMap<String, Vec<(usize, Performance)>>,
     /// By mismatched condition whose other clips the design draws, then by clip: the motions that it may show.
     drawn: BTreeMap<String, Vec<ShownMotion>>,
-    /// Visibility of the films of each clip.
     visibilities: Vec<CommonVisibility>,
     body: CommonBody,
     stage: AvatarStage,
@@ -68,9 +65,6 @@ impl CutSpeaker {
     }
 
     /// Cuts `n_clips` clips of a speaker, or fewer if there are no more; `rank` orders clips of equal grade.
-    ///
-    /// # Errors
-    /// A dataset, sound or checkpoint of the study file cannot be read.
     pub fn new(file: &StudyFile, speaker: &StudySpeaker, n_clips: usize, rank: impl Fn(&str) -> u64) -> Result<Self> {
         let name = &speaker.name;
         let models = ConditionModels::open(&file.condition, name)?;
@@ -167,7 +161,6 @@ pub fn normalise_loudness<'s>(sounds: impl Iterator<Item = &'s mut Sound>) -> f6
 }
 
 impl FilmedSpeaker {
-    /// Index of the clip `speaker/clip`.
     fn find(&self, clip: &str) -> Option<usize> {
         let name = clip.rsplit('/').next().unwrap_or(clip);
         self.clips.iter().position(|known| known.name == name)
@@ -175,9 +168,6 @@ impl FilmedSpeaker {
 
     /// Name `speaker/clip` of the clip whose motion the left avatar shows in the film with this content, unless the
     /// design draws it.
-    ///
-    /// # Errors
-    /// The speaker does not have the clip or the condition.
     pub fn motion_of(&self, content: &FilmContent) -> Result<String> {
         let (of, _) = self.shown(content)?;
         Ok(format!("{}/{}", content.speaker, self.clips[*of].name))
@@ -190,9 +180,6 @@ impl FilmedSpeaker {
     }
 
     /// Performance of the left avatar of the film with this content, at the film's rate.
-    ///
-    /// # Errors
-    /// The speaker does not have the clips or the condition.
     fn performance(&self, content: &FilmContent) -> Result<Performance> {
         if let Some(motions) = self.drawn.get(&content.condition) {
             let missing = || format!("no motion of the clip {} for the clip {}", content.motion_of, content.clip);
@@ -206,15 +193,11 @@ impl FilmedSpeaker {
     }
 
     /// Performances of the film with this content at the film's rate, left to right.
-    ///
-    /// # Errors
-    /// The speaker does not have the clip or a condition.
     pub fn performances(&self, content: &FilmContent) -> Result<Vec<Performance>> {
         let right = content.right_alone().map(|right| self.performance(&right));
         std::iter::once(self.performance(content)).chain(right).collect()
     }
 
-    /// Scene of the film with this content and its performances.
     pub fn scene<'a>(&'a self, content: &FilmContent, performances: &'a [Performance]) -> FilmScene<'a> {
         let sound = match content.sound {
             FilmSound::Speech => self.find(&content.clip).and_then(|clip| self.sounds.get(clip)),

@@ -1,7 +1,6 @@
 //! Films of a study: speech is cut into clips at pauses, the motions of all conditions are put on one rig with the same
 //! visibility, and films are written so that only their motion reveals the condition.
 
-pub mod common_motion;
 pub mod condition_motion;
 pub mod cut;
 pub mod film;

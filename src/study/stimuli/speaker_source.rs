@@ -14,10 +14,8 @@ use orator_formats::transcript::{Transcript, Word};
 use orator_media::ffmpeg::audio;
 use std::path::{Path, PathBuf};
 
-/// Source of the speech of one speaker.
 pub struct SpeakerSource {
     pub name: String,
-    /// Frame rate of the motion.
     pub fps: FrameRate,
     /// Bone lengths of the speaker, metres, 0 if unknown; empty without a dataset.
     pub bone_lengths: Vec<f32>,
@@ -25,7 +23,6 @@ pub struct SpeakerSource {
     segments: Vec<SourceSegment>,
 }
 
-/// Continuous segment of speech.
 struct SourceSegment {
     name: String,
     location: SegmentLocation,
@@ -36,7 +33,6 @@ enum SegmentLocation {
     File(PathBuf),
 }
 
-/// Segment of speech in memory.
 pub struct SpeechSegment {
     /// Name, unique for the speaker.
     pub name: String,
@@ -102,10 +98,6 @@ impl SpeakerSource {
         self.segments.len()
     }
 
-    /// Reads the segment with this index.
-    ///
-    /// # Errors
-    /// The segment's sound, motion or transcript cannot be read.
     pub fn read(&self, segment: usize) -> Result<SpeechSegment> {
         let SourceSegment { name, location } = &self.segments[segment];
         match (location, &self.dataset) {

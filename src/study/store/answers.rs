@@ -1,15 +1,15 @@
-//! Stored answers: one per trial, in the order of the session, never changed.
+//! Stored answers: one per trial, in the order of the session, never changed. Starts of trials: in how many loads of
+//! the page the films of a trial began to play; with more than one, the page was reloaded and films were seen again.
 
 use super::participants::{Participant, Status, find};
 use crate::vote::Response;
 use rusqlite::{Connection, OptionalExtension, Row, params};
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
 
-/// Answer to a trial as sent by a page.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SubmittedAnswer {
-    /// Index of the trial in its session.
     pub position: u32,
     pub response: Response,
     /// Number of times the films were played.
@@ -30,13 +30,10 @@ pub struct TrialTerms {
     /// Minimum time from the first presentation of the trial to its answer, milliseconds: before, its films cannot have
     /// been watched.
     pub min_ms: i64,
-    /// Whether the trial is the last of its session.
     pub is_last: bool,
-    /// Whether the answer fails an attention check.
     pub fails_check: bool,
 }
 
-/// Result of recording an answer.
 #[derive(Clone, Debug, PartialEq)]
 pub enum RecordOutcome {
     /// The answer is stored, now or earlier; current state of the participant.
@@ -54,9 +51,6 @@ pub enum RecordOutcome {
 }
 
 /// Stores `answer` of the participant `id`.
-///
-/// # Errors
-/// The database fails; nothing is stored.
 pub fn record(
     db: &Connection,
     id: &str,
@@ -124,21 +118,119 @@ fn at(db: &Connection, id: &str, position: u32) -> rusqlite::Result<Option<Submi
     db.query_row(&sql, params![id, position], of_row).optional()
 }
 
-/// Answers of a participant by position.
 pub fn of(db: &Connection, id: &str) -> rusqlite::Result<Vec<SubmittedAnswer>> {
     let sql = format!("SELECT {COLUMNS} FROM answer WHERE participant = ?1 ORDER BY position");
     db.prepare(&sql)?.query_map([id], of_row)?.collect()
 }
 
-/// Number and total duration of stalls.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct StallCount {
     pub trials: u32,
     pub secs: f64,
 }
 
-/// Counts the answers with stalled films.
 pub fn stalls(db: &Connection) -> rusqlite::Result<StallCount> {
     let sql = "SELECT COUNT(*), TOTAL(stalled_secs) FROM answer WHERE stalled_secs > 0";
     db.query_row(sql, [], |row| Ok(StallCount { trials: row.get(0)?, secs: row.get(1)? }))
+}
+
+/// Start of a trial's films as sent by a page.
+#[derive(Clone, Debug, PartialEq, Eq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TrialStart {
+    /// Index of the trial in its session.
+    pub position: u32,
+    /// Random number of the load of the page.
+    pub load: String,
+}
+
+/// Counts the start unless the same load of the page has sent it already; returns whether the participant `id` is known
+/// in this session. Starts of other trials than the current one are ignored.
+pub fn record_start(db: &Connection, id: &str, session: u32, start: &TrialStart) -> rusqlite::Result<bool> {
+    let found = find(db, id)?.filter(|participant| participant.session == session);
+    let Some(participant) = found else { return Ok(false) };
+    if participant.status == Status::Active && participant.position == start.position {
+        // One row per trial, so that requests cannot fill the database.
+        let sql = "INSERT INTO start VALUES (?1, ?2, ?3, 1) ON CONFLICT (participant, position) \
+            DO UPDATE SET load = excluded.load, loads = loads + 1 WHERE load <> excluded.load";
+        db.execute(sql, params![id, start.position, start.load])?;
+    }
+    Ok(true)
+}
+
+/// Number of reloads of a participant after a film began, by position of the trial; trials without any are absent.
+pub fn reloads(db: &Connection, id: &str) -> rusqlite::Result<BTreeMap<u32, u32>> {
+    let sql = "SELECT position, loads - 1 FROM start WHERE participant = ?1 AND loads > 1";
+    db.prepare(sql)?.query_map([id], |row| Ok((row.get(0)?, row.get(1)?)))?.collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::database;
+    use super::super::participants::{BeginOutcome, NewParticipant, Quota, begin, withdraw};
+    use super::*;
+
+    const QUOTA: Quota =
+        Quota { n_sessions: 1, target: 1, excluded_from: None, abandoned_ms: 3_600_000, unanswered_ms: 300_000 };
+
+    fn begun(db: &Connection, name: &str, now_ms: i64) {
+        let id = name.to_owned();
+        let new = NewParticipant { id, language: "en".to_owned(), parameters: BTreeMap::new(), code: String::new() };
+        assert!(matches!(begin(db, &new, QUOTA, now_ms).unwrap(), BeginOutcome::Begun(_)));
+    }
+
+    fn start(db: &Connection, position: u32, load: &str) -> bool {
+        record_start(db, "p", 0, &TrialStart { position, load: load.to_owned() }).unwrap()
+    }
+
+    fn n_rows(db: &Connection) -> u32 {
+        db.query_row("SELECT COUNT(*) FROM start", [], |row| row.get(0)).unwrap()
+    }
+
+    #[test]
+    fn only_further_loads_of_the_page_count_as_reloads() {
+        let dir = tempfile::tempdir().unwrap();
+        let db = database::open(&dir.path().join("responses.sqlite"), "plan").unwrap();
+        assert!(!start(&db, 0, "a"), "an unknown participant");
+        begun(&db, "p", 0);
+        for load in ["a", "a"] {
+            assert!(start(&db, 0, load), "a repeated request");
+        }
+        assert!(
+            start(&db, 1, "a")
+                && !record_start(&db, "p", 1, &TrialStart { position: 0, load: "b".to_owned() }).unwrap()
+        );
+        assert_eq!((reloads(&db, "p").unwrap(), n_rows(&db)), (BTreeMap::new(), 1));
+        assert!(start(&db, 0, "b") && start(&db, 0, "c"));
+        let [stalled_secs, unfocused_secs, response_secs] = [0.0; 3];
+        let response = Response::Number(42);
+        let given = SubmittedAnswer { position: 0, response, plays: 1, stalled_secs, unfocused_secs, response_secs };
+        let terms = TrialTerms { session: 0, min_ms: 0, is_last: false, fails_check: false };
+        record(&db, "p", &given, terms, 1000).unwrap();
+        assert!(start(&db, 0, "d"), "a late request is ignored");
+        assert_eq!(reloads(&db, "p").unwrap(), BTreeMap::from([(0, 2)]));
+        assert!(withdraw(&db, "p").unwrap());
+        assert_eq!(n_rows(&db), 0);
+        // A participant without answers who loses the session is deleted, with the starts.
+        begun(&db, "p", 2000);
+        assert!(start(&db, 0, "a"));
+        begun(&db, "q", 400_000);
+        assert_eq!(n_rows(&db), 0);
+    }
+
+    #[test]
+    fn a_database_without_starts_is_read_and_extended() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("responses.sqlite");
+        let db = database::open(&path, "plan").unwrap();
+        begun(&db, "p", 0);
+        db.execute_batch("DROP TABLE start").unwrap();
+        drop(db);
+        let reader = database::open_for_reading(&path).unwrap();
+        assert_eq!(reloads(&reader, "p").unwrap(), BTreeMap::new());
+        drop(reader);
+        let db = database::open(&path, "plan").unwrap();
+        assert!(start(&db, 0, "a") && start(&db, 0, "b"));
+        assert_eq!(reloads(&database::open_for_reading(&path).unwrap(), "p").unwrap(), BTreeMap::from([(0, 1)]));
+    }
 }

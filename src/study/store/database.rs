@@ -1,9 +1,13 @@
-//! SQLite file of the responses: its tables, opening, and secure erasure of deleted rows.
+//! SQLite file of the responses: its tables, opening, secure erasure of deleted rows, and the writer thread, which
+//! takes all queued work, runs it in one transaction, and acknowledges it after the commit.
 
 use anyhow::{Context, Result, ensure};
-use rusqlite::{Connection, OpenFlags, OptionalExtension, params};
+use rusqlite::{Connection, OpenFlags, OptionalExtension, TransactionBehavior, params};
 use std::path::Path;
+use std::thread::JoinHandle;
 use std::time::Duration;
+use tokio::sync::{mpsc, oneshot};
+use tokio::time::timeout;
 
 /// Time that a connection waits for locks of other processes.
 const BUSY_TIMEOUT: Duration = Duration::from_secs(10);
@@ -62,9 +66,6 @@ pub fn open(path: &Path, plan: &str) -> Result<Connection> {
 }
 
 /// Opens the database at `path` for reading, while a server may be writing it.
-///
-/// # Errors
-/// There is no database at `path`.
 pub fn open_for_reading(path: &Path) -> Result<Connection> {
     ensure!(path.is_file(), "{} does not exist: no participant has started yet", path.display());
     // Writable, because a reader also has to recover the write-ahead log of a killed server.
@@ -101,4 +102,149 @@ pub fn erase_deleted(db: &Connection) -> rusqlite::Result<()> {
 /// Increments a counter of the table `about`.
 pub fn increment(db: &Connection, name: &str) -> rusqlite::Result<()> {
     db.execute("UPDATE about SET value = value + 1 WHERE name = ?1", params![name]).map(drop)
+}
+
+const MAX_JOBS_PER_COMMIT: usize = 256;
+/// Maximum number of queued jobs; further callers wait to enqueue.
+const MAX_QUEUED: usize = 1024;
+
+/// Timeout of a job including its time in the queue. Shorter than the timeout of a request, so that the client gets a
+/// reply.
+const STORE_TIMEOUT: Duration = Duration::from_secs(8);
+/// Time that a transaction waits for locks of other processes.
+const LOCK_TIMEOUT: Duration = Duration::from_secs(3);
+
+/// Notifies the caller that the work is committed.
+type Acknowledge = Box<dyn FnOnce() + Send>;
+type Work = Box<dyn FnOnce(&Connection) -> rusqlite::Result<Acknowledge> + Send>;
+
+struct Job {
+    work: Work,
+    /// Whether the job deletes data that must leave no trace.
+    erases: bool,
+}
+
+/// The work was not committed: the disk is full, or the database is not writable or is locked by another process.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("the response could not be stored")]
+pub struct NotStored;
+
+/// Handle of the writer thread; clones share it.
+#[derive(Clone, Debug)]
+pub struct ResponseStore {
+    jobs: mpsc::Sender<Job>,
+}
+
+impl ResponseStore {
+    /// Opens the database at `path` for the plan with this hash and starts the writer thread, which ends after the last
+    /// handle is dropped.
+    ///
+    /// # Errors
+    /// The database cannot be opened (see [`open`]), or the thread cannot be started.
+    pub fn open(path: &Path, plan: &str) -> Result<(Self, JoinHandle<()>)> {
+        let mut db = open(path, plan)?;
+        db.busy_timeout(LOCK_TIMEOUT)?;
+        let (jobs, mut queue) = mpsc::channel(MAX_QUEUED);
+        let thread = std::thread::Builder::new().name("responses".to_owned());
+        let thread = thread.spawn(move || run_jobs(&mut db, &mut queue)).context("cannot start a thread")?;
+        Ok((Self { jobs }, thread))
+    }
+
+    /// Runs `work` in a transaction and returns its value after the commit. An error of `work` rolls back the entire
+    /// batch, so `work` must report rejections in its value and fail only when the database fails.
+    ///
+    /// # Errors
+    /// The work was not committed, or not within the timeout.
+    pub async fn write<T: Send + 'static>(
+        &self,
+        work: impl FnOnce(&Connection) -> rusqlite::Result<T> + Send + 'static,
+    ) -> Result<T, NotStored> {
+        self.submit(false, work).await
+    }
+
+    /// Runs `work`, which deletes data, and returns its value once no file contains a byte of the deleted data.
+    pub async fn erase<T: Send + 'static>(
+        &self,
+        work: impl FnOnce(&Connection) -> rusqlite::Result<T> + Send + 'static,
+    ) -> Result<T, NotStored> {
+        self.submit(true, work).await
+    }
+
+    async fn submit<T: Send + 'static>(
+        &self,
+        erases: bool,
+        work: impl FnOnce(&Connection) -> rusqlite::Result<T> + Send + 'static,
+    ) -> Result<T, NotStored> {
+        let (answer, answered) = oneshot::channel();
+        let work: Work = Box::new(move |db| {
+            // The caller has timed out or disconnected; a withdrawal is carried out nevertheless.
+            if answer.is_closed() && !erases {
+                return Ok(Box::new(|| ()));
+            }
+            let value = work(db)?;
+            Ok(Box::new(move || drop(answer.send(value))))
+        });
+        let stored = async {
+            self.jobs.send(Job { work, erases }).await.map_err(|_| NotStored)?;
+            answered.await.map_err(|_| NotStored)
+        };
+        timeout(STORE_TIMEOUT, stored).await.unwrap_or(Err(NotStored))
+    }
+}
+
+fn run_jobs(db: &mut Connection, queue: &mut mpsc::Receiver<Job>) {
+    let mut holds_deleted = false;
+    while let Some(first) = queue.blocking_recv() {
+        let more = std::iter::from_fn(|| queue.try_recv().ok());
+        let batch = std::iter::once(first).chain(more).take(MAX_JOBS_PER_COMMIT);
+        // On failure, callers are notified by their dropped channels.
+        let Ok((committed, erases)) = commit(db, batch) else { continue };
+        holds_deleted |= erases;
+        if holds_deleted {
+            holds_deleted = erase_deleted(db).is_err();
+        }
+        for (acknowledge, erases) in committed {
+            if !(erases && holds_deleted) {
+                acknowledge();
+            }
+        }
+    }
+}
+
+/// Runs a batch in one transaction. Returns the acknowledgements with their erasure flags, and whether any job erases.
+fn commit(db: &mut Connection, batch: impl Iterator<Item = Job>) -> rusqlite::Result<(Vec<(Acknowledge, bool)>, bool)> {
+    let transaction = db.transaction_with_behavior(TransactionBehavior::Immediate)?;
+    let done = batch.map(|job| Ok(((job.work)(&transaction)?, job.erases)));
+    let done = done.collect::<rusqlite::Result<Vec<_>>>()?;
+    transaction.commit()?;
+    let erases = done.iter().any(|(_, erases)| *erases);
+    Ok((done, erases))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn work_is_acknowledged_after_its_commit_and_failures_are_not_stored() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("responses.sqlite");
+        let (store, thread) = ResponseStore::open(&path, "plan").unwrap();
+        let runtime = tokio::runtime::Builder::new_current_thread().enable_time().build().unwrap();
+        let add = |db: &Connection| {
+            increment(db, "withdrawn")?;
+            db.query_row("SELECT value FROM about WHERE name = 'withdrawn'", [], |row| row.get::<_, String>(0))
+        };
+        assert_eq!(runtime.block_on(store.write(add)).unwrap(), "1");
+        let failed = runtime.block_on(store.write(move |db| {
+            add(db)?;
+            db.execute("no SQL", []).map(drop)
+        }));
+        assert_eq!(failed, Err(NotStored));
+        assert_eq!(runtime.block_on(store.erase(add)).unwrap(), "2");
+        drop(store);
+        thread.join().unwrap();
+        let error = ResponseStore::open(&path, "another").unwrap_err();
+        assert!(format!("{error:#}").contains("a different plan"), "{error:#}");
+    }
 }

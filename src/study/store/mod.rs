@@ -4,5 +4,3 @@
 pub mod answers;
 pub mod database;
 pub mod participants;
-pub mod starts;
-pub mod writer;

@@ -12,7 +12,6 @@ pub const PARAMETERS: [&str; 6] = ["PROLIFIC_PID", "STUDY_ID", "SESSION_ID", "wo
 /// Parameters that identify a person.
 const PERSON_IDS: [&str; 2] = ["PROLIFIC_PID", "workerId"];
 
-/// Status of a participant's session.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Status {
@@ -27,7 +26,6 @@ pub enum Status {
 impl Status {
     const ALL: [Self; 3] = [Self::Active, Self::Completed, Self::Replaced];
 
-    /// Name in the database and in exports.
     pub fn name(self) -> &'static str {
         match self {
             Self::Active => "active",
@@ -50,7 +48,6 @@ impl FromSql for Status {
     }
 }
 
-/// Participant as stored.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Participant {
     /// Random identifier, or the one derived from the page's attempt to begin.
@@ -68,7 +65,6 @@ pub struct Participant {
     pub position: u32,
     /// Time at which that trial was first presented, milliseconds since 1970.
     pub given_ms: i64,
-    /// Number of failed attention checks.
     pub failed_checks: u32,
 }
 
@@ -93,10 +89,8 @@ impl Participant {
     }
 }
 
-/// Rules for assigning sessions.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Quota {
-    /// Number of sessions of the plan.
     pub n_sessions: u32,
     /// Target number of participants who complete the study and are not excluded for failed checks.
     pub target: u32,
@@ -109,7 +103,6 @@ pub struct Quota {
     pub unanswered_ms: i64,
 }
 
-/// Number of participants by status.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
 pub struct QuotaCounts {
     pub target: u32,
@@ -157,7 +150,6 @@ impl Quota {
     }
 }
 
-/// Participant who requests a session.
 #[derive(Clone, Debug)]
 pub struct NewParticipant {
     pub id: String,
@@ -172,18 +164,15 @@ impl NewParticipant {
         PERSON_IDS.into_iter().filter_map(|name| Some((name, self.parameters.get(name).filter(|id| !id.is_empty())?)))
     }
 
-    /// Whether the request has an ID from a recruiting site.
     pub fn has_id(&self) -> bool {
         self.ids().next().is_some()
     }
 
-    /// Whether `participant` has the same ID from a recruiting site.
     fn has_same_id(&self, participant: &Participant) -> bool {
         self.ids().any(|(name, id)| participant.parameters.get(name) == Some(id))
     }
 }
 
-/// Result of a request to begin.
 #[derive(Clone, Debug, PartialEq)]
 pub enum BeginOutcome {
     /// Session assigned now, or earlier to the same identifier.
@@ -200,9 +189,6 @@ pub enum BeginOutcome {
 /// Assigns the first free session to `new_participant`, unless its identifier has a session already: the page repeats a
 /// request whose reply was lost. An abandoned participant of the assigned session is marked as replaced, or deleted if
 /// there are no answers; so is one with the same ID who has not given the first answer in time.
-///
-/// # Errors
-/// The database fails; nothing is stored.
 pub fn begin(
     db: &Connection,
     new_participant: &NewParticipant,
@@ -261,7 +247,6 @@ pub fn find(db: &Connection, id: &str) -> rusqlite::Result<Option<Participant>> 
     db.query_row(&sql, [id], Participant::of_row).optional()
 }
 
-/// All participants in order of start time.
 pub fn all(db: &Connection) -> rusqlite::Result<Vec<Participant>> {
     select(db, "")
 }
@@ -289,7 +274,6 @@ pub fn latest_ms(db: &Connection) -> rusqlite::Result<i64> {
     db.query_row(sql, [], |row| row.get(0))
 }
 
-/// Number of participants who withdrew.
 pub fn n_withdrawn(db: &Connection) -> rusqlite::Result<u32> {
     db.query_row("SELECT CAST(value AS INTEGER) FROM about WHERE name = 'withdrawn'", [], |row| row.get(0))
 }
@@ -315,7 +299,6 @@ mod tests {
         if let BeginOutcome::Begun(participant) = outcome { Some(participant.session) } else { None }
     }
 
-    /// Answers the first trial of the session `name`.
     fn answer(db: &Connection, name: &str, now_ms: i64) -> RecordOutcome {
         let response = Response::Number(42);
         let [stalled_secs, unfocused_secs, response_secs] = [0.0; 3];
@@ -370,25 +353,5 @@ mod tests {
         let given = SubmittedAnswer { position: 0, response, plays: 1, stalled_secs, unfocused_secs, response_secs };
         let terms = TrialTerms { session: 0, min_ms: 0, is_last: false, fails_check: false };
         assert_eq!(record(&db, "own-0", &given, terms, 29_700_002).unwrap(), RecordOutcome::Unknown);
-    }
-
-    #[test]
-    fn a_session_without_answers_is_reassigned_after_minutes() {
-        let dir = tempfile::tempdir().unwrap();
-        let db = database::open(&dir.path().join("responses.sqlite"), "plan").unwrap();
-        assert_eq!(latest_ms(&db).unwrap(), 0);
-        for name in ["silent", "answers"] {
-            assert!(session(&begin_as(&db, name, "", 0)).is_some());
-        }
-        assert!(matches!(answer(&db, "answers", 10_000), RecordOutcome::Stored(_)));
-        assert_eq!(begin_as(&db, "early", "", 299_999), BeginOutcome::Full);
-        let counts = QUOTA.count(&all(&db).unwrap(), 0, 300_000);
-        assert_eq!((counts.active, counts.abandoned), (1, 1));
-        assert!(
-            matches!(answer(&db, "silent", 300_000), RecordOutcome::Stored(_)),
-            "late, but the session was not reassigned"
-        );
-        assert_eq!(begin_as(&db, "later", "", 3_609_999), BeginOutcome::Full, "an answer holds it for an hour");
-        assert_eq!(session(&begin_as(&db, "last", "", 3_610_000)), Some(1));
     }
 }

@@ -12,7 +12,7 @@ use orator_base::types::skeleton::{N_BONES, N_JOINTS, NECK, is_duplicate, parent
 use orator_base::types::time::FrameRate;
 use orator_dataset::config::{AdversarialLoss, GanConfig, GanRecipe, MotionRepresentation};
 use orator_formats::checkpoint;
-use orator_gesture::generate::mel_stream::mel_frames;
+use orator_gesture::generate::generator::mel_frames;
 use orator_gesture::generate::model::SpeakerMetadata;
 use orator_gesture::generate::normalisation::{N_FEATURES, Normalisation};
 use orator_gesture::generate::representation::Representation;

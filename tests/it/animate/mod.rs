@@ -9,6 +9,7 @@ pub(crate) mod film;
 pub(crate) mod foreign_bvh;
 pub(crate) mod gltf;
 pub(crate) mod motion_files;
+pub(crate) mod noise;
 pub(crate) mod posture;
 pub(crate) mod rates;
 pub(crate) mod skeleton;

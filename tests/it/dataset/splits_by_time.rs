@@ -11,7 +11,7 @@ use orator_dataset::config::{LiftConfig, SplitUnit};
 use orator_dataset::verify::verify::verify;
 use orator_dataset::write::entry::VideoEntry;
 use orator_dataset::{Dataset, Split};
-use orator_gesture::train::gan::speaker_metadata::normalisation;
+use orator_gesture::train::gan::speakers::normalisation;
 use orator_gesture::train::gan::windows::WindowLoader;
 use orator_pipeline::lift::lifter::context_secs;
 use rand::{Rng, SeedableRng};

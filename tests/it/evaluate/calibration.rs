@@ -2,8 +2,8 @@
 //! clear difference is detected. Errors are first-order autoregressions. 300 evaluations of one setting; `ORATOR_LONG`
 //! runs 2,000 of each.
 
-use orator_gesture::evaluate::table::block_length::BlockLength;
-use orator_gesture::evaluate::table::jackknife::BlockGroups;
+use orator_gesture::evaluate::table::blocks::BlockLength;
+use orator_gesture::evaluate::table::bootstrap::BlockGroups;
 use orator_gesture::evaluate::table::sign_flips::{self, LEVEL};
 use orator_gesture::metrics::catalogue::n_blocks;
 use rand::{Rng, SeedableRng};

@@ -13,7 +13,7 @@ use orator_gesture::evaluate::clips::from_checkpoints::nearest_neighbours;
 use orator_gesture::evaluate::clips::held_out;
 use orator_gesture::evaluate::clips::motion_store::{MotionStore, StoredMotion};
 use orator_gesture::evaluate::clips::sound_features::from_samples;
-use orator_gesture::train::gan::speaker_metadata::normalisation;
+use orator_gesture::train::gan::speakers::normalisation;
 use orator_test_support::project::Project;
 use std::path::Path;
 

@@ -15,7 +15,7 @@ use orator_formats::checkpoint;
 use orator_formats::mocap::motion_file;
 use orator_formats::{authors_txt, npy};
 use orator_gesture::generate::GestureGenerator;
-use orator_gesture::generate::mel_stream::mel_frames;
+use orator_gesture::generate::generator::mel_frames;
 use orator_gesture::generate::model::SpeakerMetadata;
 use orator_gesture::generate::normalisation::{N_FEATURES, Normalisation};
 use orator_gesture::generate::representation::Representation;

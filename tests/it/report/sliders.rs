@@ -13,8 +13,8 @@ use orator_formats::media_json::MediaInfo;
 use orator_formats::npz::Npz;
 use orator_pipeline::lift::LiftStage;
 use orator_pipeline::segment::{Measures, SegmentStage};
+use orator_report::videos::sliders::{JudgedVideo, open_frames};
 use orator_report::videos::thresholds::THRESHOLDS;
-use orator_report::videos::what_if::{JudgedVideo, open_frames};
 use std::path::Path;
 
 /// Half a minute with a cut, a small step aside, a quiet part, a hand that is out of frame for a while, and a wrist

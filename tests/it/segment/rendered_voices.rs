@@ -21,10 +21,10 @@ const SECS: f64 = 7.0;
 fn measure(clips: &[TalkingClip]) -> [f64; 2] {
     let (mut own, mut other, mut errors) = (Vec::new(), Vec::new(), Vec::new());
     for (index, clip) in clips.iter().enumerate() {
-        own.extend(clip.windows(&clip.voice, 0.0, clip.offset().secs));
+        own.extend(clip.windows(&clip.voice, 0.0));
         let others = (1..clips.len().min(5)).map(|step| &clips[(index + step * 7) % clips.len()]);
         let other_clips = others.filter(|other_clip| other_clip.name != clip.name);
-        other_clips.for_each(|other_clip| other.extend(clip.windows(&other_clip.voice, 0.0, 0.0)));
+        other_clips.for_each(|other_clip| other.extend(clip.windows(&other_clip.voice, 0.0)));
         errors.extend(clip.shift_errors(8.0, 6.0).into_iter().map(|error| error * clip.source_fps));
     }
     let n_within = errors.iter().filter(|frames| **frames <= 1.0 + 1e-9).count();

@@ -176,9 +176,16 @@ fn short_quiet_or_static_parts_are_accepted_and_longer_ones_rejected() {
 #[test]
 fn a_body_turned_away_is_rejected() {
     assert_eq!(judged_with(|m| m.facing[80..85].fill(0.2)), (vec![(0, 200)], vec![]));
+    assert_eq!(
+        judged_with(|m| {
+            m.facing.fill(0.6);
+            m.nose_off.fill(2.0);
+        }),
+        (vec![(0, 200)], vec![])
+    );
     assert_eq!(judged_with(|m| m.facing[80..86].fill(0.2)), (vec![(0, 80), (86, 200)], vec!["turned".into()]));
     assert_eq!(judged_with(|m| m.facing[80..].fill(-2.0)), (vec![(0, 80)], vec!["turned".into()]));
-    assert_eq!(judged_with(|m| m.nose_off[..120].fill(1.4)), (vec![(120, 200)], vec!["turned".into()]));
+    assert_eq!(judged_with(|m| m.nose_off[..120].fill(3.4)), (vec![(120, 200)], vec!["turned".into()]));
     assert_eq!(judged_with(|m| m.nose_off.fill(f32::NAN)), (vec![(0, 200)], vec![]));
 }
 

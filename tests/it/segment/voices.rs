@@ -99,7 +99,7 @@ fn own_voices_are_distinguished_from_others_and_shifts_estimated() {
     let (mut scored, mut n_found, mut n_shifts) = (Vec::new(), [0, 0], [0, 0]);
     for clip in &clips {
         let offset = clip.offset();
-        let own = clip.windows(&clip.voice, 0.0, offset.secs);
+        let own = clip.windows(&clip.voice, 0.0);
         let of_clips = clips.iter().filter(|other| speaker(&other.name) != speaker(&clip.name));
         let others = of_clips.map(|other| (&other.voice, other.secs)).chain(recorded.iter().map(|(v, s)| (v, *s)));
         let mut other = Vec::new();
@@ -107,7 +107,7 @@ fn own_voices_are_distinguished_from_others_and_shifts_estimated() {
             for _ in 0..4 {
                 let slack = secs - clip.secs;
                 let shift = if slack > 0.0 { rng.random_range(0.0..slack) } else { rng.random_range(slack..0.0) };
-                other.extend(clip.windows(voice, shift, 0.0));
+                other.extend(clip.windows(voice, shift));
             }
         }
         let is_generated = clip.name.starts_with("mdd");

@@ -17,7 +17,7 @@ use orator_gesture::generate::model::{BEST, GENERATOR, GenerationChoice};
 use orator_gesture::train::epochs::ValidatedStep;
 use orator_gesture::train::gan::pretrained::PretrainedModel;
 use orator_gesture::train::gan::recipe::{self, InitialWeights, TrainingMaterial};
-use orator_gesture::train::gan::speaker_metadata;
+use orator_gesture::train::gan::speakers;
 use orator_gesture::train::gan::train::{train, train_with_callback};
 use orator_gesture::train::gan::windows::JoinedWindows;
 use orator_gesture::train::gan::windows::WindowLoader;
@@ -142,11 +142,11 @@ fn assert_trains_only_speaker_layer(both: &Path, new: &Dataset, out: &Path) {
 
 /// A new speaker starts from the layer of a known speaker, or their mean, with the least error.
 fn assert_starts_from_nearest_speaker(both: &Path, new: &Dataset) {
-    let normal = speaker_metadata::normalisation(new).unwrap();
+    let normal = speakers::normalisation(new).unwrap();
     let loader = WindowLoader::load(new, Split::Train, &normal, 32, 5).unwrap();
     let of =
         recipe::settings(&settings(), &TrainingMaterial::measure(&[new], 32), InitialWeights::SeveralSpeakers).unwrap();
-    let metadata = speaker_metadata::metadata(new, &normal, &loader, &of, 1).unwrap();
+    let metadata = speakers::metadata(new, &normal, &loader, &of, 1).unwrap();
     let windows = JoinedWindows::new(vec![loader]);
     let trainer = PretrainedModel::read(both).unwrap().trainer(vec![metadata], of, &windows).unwrap();
     let batch = windows.batch_changed(&(0..windows.len()).collect::<Vec<_>>(), &[]).unwrap();

@@ -6,7 +6,7 @@ use orator_dataset::Split;
 use orator_dataset::config::{GanConfig, GanRecipe};
 use orator_gesture::train::gan::augment::changes;
 use orator_gesture::train::gan::recipe::{self, InitialWeights, TrainingMaterial};
-use orator_gesture::train::gan::speaker_metadata::normalisation_with_channels;
+use orator_gesture::train::gan::speakers::normalisation_with_channels;
 use orator_gesture::train::gan::windows::{WindowBatch, WindowLoader};
 
 fn values(batch: &WindowBatch) -> Vec<Vec<f32>> {

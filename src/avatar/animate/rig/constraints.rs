@@ -155,9 +155,9 @@ fn bend(given: Bend, limit: Limit, kind: usize, counter: &mut ClampCounter) -> B
     }
 }
 
-/// Certainty of a flexion: 1, falling from a sideways bend of 60 degrees to 0 at 90.
+/// Certainty of a flexion: 1, falling from a sideways bend of 70 degrees, the widest limit, to 0 at 90.
 fn certainty(side: f64) -> f64 {
-    1.0 - smoothstep([60.0, 90.0], side.abs())
+    1.0 - smoothstep([70.0, 90.0], side.abs())
 }
 
 /// Clamps the four fingers' flexion, level by level, to a range around their mean. The mean is that of the result, so a

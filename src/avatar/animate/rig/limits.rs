@@ -1,6 +1,7 @@
 //! Joint limits in degrees, for the left side: the normal ranges of an adult (American Academy of Orthopaedic Surgeons,
-//! Joint Motion, 1965; Norkin and White, Measurement of Joint Motion; fingers by Rebol et al. 2021), widened where more
-//! than 0.1 % of the frames of a motion capture exceed them. `orator guide animation` lists the captures.
+//! Joint Motion, 1965; Norkin and White, Measurement of Joint Motion; fingers by Rebol et al. 2021), widened by about
+//! 12 degrees beyond percentiles 0.1 and 99.9 of captured fingers on hands of several proportions.
+//! `orator guide animation` lists the captures.
 
 /// Ranges of a hinge joint.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -22,23 +23,23 @@ pub const ELBOW: Limit = limit([0.0, 175.0], [-10.0, 10.0]);
 /// captured persons exceed this range by up to 60 degrees.
 pub const SUPINATION: [f64; 2] = [-140.0, 140.0];
 /// Extension to flexion; ulnar to radial deviation.
-pub const WRIST: Limit = limit([-80.0, 90.0], [-45.0, 35.0]);
+pub const WRIST: Limit = limit([-90.0, 100.0], [-60.0, 55.0]);
 /// Thumb to little finger, each from the knuckle to the end joint. Angles of the thumb are relative to its rest
 /// direction (`rig::finger_hinge`).
 pub const FINGERS: [[Limit; 3]; 5] = [
-    [limit([-35.0, 45.0], [-45.0, 35.0]), limit([-25.0, 60.0], SIDE), limit([-20.0, 80.0], SIDE)],
-    finger([-45.0, 20.0], SIDE, SIDE),
-    finger([-25.0, 15.0], SIDE, SIDE),
-    finger([-20.0, 25.0], SIDE, SIDE),
-    finger([-30.0, 60.0], [-60.0, 25.0], [-25.0, 32.0]),
+    [limit([-50.0, 60.0], [-65.0, 45.0]), limit([-50.0, 65.0], [-50.0, 45.0]), limit([-35.0, 85.0], SIDE)],
+    finger([-55.0, 35.0], [-55.0, 45.0]),
+    finger([-40.0, 35.0], SIDE),
+    finger([-40.0, 40.0], SIDE),
+    finger([-65.0, 65.0], [-70.0, 45.0]),
 ];
 /// Sideways range of a joint that does not bend sideways: variation of finger axes between persons.
-const SIDE: [f64; 2] = [-25.0, 25.0];
+const SIDE: [f64; 2] = [-45.0, 45.0];
 /// Maximum difference of a finger's flexion from the mean of the four fingers at the same joint (Rebol et al. 2021).
 pub const CURL_COHERENCE: f64 = 10.0;
 
-const fn finger(spread: [f64; 2], middle_side: [f64; 2], end_side: [f64; 2]) -> [Limit; 3] {
-    [limit([-20.0, 122.0], spread), limit([-5.0, 110.0], middle_side), limit([-10.0, 80.0], end_side)]
+const fn finger(spread: [f64; 2], middle_side: [f64; 2]) -> [Limit; 3] {
+    [limit([-45.0, 130.0], spread), limit([-25.0, 115.0], middle_side), limit([-25.0, 90.0], SIDE)]
 }
 
 /// Clamps a circular angle to a range. Near the point opposite the range the result blends from one end to the other,

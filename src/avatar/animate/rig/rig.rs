@@ -5,7 +5,7 @@
 use super::hinge::Hinge;
 use crate::animate::solve::positions::{JointPositions, palm_frame};
 use orator_base::math::order::upper_median;
-use orator_base::math::vec3::{Vec3, across, cross, norm, scale};
+use orator_base::math::vec3::{Vec3, across, cross, dot, norm, scale};
 use orator_base::motion::fk::Skeleton;
 use orator_base::types::pose3d::Motion;
 use orator_base::types::skeleton::{self, L_ELBOW, L_HAND, L_SHOULDER, L_WRIST, N_JOINTS, NECK, R_HAND};
@@ -28,6 +28,11 @@ const DEFAULT_FINGERS: [[f64; 4]; 5] = [
 const SPREAD_DEGREES: [f64; 5] = [50.0, 16.0, 5.0, -6.0, -17.0];
 /// Minimum cosine between a metacarpal and the axis of the hand (60 degrees); the default palm has at most 17 degrees.
 const MIN_METACARPAL_COS: f64 = 0.5;
+/// Ratio of a bone's length without noise to its median length: minimum, and the ratio below which it is used.
+const MIN_LENGTH_RATIO: f64 = 0.5;
+const NOISE_LENGTH_RATIO: f64 = 0.99;
+/// Number of frames over which the products are averaged.
+const NOISE_FRAMES: usize = 12;
 /// Directions of the left thumb at rest and towards which it flexes, close to the medians of speakers' hands.
 const THUMB_ALONG: Vec3 = [0.74, -0.35, 0.57];
 const THUMB_FLEXION: Vec3 = [0.0, -0.5, -0.87];
@@ -184,15 +189,22 @@ fn default_palm(metres: &[f64; N_JOINTS]) -> [Vec3; 5] {
 }
 
 /// Median length over the frames of the bone to each joint, metres; that of the other side or a default if never
-/// detected.
+/// detected. Noise lengthens short bones; where it does, the length is taken from products of different frames, whose
+/// errors are independent.
 pub fn bone_metres(motion: &Motion) -> [f64; N_JOINTS] {
     let seen: [Option<f64>; N_JOINTS] = std::array::from_fn(|joint| {
         let parent = skeleton::parent(joint)?;
-        let lengths = motion.joints.outer_iter().map(|frame| {
-            let square = |k| (f64::from(frame[[joint, k]]) - f64::from(frame[[parent, k]])).powi(2);
-            (0..3).map(square).sum::<f64>().sqrt()
-        });
-        upper_median(lengths)
+        let bone = |frame: ndarray::ArrayView2<f32>| -> Vec3 {
+            std::array::from_fn(|k| f64::from(frame[[joint, k]]) - f64::from(frame[[parent, k]]))
+        };
+        let bones: Vec<Vec3> = motion.joints.outer_iter().map(bone).collect();
+        let length = upper_median(bones.iter().map(|&bone| norm(bone)))?;
+        // For a bone that turns evenly the rotation between the frames cancels out.
+        let square = |run: &[Vec3]| (4.0 * dot(run[0], run[1]) - dot(run[0], run[2])) / 3.0;
+        let mean = |run: &[Vec3]| run.windows(3).map(square).sum::<f64>() / (NOISE_FRAMES - 2) as f64;
+        let without_noise = upper_median(bones.windows(NOISE_FRAMES).map(mean))
+            .map_or(length, |square| square.sqrt().max(length * MIN_LENGTH_RATIO));
+        Some(if without_noise < NOISE_LENGTH_RATIO * length { without_noise } else { length })
     });
     std::array::from_fn(|joint| seen[joint].or(seen[skeleton::mirror(joint)]).unwrap_or_else(|| default_metres(joint)))
 }

@@ -6,13 +6,14 @@
 
 use super::arm_pose::{ArmPose, elbow};
 use super::positions::JointPositions;
+use super::reach::reach;
 use super::roll::upper_arm_rotations;
 use super::smoothing::{Filter, Smoothing};
 use super::track::{ObservedTrack, RotationTrack, filled, mirrored, world};
 use crate::animate::rig::hinge::Bend;
-use crate::animate::rig::rig::{Rig, RigArm, finger_hinge};
+use crate::animate::rig::rig::{CM, Rig, RigArm, finger_hinge};
 use orator_base::math::rotation::Rotation;
-use orator_base::math::vec3::Vec3;
+use orator_base::math::vec3::{Vec3, norm};
 use orator_base::types::skeleton::{L_ELBOW, L_HAND, L_SHOULDER, L_WRIST, NECK};
 use orator_base::types::time::FrameRate;
 
@@ -57,8 +58,10 @@ pub fn rotations(positions: &JointPositions, rig: &Rig, filters: &SolveFilters) 
     local[rig.chest] = half_yaw;
 
     let [left, right] = &rig.arms;
-    solve(positions, left, &chest, filters, &mut local);
-    solve(&positions.mirrored(), right, &mirrored(chest), filters, &mut local);
+    let metres =
+        |arm: &RigArm| [arm.upper, arm.forearm, arm.hand].map(|joint| norm(rig.skeleton.joints[joint].offset) / CM);
+    solve(positions, (left, metres(left)), &chest, filters, &mut local);
+    solve(&positions.mirrored(), (right, metres(right)), &mirrored(chest), filters, &mut local);
     let fingers = right.fingers.iter().flatten();
     for &joint in [right.clavicle, right.upper, right.forearm, right.hand].iter().chain(fingers) {
         local[joint] = mirrored(std::mem::take(&mut local[joint]));
@@ -67,10 +70,10 @@ pub fn rotations(positions: &JointPositions, rig: &Rig, filters: &SolveFilters) 
 }
 
 /// Solves `arm` as a left arm (right arms are given mirrored) and writes its tracks into `local`, one track per joint
-/// of the skeleton.
+/// of the skeleton. `metres`: lengths of clavicle, upper arm and forearm.
 fn solve(
     positions: &JointPositions,
-    arm: &RigArm,
+    (arm, metres): (&RigArm, [f64; 3]),
     chest: &RotationTrack,
     filters: &SolveFilters,
     local: &mut [RotationTrack],
@@ -87,7 +90,8 @@ fn solve(
     local[arm.clavicle] = filled(clavicle.collect(), Rotation::IDENTITY, None);
     let clavicle = world(chest, &local[arm.clavicle]);
 
-    let (along, fore) = (smooth(&clavicle, L_SHOULDER, L_ELBOW), smooth(&clavicle, L_ELBOW, L_WRIST));
+    let (mut along, mut fore) = (smooth(&clavicle, L_SHOULDER, L_ELBOW), smooth(&clavicle, L_ELBOW, L_WRIST));
+    reach(positions, metres, (chest, &clavicle), &filters.arms, (&mut along, &mut fore));
     let upper: ObservedTrack = upper_arm_rotations(&along, &fore);
     let hanging = Rotation::between(X, [0.17, -0.985, 0.0]);
     local[arm.upper] = filled(upper, hanging, None);

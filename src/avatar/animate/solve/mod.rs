@@ -2,9 +2,11 @@
 
 pub mod arm;
 pub mod arm_pose;
+pub mod hand_fit;
 pub mod head;
 pub mod legs;
 pub mod positions;
+pub mod reach;
 pub mod roll;
 pub mod smoothing;
 pub mod track;

@@ -11,6 +11,9 @@ const MIN_METRES: f64 = 1e-5;
 /// Lever over which the displacement of a finger tip is converted to an angle, metres.
 const LEVER_METRES: f64 = 0.1;
 
+/// Points of a hand, its wrist first.
+pub type HandPositions = [Option<Vec3>; skeleton::N_HAND_JOINTS];
+
 /// Joint positions by frame.
 pub struct JointPositions {
     positions: Vec<[Option<Vec3>; N_JOINTS]>,
@@ -49,6 +52,22 @@ impl JointPositions {
         Self { positions, hand_errors }
     }
 
+    /// Points of the left hand.
+    pub fn left_hand(&self, t: usize) -> HandPositions {
+        std::array::from_fn(|point| self.position(t, L_HAND + point))
+    }
+
+    /// Replaces the given points of the left hand by frame, and with its first point the wrist.
+    pub fn with_left_hand(&self, hands: &[Option<HandPositions>]) -> Self {
+        let mut positions = self.positions.clone();
+        for (frame, hand) in positions.iter_mut().zip(hands) {
+            let Some(hand) = hand else { continue };
+            frame[L_HAND..R_HAND].iter_mut().zip(hand).for_each(|(joint, point)| *joint = point.or(*joint));
+            frame[L_WRIST] = hand[0].or(frame[L_WRIST]);
+        }
+        Self { positions, hand_errors: self.hand_errors.clone() }
+    }
+
     /// Error of the left hand's directions, radians, by frame; 0 if the limits changed nothing.
     pub fn hand_error(&self) -> &[f64] {
         &self.hand_errors[0]
@@ -67,9 +86,14 @@ impl JointPositions {
         self.positions.len()
     }
 
+    /// Vector from one joint to another, metres; `None` if a joint is missing.
+    pub fn offset(&self, t: usize, from: usize, to: usize) -> Option<Vec3> {
+        Some(sub(self.position(t, to)?, self.position(t, from)?))
+    }
+
     /// Unit vector from one joint to another; `None` if a joint is missing or both coincide.
     pub fn direction(&self, t: usize, from: usize, to: usize) -> Option<Vec3> {
-        unit(sub(self.position(t, to)?, self.position(t, from)?), MIN_METRES)
+        unit(self.offset(t, from, to)?, MIN_METRES)
     }
 
     /// Horizontal part of the direction from the right to the left shoulder, a unit vector.

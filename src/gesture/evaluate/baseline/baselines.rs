@@ -2,7 +2,7 @@
 //! (realistic, but unrelated to the sound), and the ground truth itself, which bounds every metric.
 
 use super::constant_pose::ConstantPoses;
-use super::neighbour::{self, Library, Query};
+use super::predictor::{self, Library, Query};
 use crate::evaluate::clips::clips::{EvalClip, EvalClips};
 use crate::evaluate::clips::motion_store::{MotionStore, StoredMotion};
 use anyhow::Result;
@@ -12,7 +12,6 @@ use serde::Serialize;
 /// Smallest time shift of a mismatched motion, seconds.
 const MIN_SHIFT_SECS: f64 = 3.0;
 
-/// Source of the predicted motion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum PredictorKind {
@@ -30,7 +29,6 @@ pub enum PredictorKind {
 }
 
 impl PredictorKind {
-    /// Human-readable name.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Prediction => "prediction",
@@ -45,7 +43,6 @@ impl PredictorKind {
         }
     }
 
-    /// Key in a result file.
     pub fn key(self) -> String {
         self.name().replace(' ', "_")
     }
@@ -78,12 +75,9 @@ impl NumberedCheckpoint {
     }
 }
 
-/// Motion of one clip by a predictor.
 #[derive(Clone, Debug)]
 pub enum ClipMotion {
-    /// Prediction of the clip.
     Prediction,
-    /// Ground truth of the clip.
     GroundTruth,
     /// Constant pose [49, 3].
     Constant(Array2<f32>),
@@ -91,7 +85,6 @@ pub enum ClipMotion {
     Motion(StoredMotion),
 }
 
-/// Motion for every clip.
 #[derive(Clone, Debug)]
 pub struct Predictor {
     pub kind: PredictorKind,
@@ -99,7 +92,6 @@ pub struct Predictor {
     pub checkpoint: Option<NumberedCheckpoint>,
     /// Description in one sentence.
     pub description: String,
-    /// One motion per clip.
     pub motions: Vec<ClipMotion>,
 }
 
@@ -121,9 +113,6 @@ impl Predictor {
     }
 
     /// Replaces missing values by the constant poses of `fallback`.
-    ///
-    /// # Errors
-    /// The temporary file cannot be written.
     pub fn filled(mut self, fallback: &Self, store: &MotionStore) -> Result<Self> {
         for (predicted, fallback) in self.motions.iter_mut().zip(&fallback.motions) {
             if let (ClipMotion::Motion(motion), ClipMotion::Constant(pose)) = (predicted, fallback)
@@ -251,7 +240,7 @@ fn neighbours(clips: &EvalClips, fallback: &Predictor, store: &MotionStore) -> R
         },
         joints: &|entry, frames| Ok(clips.clips[entry].ground_truth.view().slice_move(s![frames, .., ..]).to_owned()),
     };
-    let Some(predicted) = neighbour::motions(&query, &library, clips.fps, store)? else { return Ok(None) };
+    let Some(predicted) = predictor::motions(&query, &library, clips.fps, store)? else { return Ok(None) };
     let description = "for each 4 s of audio the motion of the most similar audio in another clip".to_owned();
     let motions = predicted.into_iter().map(ClipMotion::Motion).collect();
     Ok(Some(Predictor::new(PredictorKind::NearestNeighbour, description, motions).filled(fallback, store)?))
@@ -261,9 +250,6 @@ fn neighbours(clips: &EvalClips, fallback: &Predictor, store: &MotionStore) -> R
 /// forth if it is shorter; for a single clip its own, shifted by half of it with wrap-around. `None` if a single clip
 /// is too short.
 /// `fallback` fills missing values.
-///
-/// # Errors
-/// The temporary file cannot be written.
 pub fn mismatched(
     clips: &EvalClips,
     kind: PredictorKind,

@@ -2,5 +2,4 @@
 
 pub mod baselines;
 pub mod constant_pose;
-pub mod neighbour;
 pub mod predictor;

@@ -33,7 +33,6 @@ const NECK_METRES: f32 = 1e-3;
 /// Ratio of median bone lengths from which another unit is assumed.
 const OTHER_UNIT: f64 = 2.5;
 
-/// Clip with ground truth and prediction.
 #[derive(Clone, Debug)]
 pub struct EvalClip {
     pub name: String,
@@ -61,7 +60,6 @@ pub enum ClipAudio {
 }
 
 impl ClipAudio {
-    /// Sound of a dataset sample in its shard.
     pub fn of_sample(dataset: &Dataset, sample: &SampleRef) -> Self {
         Self::Within {
             path: dataset.dir().join(&sample.shard),
@@ -100,7 +98,6 @@ impl ClipAudio {
     }
 }
 
-/// Sample as a 16-bit integer.
 fn pcm(sample: f32) -> i16 {
     (sample * 32_768.0).round().clamp(-32_768.0, 32_767.0) as i16
 }

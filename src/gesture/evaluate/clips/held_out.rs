@@ -14,7 +14,6 @@ use orator_formats::transcript::Word;
 use rayon::prelude::*;
 use std::ops::Range;
 
-/// Interval of the dataset with its sound.
 pub struct HeldOutInterval {
     pub key: String,
     /// Motion with the speaker's bone lengths, as in training, instead of those of the video.
@@ -65,9 +64,6 @@ pub fn joints(
 }
 
 /// Reads a sample with the speaker's bone lengths.
-///
-/// # Errors
-/// A sample that cannot be read or is damaged.
 pub fn interval(dataset: &Dataset, sample: &SampleRef, normal: &Normalisation) -> Result<HeldOutInterval> {
     let mut sample = dataset.read(sample)?;
     bones::with_lengths(&mut sample.motion, &normal.lengths());
@@ -76,7 +72,6 @@ pub fn interval(dataset: &Dataset, sample: &SampleRef, normal: &Normalisation) -
     Ok(HeldOutInterval { key, ground_truth, posture, sound, words })
 }
 
-/// Reads all samples in parallel.
 pub fn read(dataset: &Dataset, samples: &[SampleRef], normal: &Normalisation) -> Result<Vec<HeldOutInterval>> {
     samples.par_iter().map(|sample| interval(dataset, sample, normal)).collect()
 }

@@ -5,6 +5,5 @@ pub mod clips;
 pub mod from_checkpoints;
 pub mod held_out;
 pub mod motion_store;
-pub mod notes;
 pub mod pairs;
 pub mod sound_features;

@@ -11,7 +11,6 @@ use std::sync::{Mutex, PoisonError};
 /// Default limit of the bytes that are stored in memory.
 pub const MEMORY_BYTES: usize = 192 << 20;
 
-/// Storage for motions.
 pub struct MotionStore(Mutex<StoreState>);
 
 struct StoreState {
@@ -30,7 +29,6 @@ pub enum StoredMotion {
 }
 
 impl MotionStore {
-    /// Store that holds everything in memory.
     pub fn in_memory() -> Self {
         Self(Mutex::new(StoreState { left: usize::MAX, file: None }))
     }
@@ -73,7 +71,6 @@ impl StoredMotion {
         }
     }
 
-    /// Number of frames T.
     pub fn n_frames(&self) -> usize {
         match self {
             Self::Held(joints) => joints.shape()[0],

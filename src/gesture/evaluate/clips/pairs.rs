@@ -13,7 +13,6 @@ const TRUTH: [&str; 7] = ["gt_interval_", "ground_truth_", "truth_", "real_", "g
 const PREDICTION: [&str; 8] =
     ["prediction_interval_", "prediction_", "predicted_", "generated_", "pred_", "made_", "output_", "synthetic_"];
 
-/// Files of a clip.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct FilePair {
     pub name: String,

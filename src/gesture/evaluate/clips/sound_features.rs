@@ -1,7 +1,7 @@
 //! Sound features for evaluation, computed on a stream of samples that are not stored: onsets for the beat metrics,
 //! and a pooled spectrogram for the nearest neighbour.
 
-use crate::generate::mel_stream::mel_frames;
+use crate::generate::generator::mel_frames;
 use anyhow::{Context, Result};
 use orator_base::audio::mel;
 use orator_base::audio::onset::{Loudest, Onsets};
@@ -15,7 +15,6 @@ pub const POOLED: usize = 2;
 /// Number of buffered samples that triggers a spectrogram.
 const PIECE: usize = 10 * SAMPLE_RATE as usize;
 
-/// Features of one sound.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct SoundFeatures {
     pub secs: f64,
@@ -55,7 +54,6 @@ impl SoundFeatureExtractor {
         }
     }
 
-    /// Adds samples.
     pub fn push(&mut self, samples: &[f32]) {
         self.n_samples += samples.len();
         if let Some(onsets) = &mut self.onsets {

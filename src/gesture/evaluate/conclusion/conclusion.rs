@@ -17,15 +17,12 @@ use serde::Serialize;
 pub enum Aspect {
     /// Position of the joints at each moment.
     Position,
-    /// Poses and their sequence.
     Poses,
-    /// Speed of movement.
     Movement,
     /// Alignment of movement with the beat of the sound.
     Beat,
 }
 
-/// Conclusion of a metric.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Answer {
@@ -34,12 +31,10 @@ pub enum Answer {
     Inconclusive,
 }
 
-/// Vote of a metric.
 #[derive(Clone, Debug, Serialize)]
 pub struct Vote {
     pub metric: String,
     pub aspect: Aspect,
-    /// Predictor of the comparison.
     pub against: PredictorKind,
     pub answer: Answer,
     /// Gain in the unit of the metric with its simultaneous interval over all votes; below 0: worse.
@@ -55,11 +50,9 @@ pub struct Conclusion {
     pub word: &'static str,
     /// Full sentence without the votes.
     pub sentence: String,
-    /// Votes of the metrics.
     pub votes: Vec<Vote>,
 }
 
-/// Compares the prediction with the better of the constant poses.
 pub fn better_than_constant_pose(table: &Table, own: &PredictorRow) -> Conclusion {
     let question = "Is the prediction better than a constant pose?";
     let aspects = [Aspect::Position, Aspect::Poses, Aspect::Movement];
@@ -109,7 +102,6 @@ pub fn better_than_constant_pose(table: &Table, own: &PredictorRow) -> Conclusio
     }
 }
 
-/// Better of the constant poses in a metric.
 fn better_constant_pose(table: &Table, index: usize) -> Option<&PredictorRow> {
     let better = |a: &PredictorRow, b: &PredictorRow| table.gain(a, b, index) >= 0.0;
     let constant_poses =

@@ -41,7 +41,6 @@ pub fn name(definition: &Definition) -> String {
     }
 }
 
-/// Name without the part of the body.
 pub fn name_without_part(definition: &Definition) -> String {
     let known =
         NAMES.iter().filter(|(start, _)| definition.name.starts_with(start)).max_by_key(|(start, _)| start.len());

@@ -1,5 +1,8 @@
 //! Metric sums in blocks, which are the units of the bootstrap and of tests, since neighbouring frames are correlated.
-//! The blocks add up to the total, and none extends beyond the end of a clip.
+//! The blocks add up to the total, and none extends beyond the end of a clip. They are long enough that the errors of
+//! neighbouring blocks are almost independent, and otherwise short enough that there are several; dependence is
+//! measured by the integrated autocorrelation time with an automatic window (Sokal 1997, Monte Carlo Methods in
+//! Statistical Mechanics, section 3).
 
 use crate::evaluate::baseline::baselines::Predictor;
 use crate::evaluate::clips::clips::EvalClips;
@@ -112,7 +115,6 @@ pub fn halves(catalogue: &Catalogue, clips: &EvalClips) -> IntervalSums {
     total(all[..all.len() / 2 * 2].par_chunks(2 * n_merged).map(merged).collect())
 }
 
-/// Sum of measurements, with the blocks in order.
 fn total(all: Vec<IntervalSums>) -> IntervalSums {
     let mut sum = IntervalSums::default();
     for one in all {
@@ -120,4 +122,153 @@ fn total(all: Vec<IntervalSums>) -> IntervalSums {
         sum.blocks.extend(one.blocks);
     }
     sum
+}
+
+/// Smallest block length in decorrelation times.
+const MIN_TIMES: f64 = 1.5;
+/// Number of blocks of short motion, if the decorrelation time allows it.
+const N_BLOCKS: f64 = 16.0;
+/// Range of the usual block length, seconds; movements of one second must fit.
+const BLOCK_SECS: [f64; 2] = [2.0, 4.0];
+/// Duration of motion, seconds, above which blocks become longer, which bounds their number.
+const MAX_SECS: f64 = 3600.0;
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BlockLength {
+    /// Length in seconds.
+    pub secs: f64,
+    /// Integrated autocorrelation time of the differences between two predictors' errors, seconds.
+    pub decorrelation_secs: f64,
+}
+
+impl BlockLength {
+    /// Block length for `secs` of motion at `fps`. `differences`: the compared error series, each in pieces with one
+    /// value per frame; the one with the longest decorrelation time counts.
+    pub fn new(secs: f64, fps: f64, differences: &[Vec<Vec<f64>>]) -> Self {
+        let times = differences.iter().map(|pieces| integrated_time(pieces));
+        let decorrelation_secs = times.fold(1.0, f64::max) / fps;
+        let [least, most] = BLOCK_SECS;
+        let usual = (secs / N_BLOCKS).clamp(least, most) * (secs / MAX_SECS).ceil().max(1.0);
+        Self { secs: usual.max(MIN_TIMES * decorrelation_secs), decorrelation_secs }
+    }
+
+    /// Length in frames, at least 1.
+    pub fn frames(&self, fps: f64) -> usize {
+        ((self.secs * fps).round() as usize).max(1)
+    }
+
+    /// Variance of the mean of blocks of `block_secs` relative to that of independent blocks: `1 + 2 r` with the
+    /// correlation r of the means of neighbouring blocks of a first-order autoregressive process with this
+    /// decorrelation time.
+    pub fn variance_inflation(&self, block_secs: f64) -> f64 {
+        // Length of a block in time constants of the exponential decay.
+        let length = 2.0 * block_secs / self.decorrelation_secs;
+        if length.is_nan() || length <= 1e-3 {
+            return 3.0;
+        }
+        let decay = 1.0 - (-length).exp();
+        1.0 + decay * decay / (length - decay)
+    }
+}
+
+/// Sokal's window constant c: the window ends at c times half of the time so far (Sokal's times are half of these).
+const WINDOW: f64 = 5.0;
+/// Smallest assumed share of the time that remains after subtracting the sample mean.
+const MIN_REMAINING: f64 = 0.1;
+
+/// Integrated autocorrelation time in frames, `1 + 2 * (sum of the autocorrelations)`, of a series in pieces: the mean
+/// of N frames has the variance of that of N / time independent frames. It is at least 1 and at most the number of
+/// frames; 1 for a constant series. Lags do not cross pieces, but the mean is that of all pieces, so that pieces of
+/// different level give a long time. Frames that are not finite are ignored. The result is corrected for the use of the
+/// sample mean.
+pub fn integrated_time(pieces: &[Vec<f64>]) -> f64 {
+    let (time, window, n) = windowed(pieces);
+    if window == 0 {
+        return 1.0;
+    }
+    let remaining = 1.0 - (2.0 * window as f64 + 1.0) / n.max(1) as f64;
+    (time.max(1.0) / remaining.max(MIN_REMAINING)).min(n.max(1) as f64)
+}
+
+/// Uncorrected time, its window (last lag), and the number of frames.
+fn windowed(pieces: &[Vec<f64>]) -> (f64, usize, usize) {
+    let all = || pieces.iter().flatten().filter(|value| value.is_finite());
+    let n = all().count();
+    let mean = all().sum::<f64>() / n.max(1) as f64;
+    // Missing values are set to 0, so that they add nothing to the products.
+    let centred = |piece: &Vec<f64>| -> Vec<f64> {
+        piece.iter().map(|value| if value.is_finite() { value - mean } else { 0.0 }).collect()
+    };
+    let pieces: Vec<Vec<f64>> = pieces.iter().map(centred).collect();
+    let product = |lag: usize| -> f64 {
+        pieces.iter().flat_map(|piece| piece.iter().zip(piece.iter().skip(lag))).map(|(a, b)| a * b).sum()
+    };
+    let variance = product(0);
+    let longest = pieces.iter().map(Vec::len).max().unwrap_or(0);
+    let mut time = 1.0;
+    if variance.is_nan() || variance <= 1e-24 * n as f64 * mean * mean {
+        return (time, 0, n);
+    }
+    for lag in 1..longest {
+        time += 2.0 * product(lag) / variance;
+        if lag as f64 >= WINDOW / 2.0 * time {
+            return (time, lag, n);
+        }
+    }
+    (time, longest.saturating_sub(1), n)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn slowly_varying_errors_give_long_blocks() {
+        let series = |period: usize, n: usize| vec![(0..n).map(|t| f64::from((t / period % 2) as u32)).collect()];
+        let fast = BlockLength::new(20.0, 15.0, &[series(1, 300)]);
+        assert_eq!((fast.secs, fast.frames(15.0)), (2.0, 30));
+        assert_eq!(BlockLength::new(60.0, 15.0, &[series(1, 900)]).secs, 3.75);
+        assert_eq!(BlockLength::new(7200.0, 15.0, &[]).secs, 8.0);
+        let slow = BlockLength::new(20.0, 15.0, &[series(1, 300), series(150, 300)]);
+        assert!(slow.secs > 4.0 && slow.secs == 1.5 * slow.decorrelation_secs, "{slow:?}");
+    }
+
+    #[test]
+    fn long_blocks_are_almost_independent() {
+        let length = BlockLength { secs: 2.0, decorrelation_secs: 1.0 };
+        // Means of two neighbouring blocks of an autoregressive process, from its autocorrelations.
+        let (frames, decay): (i32, f64) = (2000, (-4.0 * 2.0 / 2000.0_f64).exp());
+        let correlation = |gap: i32| {
+            let pairs = (-frames..frames).map(|lag| f64::from(frames - lag.abs()) * decay.powi((lag + gap).abs()));
+            pairs.sum::<f64>()
+        };
+        let expected = 1.0 + 2.0 * correlation(frames) / correlation(0);
+        assert!((length.variance_inflation(4.0) - expected).abs() < 1e-3, "{expected}");
+        assert!(length.variance_inflation(400.0) < 1.01 && length.variance_inflation(1e-9) == 3.0);
+        assert!((length.variance_inflation(1e-2) - 3.0).abs() < 0.1);
+    }
+
+    #[test]
+    fn times_match_emcee() {
+        let golden: serde_json::Value =
+            serde_json::from_str(include_str!("../../../../fixtures/reference/verdict_golden.json")).unwrap();
+        for case in golden["integrated_time"].as_array().unwrap() {
+            let series: Vec<f64> = serde_json::from_value(case["series"].clone()).unwrap();
+            let expected = case["time"].as_f64().unwrap();
+            let (time, _, n) = windowed(std::slice::from_ref(&series));
+            assert!((time / expected - 1.0).abs() < 1e-9 && n == series.len(), "{time} {expected}");
+            assert!(integrated_time(&[series]) > time.max(1.0));
+        }
+    }
+
+    #[test]
+    fn pieces_of_different_level_have_a_long_time_and_constants_do_not() {
+        let wave = |level: f64| (0..75).map(|t| level + f64::from(t * 7919 % 101) / 101.0).collect::<Vec<f64>>();
+        let alike = integrated_time(&[wave(0.0), wave(0.0), wave(0.0)]);
+        let apart = integrated_time(&[wave(0.0), wave(5.0), wave(-3.0)]);
+        assert!(alike < 4.0 && apart > 40.0, "{alike} {apart}");
+        for pieces in [vec![], vec![vec![]], vec![vec![f64::NAN; 9]], vec![vec![2.0; 50]], vec![vec![1.0]]] {
+            assert_eq!(integrated_time(&pieces), 1.0);
+        }
+    }
 }

@@ -1,4 +1,7 @@
-//! Block bootstrap: confidence intervals of a metric from blocks drawn with replacement (Efron 1979; Kuensch 1989).
+//! Resampling of blocks: confidence intervals of a metric from blocks drawn with replacement (Efron 1979; Kuensch
+//! 1989), and contributions of groups of blocks to a metric that is any function of sums over blocks, from the values
+//! without each group (the jackknife; Efron and Tibshirani 1993, chapter 11). For a mean over frames they are the
+//! groups' own sums.
 
 use ndarray::Array2;
 use orator_base::math::estimate::Estimate;
@@ -30,6 +33,52 @@ pub fn estimate(value: f64, drawn: &[f64]) -> Estimate {
     Estimate::new(value, value + at(TAIL) - median, value + at(1.0 - TAIL) - median)
 }
 
+/// Largest number of groups. If there are more blocks, neighbours are merged, which limits the number of values to
+/// compute and makes the groups less dependent.
+const MAX_GROUPS: usize = 32;
+
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct BlockGroups {
+    of_block: Vec<usize>,
+    /// Share of the frames in each group, sum 1.
+    shares: Vec<f64>,
+}
+
+impl BlockGroups {
+    pub fn new(frames: &[usize]) -> Self {
+        let n = frames.len().min(MAX_GROUPS);
+        let of_block: Vec<usize> = (0..frames.len()).map(|block| block * n / frames.len()).collect();
+        let total = frames.iter().sum::<usize>().max(1) as f64;
+        let mut shares = vec![0.0; n];
+        of_block.iter().zip(frames).for_each(|(group, frames)| shares[*group] += *frames as f64 / total);
+        Self { of_block, shares }
+    }
+
+    pub fn len(&self) -> usize {
+        self.shares.len()
+    }
+
+    pub fn is_empty(&self) -> bool {
+        self.shares.is_empty()
+    }
+
+    /// Weights of the blocks without each group [groups, blocks]: 0 or 1.
+    pub fn counts_without(&self) -> Array2<f64> {
+        let is_included = |(group, block): (usize, usize)| f64::from(u8::from(self.of_block[block] != group));
+        Array2::from_shape_fn((self.shares.len(), self.of_block.len()), is_included)
+    }
+
+    /// Contribution of each group in the unit of `value`, which is also their mean. `value` is the metric over all
+    /// blocks, `without` the metric without each group.
+    pub fn contributions(&self, value: f64, without: &[f64]) -> Vec<f64> {
+        let n = self.shares.len() as f64;
+        let own = |(share, without): (&f64, &f64)| n * (1.0 - share) * (value - without);
+        let changes: Vec<f64> = self.shares.iter().zip(without).map(own).collect();
+        let bias = changes.iter().sum::<f64>() / n;
+        self.shares.iter().zip(changes).map(|(share, change)| n * share * value + change - bias).collect()
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -48,5 +97,30 @@ mod tests {
         assert!(interval.low < value && value < interval.high && interval.excludes_zero());
         let none = super::estimate(1.0, &[f64::NAN]);
         assert!(none.value == 1.0 && none.interval.low.is_nan() && !none.interval.excludes_zero());
+    }
+
+    #[test]
+    fn contributions_to_a_mean_are_the_sums_of_the_groups() {
+        let frames = [30, 30, 10, 20, 45];
+        let sums = [3.0, -2.0, 7.0, 0.5, 1.0];
+        let groups = BlockGroups::new(&frames);
+        let mean = |counts: &[f64]| {
+            let total = |of: &dyn Fn(usize) -> f64| (0..5).map(|k| counts[k] * of(k)).sum::<f64>();
+            total(&|k| sums[k]) / total(&|k| frames[k] as f64)
+        };
+        let without: Vec<f64> = groups.counts_without().outer_iter().map(|row| mean(&row.to_vec())).collect();
+        let found = groups.contributions(mean(&[1.0; 5]), &without);
+        for (found, sum) in found.iter().zip(sums) {
+            assert!((found - 5.0 * sum / 135.0).abs() < 1e-12, "{found}");
+        }
+    }
+
+    #[test]
+    fn many_blocks_are_merged() {
+        let groups = BlockGroups::new(&[60; 900]);
+        assert_eq!((groups.len(), groups.counts_without().dim()), (32, (32, 900)));
+        assert!(groups.shares.iter().all(|share| (share - 1.0 / 32.0).abs() < 2e-3));
+        assert!(groups.counts_without().column(899).iter().sum::<f64>() == 31.0);
+        assert!(BlockGroups::new(&[]).is_empty() && BlockGroups::new(&[]).contributions(1.0, &[]).is_empty());
     }
 }

@@ -20,7 +20,6 @@ pub struct MetricPair {
     pub b: Option<Estimate>,
 }
 
-/// Outcome of a comparison.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Comparison {
     /// Warning if the results have different ground truth.
@@ -33,7 +32,6 @@ pub struct Comparison {
     pub only_in_b: Vec<String>,
 }
 
-/// Compares the predictions of two results.
 pub fn compare(a: &StoredResult, b: &StoredResult) -> Comparison {
     let warning = format!(
         "A has {} and B {}, and their ground truth differs: better values may come from easier clips",
@@ -103,7 +101,6 @@ fn differences(path: &str, a: &Value, b: &Value, differ: &mut Vec<String>) {
     }
 }
 
-/// Formats the comparison as a text table.
 pub fn text(compared: &Comparison) -> String {
     let cell = |estimate: &Option<Estimate>| match estimate {
         Some(Estimate { value, interval }) if interval.low.is_finite() => {

@@ -1,11 +1,9 @@
 //! The table of metrics: sums over blocks that are long enough to be independent, bootstrap intervals, sign-flip tests
 //! of paired differences, the result file, and the comparison of two results.
 
-pub mod block_length;
 pub mod blocks;
 pub mod bootstrap;
 pub mod compare;
-pub mod jackknife;
 pub mod result;
 pub mod sign_flips;
 pub mod table;

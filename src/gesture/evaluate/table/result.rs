@@ -84,7 +84,6 @@ fn metric(table: &Table, index: usize) -> Value {
     })
 }
 
-/// Metric of a result file.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 pub struct StoredMetric {
     pub name: String,
@@ -97,7 +96,6 @@ pub struct StoredMetric {
     values: Map<String, Value>,
 }
 
-/// Result file.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 pub struct StoredResult {
     evaluation: u64,

@@ -19,7 +19,6 @@ const SEED: u64 = 1;
 /// Tolerance within which two statistics count as equal.
 const ROUNDING: f64 = 1e-9;
 
-/// Mean difference with the result of its test.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TestedDifference {
     /// Mean with the simultaneous interval, which excludes 0 if `p` is at most [`LEVEL`]. The interval is infinite if

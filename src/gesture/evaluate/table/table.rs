@@ -1,9 +1,8 @@
 //! Table of all metrics of all predictors with confidence intervals, computed on the same clips and the same draws.
 
-use super::block_length::BlockLength;
-use super::jackknife::BlockGroups;
+use super::blocks::{self, BlockLength};
+use super::bootstrap::{self, BlockGroups};
 use super::sign_flips::{self, TestedDifference};
-use super::{blocks, bootstrap};
 use crate::evaluate::baseline::baselines::{NumberedCheckpoint, Predictor, PredictorKind};
 use crate::evaluate::clips::clips::EvalClips;
 use crate::metrics::catalogue::{Better, Catalogue, Definition, IntervalSums};
@@ -20,7 +19,6 @@ pub const N_COSTLY_DRAWS: usize = 100;
 /// Number of blocks below which bootstrap intervals are unreliable.
 pub const FEW_BLOCKS: usize = 10;
 
-/// Metrics of one predictor.
 #[derive(Clone, Debug)]
 pub struct PredictorRow {
     pub kind: PredictorKind,
@@ -28,7 +26,6 @@ pub struct PredictorRow {
     pub checkpoint: Option<NumberedCheckpoint>,
     /// Description in one sentence.
     pub description: String,
-    /// One estimate per definition.
     pub values: Vec<Estimate>,
     /// Reasons for missing values; empty where there is a value.
     pub reasons: Vec<String>,
@@ -36,7 +33,6 @@ pub struct PredictorRow {
     without_group: Array2<f64>,
 }
 
-/// Metrics of all predictors.
 #[derive(Clone, Debug)]
 pub struct Table {
     pub settings: MetricSettings,
@@ -201,12 +197,10 @@ fn row(catalogue: &Catalogue, kind: PredictorKind, description: &str, measured: 
 }
 
 impl PredictorRow {
-    /// Human-readable name.
     pub fn name(&self) -> String {
         NumberedCheckpoint::name_of(self.kind, self.checkpoint.as_ref())
     }
 
-    /// Key in a result file.
     pub fn key(&self) -> String {
         NumberedCheckpoint::key_of(self.kind, self.checkpoint.as_ref())
     }

@@ -1,10 +1,9 @@
 //! Generates poses for a sound of any length segment by segment; each segment starts from the last poses of the
 //! previous one.
 
-use super::architecture::{self, Architecture};
+use super::architecture::{self, Architecture, NumberedWord, UNKNOWN};
 use super::metadata::{self, SequenceMetadata};
 use super::poses::PoseFormat;
-use super::vocabulary::{NumberedWord, UNKNOWN};
 use crate::generate::model::checkpoint_file;
 use anyhow::{Result, ensure};
 use candle_core::{DType, Device, Tensor};
@@ -22,14 +21,10 @@ use std::collections::BTreeSet;
 use std::path::Path;
 use std::sync::Arc;
 
-/// A trained sequence-to-sequence network.
 pub struct SequenceGenerator {
-    /// Metadata stored in the checkpoint.
     pub metadata: SequenceMetadata,
     network: Box<dyn GesturePredictor>,
-    /// Tensors of the network.
     params: Params,
-    /// Vectors of words that are not in the vocabulary.
     vectors: Option<Arc<WordVectors>>,
 }
 
@@ -43,7 +38,6 @@ pub struct SpeechInput {
     network: Option<Box<dyn GesturePredictor>>,
 }
 
-/// Generated poses for a sound.
 #[derive(Clone, Debug)]
 pub struct GeneratedPoses {
     /// Smoothed pose features [T, C].
@@ -98,7 +92,6 @@ impl SequenceGenerator {
         }
     }
 
-    /// Frame rate of the generated motion.
     pub fn fps(&self) -> FrameRate {
         self.metadata.fps
     }

@@ -1,8 +1,7 @@
 //! Metadata in the checkpoint of a sequence-to-sequence network, and loading of the network it describes.
 
-use super::architecture::{self, AROUND_SEGMENT_SECS, Architecture, RATES, network_config};
+use super::architecture::{self, AROUND_SEGMENT_SECS, Architecture, NumberedWord, RATES, Vocabulary, network_config};
 use super::poses::PoseFormat;
-use super::vocabulary::{NumberedWord, Vocabulary};
 use anyhow::{Context, Result, ensure};
 use candle_core::Tensor;
 use orator_base::types::time::FrameRate;

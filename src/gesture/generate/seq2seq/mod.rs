@@ -1,10 +1,9 @@
 //! Generation of motion from speech with FineMotion's sequence-to-sequence networks: the checkpoint (`metadata`), the
-//! inputs (`architecture`, `vocabulary`), the output format (`poses`), and generation segment by segment (`generator`).
+//! inputs (`architecture`), the output format (`poses`), and generation segment by segment (`generator`).
 
 pub mod architecture;
 pub mod generator;
 pub mod metadata;
 pub mod poses;
-pub mod vocabulary;
 
 pub use generator::SequenceGenerator;

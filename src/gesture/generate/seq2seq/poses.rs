@@ -10,7 +10,6 @@ use orator_base::types::time::FrameRate;
 use orator_formats::bvh::exponential_maps::{ExponentialMaps, FPS};
 use serde::{Deserialize, Serialize};
 
-/// Format of the pose features.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum PoseFormat {
@@ -25,7 +24,6 @@ pub enum PoseFormat {
 }
 
 impl PoseFormat {
-    /// Number of features per pose.
     pub fn n_features(&self) -> usize {
         match self {
             Self::Captured(maps) => maps.n_columns(),

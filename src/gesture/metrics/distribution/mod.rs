@@ -1,6 +1,5 @@
 //! Metrics of distributions: Frechet distances, diversity, pairwise distances.
 
-pub mod diversity;
 pub mod frechet;
 pub mod frechet_metrics;
 pub mod moments;

@@ -37,7 +37,6 @@ fn turn(degrees: f64) -> f64 {
     degrees - 360.0 * (degrees / 360.0).round()
 }
 
-/// Metrics of a posture channel.
 pub(crate) fn metrics(channel: PostureChannel) -> [MetricFamily; 4] {
     let row = N_JOINTS + usize::from(channel == PostureChannel::Trunk);
     let definition = |name, unit, better, formula, undefined| Definition {
@@ -135,7 +134,6 @@ pub(crate) fn metrics(channel: PostureChannel) -> [MetricFamily; 4] {
     ]
 }
 
-/// All pairs of frame and angle.
 fn angles(pair: &PairedFrames) -> impl Iterator<Item = (usize, usize)> + use<> {
     (0..pair.n_frames()).flat_map(|t| (0..3).map(move |k| (t, k)))
 }

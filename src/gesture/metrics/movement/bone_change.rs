@@ -1,7 +1,6 @@
 //! Changes of bone lengths, which are constant in reality: between consecutive frames, and over time.
 
-use crate::metrics::body_part::BodyPart;
-use crate::metrics::definition::{Better, Definition, MetricFamily};
+use crate::metrics::definition::{Better, BodyPart, Definition, MetricFamily};
 use crate::metrics::pair::PairedFrames;
 use crate::metrics::sums::BlockSums;
 use orator_base::math::vec3::{self, Vec3};

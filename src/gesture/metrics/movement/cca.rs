@@ -2,8 +2,7 @@
 //! weighted sum of all predicted coordinates and one of all ground-truth coordinates. With few frames and many
 //! coordinates it is near 1 for any motion.
 
-use crate::metrics::body_part::BodyPart;
-use crate::metrics::definition::{Better, Definition, MetricFamily};
+use crate::metrics::definition::{Better, BodyPart, Definition, MetricFamily};
 use crate::metrics::distribution::moments;
 use crate::metrics::pair::PairedFrames;
 use crate::metrics::sums::BlockSums;

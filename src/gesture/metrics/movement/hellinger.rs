@@ -1,7 +1,6 @@
 //! Hellinger distance between the histograms of predicted and real speeds: 0 for equal histograms, 1 for disjoint ones.
 
-use crate::metrics::body_part::BodyPart;
-use crate::metrics::definition::{Better, Definition, MetricFamily};
+use crate::metrics::definition::{Better, BodyPart, Definition, MetricFamily};
 use crate::metrics::pair::PairedFrames;
 use crate::metrics::sums::BlockSums;
 use orator_base::math::vec3::{self, Vec3};

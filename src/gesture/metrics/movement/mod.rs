@@ -5,5 +5,4 @@ pub mod angles;
 pub mod bone_change;
 pub mod cca;
 pub mod derivatives;
-pub mod energy;
 pub mod hellinger;

@@ -1,10 +1,12 @@
 //! Position and acceleration errors, averaged over points and windows of one or three frames, including the two of the
-//! trimodal convention (Yoon et al. 2020, `train.py` in their repository).
+//! trimodal convention (Yoon et al. 2020, `train.py` in their repository), and the error after Procrustes alignment
+//! (P-MPJPE), which measures the pose itself regardless of its orientation.
 
-use crate::metrics::body_part::BodyPart;
-use crate::metrics::definition::{Better, Definition, MetricFamily};
-use crate::metrics::per_frame::{self, PointWindow};
+use crate::metrics::definition::{Better, BodyPart, Definition, MetricFamily};
+use crate::metrics::pair::{self, PointWindow};
+use orator_base::math::procrustes::similarity;
 use orator_base::math::vec3::{self, Vec3};
+use orator_base::types::skeleton::{L_HAND, N_HAND_JOINTS, R_HAND};
 use serde_json::json;
 
 /// Mean absolute error of the coordinates, metres, as in the L1 loss of training.
@@ -14,7 +16,7 @@ pub(crate) fn l1(part: BodyPart) -> MetricFamily {
         undefined: "no joint of the part is visible",
         ..Definition::new("l1", part.name(), "m", Better::Lower)
     };
-    per_frame::mean(definition, part, 1, 0, |window| mean_abs(window.difference(0)))
+    pair::mean(definition, part, 1, 0, |window| mean_abs(window.difference(0)))
 }
 
 /// Mean per-joint position error (MPJPE), millimetres, relative to the neck or to the wrist of the same side.
@@ -25,7 +27,7 @@ pub(crate) fn mpjpe(part: BodyPart) -> MetricFamily {
         undefined: "no joint of the part is visible",
         ..Definition::new("mpjpe", part.name(), "mm", Better::Lower)
     };
-    per_frame::mean(definition, part, 1, 0, |window| 1000.0 * vec3::norm(window.difference(0)))
+    pair::mean(definition, part, 1, 0, |window| 1000.0 * vec3::norm(window.difference(0)))
 }
 
 /// Mean norm of the difference between predicted and real accelerations.
@@ -37,7 +39,7 @@ pub(crate) fn acceleration(part: BodyPart) -> MetricFamily {
         ..Definition::new("acceleration_error", part.name(), "m/s^2", Better::Lower)
     };
     let of = |window: &PointWindow| vec3::norm(second_difference(window)) * window.fps() * window.fps();
-    per_frame::mean(definition, part, 3, 0, of)
+    pair::mean(definition, part, 3, 0, of)
 }
 
 /// Acceleration error of the trimodal convention: mean over coordinates, in units per frame^2.
@@ -48,7 +50,7 @@ pub(crate) fn acceleration_by_coordinate() -> MetricFamily {
         undefined: "no joint is visible in 3 frames in a row",
         ..Definition::new("acceleration_error", BodyPart::All.name(), "m/frame^2", Better::Lower)
     };
-    per_frame::mean(definition, BodyPart::All, 3, 0, |window| mean_abs(second_difference(window)))
+    pair::mean(definition, BodyPart::All, 3, 0, |window| mean_abs(second_difference(window)))
 }
 
 /// Number of seed frames given to the generator in the trimodal convention, at `SEED_FPS`.
@@ -65,7 +67,7 @@ pub(crate) fn maje(fps: f64) -> MetricFamily {
         parameters: json!({"n_seed_frames": n_seed}),
         ..Definition::new("maje", BodyPart::All.name(), "m", Better::Lower)
     };
-    per_frame::mean(definition, BodyPart::All, 1, n_seed, |window| mean_abs(window.difference(0)))
+    pair::mean(definition, BodyPart::All, 1, n_seed, |window| mean_abs(window.difference(0)))
 }
 
 /// Mean absolute value of the coordinates.
@@ -77,4 +79,51 @@ fn mean_abs(v: Vec3) -> f64 {
 fn second_difference(window: &PointWindow) -> Vec3 {
     let [a, b, c] = [0, 1, 2].map(|k| window.difference(k));
     std::array::from_fn(|k| a[k] - 2.0 * b[k] + c[k])
+}
+
+/// P-MPJPE of all joints, the body, or the hands, of which each (21 joints) is aligned separately.
+pub(crate) fn p_mpjpe(part: BodyPart) -> MetricFamily {
+    // Groups of joints that are aligned together.
+    let groups: Vec<Vec<usize>> = match part {
+        BodyPart::Hands => [L_HAND, R_HAND].map(|root| (root..root + N_HAND_JOINTS).collect()).to_vec(),
+        _ => vec![part.joints()],
+    };
+    let definition = Definition {
+        formula: "1000 times the mean over t and j of |S_t p - g|, S_t the turn, uniform scale and shift without \
+                  reflection that bring the seen joints of the part in frame t nearest to those of g (least \
+                  squares); part hands: each hand for itself, all its 21 joints, the wrist among them",
+        undefined: "no frame has 3 visible joints of the part",
+        parameters: json!({"scale": true, "reflection": false}),
+        ..Definition::new("p_mpjpe", part.name(), "mm", Better::Lower)
+    };
+    MetricFamily::mean(definition, move |pair, blocks| {
+        for t in 0..pair.n_frames() {
+            for group in &groups {
+                let visible = group.iter().copied().filter(|joint| pair.visible[t][*joint]);
+                let (predicted, ground_truth): (Vec<Vec3>, Vec<Vec3>) =
+                    visible.map(|joint| (pair.predicted[t][joint], pair.ground_truth[t][joint])).unzip();
+                if predicted.len() >= 3 {
+                    let sums = blocks.at(t);
+                    sums[0] += 1000.0 * error(&predicted, &ground_truth);
+                    sums[1] += predicted.len() as f64;
+                }
+            }
+        }
+    })
+}
+
+/// Sum of the distances after the best similarity transform; NaN if a predicted point is not finite.
+fn error(predicted: &[Vec3], ground_truth: &[Vec3]) -> f64 {
+    if predicted.iter().flatten().any(|v| !v.is_finite()) {
+        return f64::NAN;
+    }
+    match similarity(predicted, ground_truth) {
+        Some(best) => predicted.iter().zip(ground_truth).map(|(p, g)| vec3::norm(vec3::sub(best.apply(*p), *g))).sum(),
+        // If all predicted points coincide, they are aligned to the centroid of the ground truth.
+        None => {
+            let n = ground_truth.len() as f64;
+            let centroid: Vec3 = std::array::from_fn(|k| ground_truth.iter().map(|g| g[k]).sum::<f64>() / n);
+            ground_truth.iter().map(|g| vec3::norm(vec3::sub(centroid, *g))).sum()
+        }
+    }
 }

@@ -1,5 +1,4 @@
 //! Metrics of joint positions: L1, MPJPE, Procrustes-aligned MPJPE, PCK, acceleration error.
 
 pub mod errors;
-pub mod p_mpjpe;
 pub mod pck;

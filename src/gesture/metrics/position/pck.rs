@@ -2,8 +2,7 @@
 //! distance from the ground truth is at most alpha times the largest extent of the real pose. `CorrectKeypoints` uses
 //! an alpha of 0.2 for training; the metrics support any alpha, in the image plane and in 3D.
 
-use crate::metrics::body_part::BodyPart;
-use crate::metrics::definition::{Better, Definition, MetricFamily};
+use crate::metrics::definition::{Better, BodyPart, Definition, MetricFamily};
 use crate::metrics::pair::PairedFrames;
 use crate::metrics::sums::BlockSums;
 use ndarray::{ArrayView2, ArrayView3, NdFloat};
@@ -52,7 +51,6 @@ impl KeypointCount {
     }
 }
 
-/// PCK for each combination of `axes`, `alphas` and `parts`.
 pub(crate) fn metric(axes: &[PckAxes], parts: &[BodyPart], alphas: &[f64]) -> MetricFamily {
     let mut variants = Vec::new();
     for axes in axes {
@@ -74,7 +72,6 @@ pub(crate) fn neck_in_box(alphas: &[f64]) -> MetricFamily {
     family(alphas.iter().map(|alpha| (PckAxes::Xyz, BodyPart::All, *alpha)).collect(), true, false)
 }
 
-/// Family with one PCK per variant.
 fn family(variants: Vec<(PckAxes, BodyPart, f64)>, neck_in_box: bool, by_frame: bool) -> MetricFamily {
     let definition = |(axes, part, alpha): &(PckAxes, BodyPart, f64)| {
         let (name, formula) = match axes {

@@ -17,7 +17,6 @@ use std::sync::LazyLock;
 pub const WINDOW: usize = 15;
 /// Frames between the starts of two windows.
 pub const STRIDE: usize = 4;
-/// Dimensions of a row.
 pub const N: usize = 64;
 
 const FILE: &[u8] = include_bytes!("../../../../models/motion_basis.safetensors");
@@ -27,7 +26,6 @@ const ROWS: usize = 256;
 
 /// Orthonormal basis of a subspace of windows.
 pub struct Basis {
-    /// Weight of each joint.
     weights: Array1<f32>,
     /// Basis vectors as columns [window x coordinates, N].
     directions: Array2<f32>,
@@ -101,7 +99,6 @@ pub fn poses(joints: ArrayView3<f32>) -> Array2<f32> {
     poses
 }
 
-/// Whether the joint belongs to a finger.
 pub fn is_finger(joint: usize) -> bool {
     joint > L_HAND
 }

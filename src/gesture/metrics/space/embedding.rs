@@ -18,7 +18,6 @@ use std::sync::LazyLock;
 pub const WINDOW: usize = motion_encoder::WINDOW;
 /// Frames between the starts of two windows.
 pub const STRIDE: usize = 4;
-/// Dimensions of the embedding.
 pub const N: usize = motion_encoder::N_CODE;
 /// Kind of the weights file.
 pub const KIND: &str = "motion-embedding";

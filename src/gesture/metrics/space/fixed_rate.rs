@@ -6,11 +6,9 @@ use orator_base::types::skeleton::{N_JOINTS, NECK, is_duplicate};
 use orator_base::types::time::FrameRate;
 use std::ops::Range;
 
-/// Frame rate of the fixed spaces.
 pub const FPS: FrameRate = FrameRate::new(15, 1);
 /// Number of joints used: all but the neck and the two hand roots.
 pub const N_JOINTS_USED: usize = 46;
-/// Coordinates per frame.
 pub const N_COORDINATES: usize = 3 * N_JOINTS_USED;
 
 /// The joints used, in skeleton order.

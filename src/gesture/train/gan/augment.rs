@@ -2,7 +2,7 @@
 //! depend on. Time shift and speed, gain and pitch, background noise, masked bands and frames (SpecAugment, Park et al.
 //! 2019), and mirrored poses.
 
-use crate::generate::mel_stream::mel_frames;
+use crate::generate::generator::mel_frames;
 use crate::generate::normalisation::Normalisation;
 use crate::train::resume;
 use ndarray::{Array2, Axis, s};
@@ -21,7 +21,6 @@ const SEED_OF_CHANGES: u64 = 0x6368_616e_6765;
 /// Knots of the piecewise linear noise spectrum over the bands.
 const NOISE_KNOTS: usize = 5;
 
-/// Random augmentation of a window.
 #[derive(Clone, Debug, Default)]
 pub struct WindowChange {
     /// Offset of the start of the window, seconds; negative is earlier.

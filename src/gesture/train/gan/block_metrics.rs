@@ -3,7 +3,7 @@
 use super::score::{ChannelError, ErrorReduction, ValidationMetrics};
 use super::windows::WindowBatch;
 use crate::metrics::distribution::frechet::{self, GaussianFit, frechet};
-use crate::metrics::movement::energy::MotionEnergy;
+use crate::metrics::movement::derivatives::MotionEnergy;
 use crate::metrics::position::pck::{CorrectKeypoints, PckAxes};
 use anyhow::Result;
 use candle_core::Tensor;
@@ -94,7 +94,6 @@ pub fn reduction(own: &[[f64; 2]], other: &[[f64; 2]]) -> ErrorReduction {
     ErrorReduction { value, low: bound(value - half_width), high: bound(value + half_width) }
 }
 
-/// Accumulated metrics of a predictor.
 #[derive(Default)]
 pub struct PredictorSums {
     correct: CorrectKeypoints,
@@ -151,7 +150,6 @@ impl AngleSums {
     }
 }
 
-/// Running mean.
 #[derive(Default)]
 pub struct RunningMean {
     sum: f64,

@@ -1,7 +1,7 @@
 //! Features and spectrograms of the intervals of a split. Small splits are cached in memory; large ones are read from
 //! the shards for every window, so that memory does not grow with the dataset. Both ways return the same values.
 
-use crate::generate::mel_stream::mel_frames;
+use crate::generate::generator::mel_frames;
 use crate::generate::normalisation::Normalisation;
 use anyhow::Result;
 use ndarray::Array2;
@@ -28,7 +28,6 @@ pub struct IntervalRows {
     pub first_mel: usize,
 }
 
-/// The intervals of a split.
 pub struct TrainingIntervals<'d> {
     dataset: &'d Dataset,
     samples: Vec<SampleRef>,
@@ -61,12 +60,10 @@ impl<'d> TrainingIntervals<'d> {
         Ok(intervals)
     }
 
-    /// Number of intervals.
     pub fn n_intervals(&self) -> usize {
         self.samples.len()
     }
 
-    /// Number of frames of an interval.
     pub fn n_frames(&self, interval: usize) -> usize {
         self.samples[interval].n_frames
     }

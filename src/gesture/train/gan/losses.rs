@@ -6,7 +6,6 @@ use orator_base::types::skeleton::{L_HAND, L_WRIST, N_JOINTS, NECK, R_HAND, R_WR
 use orator_dataset::config::{AdversarialLoss, BoneLoss};
 use orator_nn::gan::discriminator::motion;
 
-/// Value of a scalar f32 tensor.
 pub fn number(scalar: &Tensor) -> anyhow::Result<f64> {
     Ok(f64::from(scalar.to_scalar::<f32>()?))
 }
@@ -172,19 +171,11 @@ mod tests {
         let mask = pattern(&shape, 9.0)?.gt(0.0)?.to_dtype(DType::F64)?;
         assert!(worst(std::slice::from_ref(&generated), |v| l1(&v[0], &real, &mask))? < 1e-7);
         assert!(worst(std::slice::from_ref(&generated), |v| velocity(&v[0], &real, &mask))? < 1e-7);
-        for loss in [AdversarialLoss::LeastSquares, AdversarialLoss::Log, AdversarialLoss::Minimax] {
-            assert!(worst(&[generated.clone(), real.clone()], |v| discriminator_loss(loss, &v[0], &v[1]))? < 1e-7);
-            assert!(worst(std::slice::from_ref(&generated), |v| generator_loss(loss, &v[0]))? < 1e-7);
-        }
         let shape = [2, N_FEATURES + 2, 4];
         let (poses, real) = (pattern(&shape, 1.0)?, pattern(&shape, 5.0)?);
         let mask = pattern(&shape, 9.0)?.gt(-0.8)?.to_dtype(DType::F64)?;
         assert!(worst(std::slice::from_ref(&poses), |v| speed(&v[0], &real, &mask))? < 1e-6);
         assert!(worst(&[poses], |v| energy(&v[0], &real, &mask))? < 1e-6);
-        for form in [BoneLoss::Relative, BoneLoss::Metres] {
-            let bones = BoneConstancy::new(&normal(), form, DType::F64, &Device::Cpu)?;
-            assert!(worst(&[pattern(&[2, N_FEATURES, 3], 0.0)?], |v| bones.loss(&v[0]))? < 1e-6);
-        }
         Ok(())
     }
 
@@ -199,21 +190,11 @@ mod tests {
     }
 
     #[test]
-    fn losses_match_hand_computed_values() -> Result<()> {
+    fn the_velocity_loss_ignores_masked_differences() -> Result<()> {
         let row = |values: [f64; 3]| Tensor::new(&[[values]], &Device::Cpu);
-        let number = |loss: Result<Tensor>| loss?.to_scalar::<f64>();
-        let (real, generated) = (row([0.5, -1.0, 90.0])?, row([2.0, 0.0, -90.0])?);
-        let log = |x: f64| -(1.0 / (1.0 + (-x).exp())).ln();
-        let expected = (log(0.5) + log(-1.0)) / 3.0 + (log(-2.0) + log(0.0)) / 3.0;
-        assert!((number(discriminator_loss(AdversarialLoss::Log, &real, &generated))? - expected).abs() < 1e-12);
-        assert!(
-            (number(generator_loss(AdversarialLoss::Log, &generated))? - (log(2.0) + log(0.0) + 90.0) / 3.0).abs()
-                < 1e-12
-        );
-        assert_eq!(number(generator_loss(AdversarialLoss::LeastSquares, &row([2.0, 0.0, 1.0])?))?, 2.0 / 3.0);
         // Differences 1, -2 against 0, 3; the second is masked.
-        let loss = velocity(&row([1.0, 2.0, 0.0])?, &row([1.0, 1.0, 4.0])?, &row([1.0, 1.0, 0.0])?);
-        assert_eq!(number(loss)?, 1.0);
+        let loss = velocity(&row([1.0, 2.0, 0.0])?, &row([1.0, 1.0, 4.0])?, &row([1.0, 1.0, 0.0])?)?;
+        assert_eq!(loss.to_scalar::<f64>()?, 1.0);
         Ok(())
     }
 
@@ -262,43 +243,6 @@ mod tests {
         let loss = bones.loss(&moving)?.to_scalar::<f64>()?;
         let with_channels = Tensor::cat(&[&moving, &pattern(&[1, 6, 5], 7.0)?], 1)?;
         assert!(loss > 0.01 && loss == bones.loss(&with_channels)?.to_scalar::<f64>()?);
-        Ok(())
-    }
-
-    /// One upper arm of 0.2 m gets longer by 0.06 m in the second of two frames; all other bones keep their lengths.
-    #[test]
-    fn bone_losses_match_hand_computed_values() -> Result<()> {
-        let table = |value: f32| Array2::from_shape_fn((N_JOINTS, 3), |_| value);
-        let normal = Normalisation::new(&table(0.0), &table(1.0), vec![0.2; N_JOINTS - 1]);
-        let mut joints = vec![[0.0f64; 3]; N_JOINTS];
-        for joint in 1..N_JOINTS {
-            let from = joints[parent(joint).unwrap_or(NECK)];
-            let step = if is_duplicate(joint) { 0.0 } else { 0.2 };
-            joints[joint] = [from[0] + step, from[1], from[2]];
-        }
-        // The elbow and all joints beyond it move along the bone, so that only the upper arm changes.
-        let moved = |joint: usize| std::iter::successors(Some(joint), |at| parent(*at)).any(|at| at == 2);
-        let rows = (1..N_JOINTS).flat_map(|joint| {
-            let [x, y, z] = joints[joint];
-            let after = x + if moved(joint) { 0.06 } else { 0.0 };
-            [x, after, y, y, z, z]
-        });
-        let poses = Tensor::from_vec(rows.collect::<Vec<f64>>(), (1, N_FEATURES, 2), &Device::Cpu)?;
-        let n_bones = (1..N_JOINTS).filter(|joint| !is_duplicate(*joint)).count() as f64;
-        for (form, expected) in [(BoneLoss::Metres, 0.06), (BoneLoss::Relative, 0.06 / 0.2 / n_bones)] {
-            let loss = BoneConstancy::new(&normal, form, DType::F64, &Device::Cpu)?.loss(&poses)?.to_scalar::<f64>()?;
-            assert!((loss - expected).abs() < 1e-6, "{form:?}: {loss}, expected {expected}");
-        }
-        Ok(())
-    }
-
-    #[test]
-    fn the_minimax_generator_loss_is_the_negated_fake_term() -> Result<()> {
-        let scores = Tensor::new(&[0.0f64, 2.0, -2.0, 90.0, -90.0], &Device::Cpu)?;
-        let loss = generator_loss(AdversarialLoss::Minimax, &scores)?.to_scalar::<f64>()?;
-        let log = |x: f64| (1.0 - 1.0 / (1.0 + (-x).exp())).ln();
-        let expected = (log(0.0) + log(2.0) + log(-2.0) - 90.0) / 5.0;
-        assert!((loss - expected).abs() < 1e-12, "{loss}, expected {expected}");
         Ok(())
     }
 }

@@ -1,16 +1,14 @@
 //! Training of the speech-to-gesture GAN: `windows` (data) -> `step` (networks, `losses`, optimiser) -> `validate` and
-//! `score` (selection of the best checkpoint). `train` sets up the loop, for which `batches` prefetches the data.
+//! `score` (selection of the best checkpoint). `train` sets up the loop and prefetches the data.
 
 pub mod augment;
 pub mod average;
-pub mod batches;
 pub mod block_metrics;
 pub mod interval_rows;
 pub mod losses;
 pub mod pretrained;
 pub mod recipe;
 pub mod score;
-pub mod speaker_metadata;
 pub mod speakers;
 pub mod step;
 pub mod train;

@@ -18,7 +18,6 @@ use std::path::{Path, PathBuf};
 /// Largest number of windows used to choose the initial layer of a new speaker.
 const MAX_SELECTION_WINDOWS: usize = 128;
 
-/// Model that a training is initialised from.
 pub struct PretrainedModel {
     path: PathBuf,
     speakers: Vec<SpeakerMetadata>,

@@ -46,7 +46,6 @@ impl TrainingMaterial {
     }
 }
 
-/// Values of a key in all recipes.
 struct RecipeRow {
     key: &'static str,
     rebol: f64,
@@ -104,7 +103,6 @@ const CHOICES: [(&str, &str, &str); 4] = [
     ("bone_loss", "metres", "relative"),
 ];
 
-/// Source of a value of the recipe `rebol2021`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ValueSource {
     /// Stated in Rebol et al. 2021, with the section or equation.
@@ -223,9 +221,6 @@ pub fn mean_pose_warning(material: &TrainingMaterial) -> Option<String> {
 }
 
 /// Three lines that describe the settings of a new training; `secs_a_step`: measured seconds per step on this machine.
-///
-/// # Errors
-/// Settings that cannot be serialised.
 pub fn lines(of: &GanSettings, material: &TrainingMaterial, secs_a_step: Option<f64>) -> Result<Vec<String>> {
     let values = serde_json::to_value(of)?;
     let (train, held_out) = (length(material.train_secs), length(material.validation_secs));
@@ -270,7 +265,6 @@ pub(super) mod tests {
         assert_eq!(warning(60.0), None);
     }
 
-    /// Settings of `recipe` for this many minutes of one speaker.
     pub(crate) fn of_minutes(recipe: GanRecipe, minutes: f64) -> GanSettings {
         let material = TrainingMaterial { train_secs: 60.0 * minutes, validation_secs: 60.0, n_speakers: 1 };
         settings(&GanConfig { recipe, ..GanConfig::default() }, &material, InitialWeights::Random).unwrap()

@@ -47,7 +47,6 @@ pub struct ErrorReduction {
 /// Metrics of the generator and of the mean pose on the same windows.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Validation {
-    /// Evaluated split.
     pub split: String,
     pub n_windows: usize,
     /// Number of poses in the Frechet distance.
@@ -63,7 +62,6 @@ pub struct Validation {
     /// Reduction of the generator's L1 error compared with mismatched sound.
     #[serde(default)]
     pub below_other_sound: Option<ErrorReduction>,
-    /// Errors of the posture channels.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub channels: BTreeMap<PostureChannel, ChannelError>,
     /// Mean absolute change of the bone lengths between consecutive frames of the raw network output, mm.

@@ -1,11 +1,10 @@
 //! A generator and its discriminator in training: one optimiser step, and saving to and loading from checkpoints.
 
-use super::augment;
-use super::average;
 use super::losses::{self, number};
 use super::score::Validation;
 use super::speakers::SpeakerSet;
 use super::windows::WindowBatch;
+use super::{augment, average};
 use crate::generate::model::{BEST, GENERATOR, SpeakerMetadata};
 use crate::train::optim::adam::{self, Adam};
 use crate::train::resume;
@@ -53,7 +52,6 @@ pub struct Losses {
     pub gradient_norm: f64,
 }
 
-/// Metadata of a checkpoint.
 #[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
 pub struct TrainerState {
     pub speaker: SpeakerMetadata,
@@ -61,7 +59,6 @@ pub struct TrainerState {
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub other_speakers: Vec<SpeakerMetadata>,
     pub settings: GanSettings,
-    /// Number of completed steps.
     pub step: usize,
     /// Step and score of the best validation so far.
     pub best: Option<(usize, f32)>,
@@ -79,7 +76,6 @@ pub struct GanTrainer {
     discriminator_params: Params,
     adam_g: Adam,
     adam_d: Adam,
-    /// Number of completed steps.
     pub step: usize,
     /// Step and score of the best validation so far.
     pub best: Option<(usize, f32)>,
@@ -121,12 +117,10 @@ impl GanTrainer {
         })
     }
 
-    /// Number of trainable parameters of the generator.
     pub fn n_parameters(&self) -> usize {
         self.generator_params.n_parameters()
     }
 
-    /// Device of the tensors.
     pub fn device(&self) -> &Device {
         self.generator_params.device()
     }
@@ -248,7 +242,6 @@ impl GanTrainer {
         self.ema.as_ref().map_or(&self.generator, |(ema, _)| ema)
     }
 
-    /// Tensors of `ema_generator`.
     fn ema_tensors(&self) -> Result<BTreeMap<String, Tensor>> {
         Ok(self.ema.as_ref().map_or(&self.generator_params, |(_, params)| params).tensors()?)
     }

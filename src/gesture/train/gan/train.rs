@@ -1,23 +1,22 @@
 //! Training of a speaker's generator against the motion discriminator. The same dataset, settings and seed give the
 //! same checkpoints, even if the training was interrupted: the windows of a step depend only on the seed and the step,
-//! and everything else is stored in the checkpoint.
+//! and everything else is stored in the checkpoint. While a step runs, a separate thread reads the batch of the next
+//! step.
 
-use super::augment;
-use super::batches::{self, BatchPrefetcher};
 use super::pretrained::PretrainedModel;
 use super::recipe::{self, InitialWeights, TrainingMaterial};
 use super::score::Validation;
-use super::speaker_metadata;
 use super::step::{GanTrainer, Losses, TrainerState};
 use super::validate::ValidationIntervals;
-use super::windows::{JoinedWindows, WindowLoader, needed};
+use super::windows::{JoinedWindows, WindowBatch, WindowLoader, needed};
+use super::{augment, speakers};
 pub use crate::generate::model::BEST;
 use crate::generate::model::SpeakerMetadata;
 use crate::generate::normalisation::Normalisation;
 use crate::train::epochs::{self, EpochSchedule, StepReport, TrainingOutcome, ValidatedStep, ValidatedTraining};
 use crate::train::resume::{self, sample_windows};
 use crate::train::{log, no_window};
-use anyhow::{Result, ensure};
+use anyhow::{Context, Result, ensure};
 use orator_base::stage::progress::Progress;
 use orator_base::stage::workdir::{self, FolderLock};
 use orator_base::text::counted;
@@ -28,7 +27,9 @@ use orator_nn::cpu::spin_pool::with_spinning_workers;
 use orator_nn::gan::generator::FRAMES_MULTIPLE;
 use orator_nn::params::open_device;
 use orator_nn::weights::Contents;
+use rayon::ThreadPoolBuilder;
 use std::path::Path;
+use std::sync::mpsc::{self, Receiver, Sender};
 use std::time::{Duration, Instant};
 
 /// Trains on `dataset` until `requested.steps`, resuming from the newest checkpoint in `folder` if there is one; then
@@ -58,7 +59,7 @@ pub fn train_with_callback(
     validated: &mut dyn FnMut(ValidatedStep),
 ) -> Result<TrainingOutcome<Validation>> {
     check(requested)?;
-    speaker_metadata::check(datasets)?;
+    speakers::check(datasets)?;
     // Shared lock: `generate` may load the model during training; `forget` may not remove it.
     let _model = FolderLock::shared(folder)?;
     let _lock = workdir::lock(folder)?;
@@ -81,8 +82,7 @@ pub fn train_with_callback(
                 .as_ref()
                 .map_or(InitialWeights::Random, |pretrained_model| pretrained_model.kind(datasets.len()));
             let settings = recipe::settings(requested, &material, initial_weights)?;
-            let normal =
-                |dataset: &&Dataset| speaker_metadata::normalisation_with_channels(dataset, &requested.channels);
+            let normal = |dataset: &&Dataset| speakers::normalisation_with_channels(dataset, &requested.channels);
             (settings, datasets.iter().map(normal).collect::<Result<Vec<_>>>()?)
         }
     };
@@ -98,7 +98,7 @@ pub fn train_with_callback(
     progress.say(&format!("{} of {dirs}; writing checkpoints to {}", counted(n_windows, "window"), folder.display()));
     let held_out = ValidationIntervals::load(&normalised_datasets, &settings, progress)?;
     let metadata = |((dataset, normal), loader): (&(&Dataset, Normalisation), &WindowLoader)| {
-        speaker_metadata::metadata(dataset, normal, loader, &settings, datasets.len())
+        speakers::metadata(dataset, normal, loader, &settings, datasets.len())
     };
     let speakers: Vec<SpeakerMetadata> = match &resumed {
         Some((stored, _)) => stored.speakers(),
@@ -129,7 +129,7 @@ pub fn train_with_callback(
         let which = sample_windows(settings.seed, step, settings.batch, loader.len());
         loader.batch_changed(&which, &augment::changes(&settings, step, loader.fps()))
     };
-    let (outcome, waiting) = batches::prefetch(settings.steps, &batch, |batches| {
+    let (outcome, waiting) = prefetch(settings.steps, &batch, |batches| {
         let mut training = GanTraining {
             names: trainer.speakers.names(),
             is_pretrained: pretrained_model.is_some(),
@@ -163,7 +163,6 @@ fn secs_a_step(trainer: &GanTrainer, loader: &JoinedWindows) -> Result<Option<f6
     })
 }
 
-/// A trainer with its training batches and validation intervals.
 struct GanTraining<'a, 'b> {
     names: String,
     /// Whether the training was initialised from another model in this run.
@@ -173,7 +172,6 @@ struct GanTraining<'a, 'b> {
     held_out: &'a ValidationIntervals,
     /// Total time of the steps, including the wait for their batches.
     stepping: Duration,
-    /// Time spent waiting for batches.
     waiting: Duration,
 }
 
@@ -254,7 +252,7 @@ fn resume(
         );
         let speakers = std::iter::once(&mut stored.speaker).chain(&mut stored.other_speakers);
         for (metadata, dataset) in speakers.zip(datasets) {
-            speaker_metadata::resume(metadata, dataset, &mut differences)?;
+            speakers::resume(metadata, dataset, &mut differences)?;
         }
         Ok((stored, differences))
     })
@@ -275,4 +273,83 @@ fn check(settings: &GanConfig) -> Result<()> {
     );
     open_device(settings.device == ComputeDevice::Cuda)?;
     Ok(())
+}
+
+pub type BatchOfStep<'a> = &'a (dyn Fn(usize) -> Result<WindowBatch> + Sync);
+
+pub struct BatchPrefetcher<'a> {
+    batch: BatchOfStep<'a>,
+    /// Steps of the training; nothing is prefetched after the last.
+    n_steps: usize,
+    requests: Sender<usize>,
+    results: Receiver<(usize, Result<WindowBatch>)>,
+    /// Step whose batch is being prefetched.
+    pending: Option<usize>,
+}
+
+impl BatchPrefetcher<'_> {
+    /// Returns the batch of `step`, and starts to prefetch that of the next step.
+    pub fn take(&mut self, step: usize) -> Result<WindowBatch> {
+        let prefetched = match self.pending.take() {
+            Some(pending) => Some(self.results.recv().context("the thread that loads batches has stopped")?)
+                .filter(|_| pending == step)
+                .map(|(_, batch)| batch),
+            None => None,
+        };
+        let batch = prefetched.unwrap_or_else(|| (self.batch)(step))?;
+        if step + 1 < self.n_steps && self.requests.send(step + 1).is_ok() {
+            self.pending = Some(step + 1);
+        }
+        Ok(batch)
+    }
+}
+
+/// Calls `work` with prefetched batches, which `batch` reads, of a training of `n_steps`.
+pub fn prefetch<R>(
+    n_steps: usize,
+    batch: BatchOfStep,
+    work: impl FnOnce(&mut BatchPrefetcher) -> Result<R>,
+) -> Result<R> {
+    // One reader thread, since the others are busy with the step.
+    let reader =
+        ThreadPoolBuilder::new().num_threads(1).build().context("cannot start the thread that loads batches")?;
+    std::thread::scope(|scope| {
+        let (requests, requested) = mpsc::channel();
+        let (sender, results) = mpsc::channel();
+        scope.spawn(move || {
+            for step in requested {
+                if sender.send((step, reader.install(|| batch(step)))).is_err() {
+                    break;
+                }
+            }
+        });
+        work(&mut BatchPrefetcher { batch, n_steps, requests, results, pending: None })
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use candle_core::{Device, Tensor};
+    use std::sync::atomic::{AtomicUsize, Ordering};
+
+    #[test]
+    fn every_step_gets_its_own_batch_and_none_is_read_after_the_last() {
+        let last = AtomicUsize::new(0);
+        let batch = |step: usize| -> Result<WindowBatch> {
+            last.fetch_max(step, Ordering::Relaxed);
+            anyhow::ensure!(step != 6, "step 6 cannot be read");
+            let tensor = || Tensor::full(step as f32, 1, &Device::Cpu);
+            Ok(WindowBatch { mels: tensor()?, poses: tensor()?, mask: tensor()?, speakers: vec![step as u32] })
+        };
+        let taken = prefetch(10, &batch, |batches| {
+            // A step may be repeated or skipped.
+            [0, 1, 2, 2, 3, 5].into_iter().map(|step| Ok(batches.take(step)?.speakers[0])).collect::<Result<Vec<u32>>>()
+        });
+        assert_eq!(taken.unwrap(), [0, 1, 2, 2, 3, 5]);
+        let failed = prefetch(10, &batch, |batches| batches.take(5).and_then(|_| batches.take(6)).map(drop));
+        assert_eq!(failed.unwrap_err().to_string(), "step 6 cannot be read");
+        prefetch(10, &batch, |batches| batches.take(9).map(drop)).unwrap();
+        assert_eq!(last.load(Ordering::Relaxed), 9);
+    }
 }

@@ -25,7 +25,6 @@ const MAX_FRAMES: usize = 16_384;
 /// Largest number of frames generated at once.
 const PIECE: usize = 2_048;
 
-/// Intervals to validate on.
 pub struct ValidationIntervals {
     split: Split,
     /// Frames per block.

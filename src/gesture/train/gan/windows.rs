@@ -2,7 +2,7 @@
 
 use super::augment::{self, WindowChange, WindowRows};
 use super::interval_rows::{IntervalRows, TrainingIntervals};
-use crate::generate::mel_stream::mel_frames;
+use crate::generate::generator::mel_frames;
 use crate::generate::normalisation::{N_FEATURES, Normalisation};
 use crate::train::no_window::NeededFrames;
 use anyhow::{Context, Result, ensure};
@@ -21,7 +21,6 @@ use std::ops::Range;
 /// Largest number of bytes of intervals that are cached in memory.
 pub const CACHE_BYTES: usize = 384 << 20;
 
-/// All windows of a split.
 pub struct WindowLoader<'d> {
     fps: FrameRate,
     n_frames: usize,
@@ -33,7 +32,6 @@ pub struct WindowLoader<'d> {
     starts: Vec<(usize, usize)>,
 }
 
-/// Batch of windows, f32.
 pub struct WindowBatch {
     /// [B, 64, mel frames]
     pub mels: Tensor,
@@ -51,7 +49,6 @@ pub const fn needed(n_frames: usize) -> NeededFrames {
 }
 
 impl WindowBatch {
-    /// Copy of the batch on `device`.
     pub fn on(&self, device: &Device) -> Result<Self> {
         let on = |tensor: &Tensor| tensor.to_device(device);
         let (mels, poses, mask) = (on(&self.mels)?, on(&self.poses)?, on(&self.mask)?);
@@ -135,12 +132,10 @@ impl<'d> WindowLoader<'d> {
         Ok(WindowBatch { mels: tensor(sound)?, poses: tensor(poses)?, mask: tensor(mask)?, speakers: vec![0] })
     }
 
-    /// Frame rate of the poses.
     pub fn fps(&self) -> FrameRate {
         self.fps
     }
 
-    /// Number of windows.
     pub fn len(&self) -> usize {
         self.starts.len()
     }
@@ -264,7 +259,6 @@ impl<'d> JoinedWindows<'d> {
         Self(loaders)
     }
 
-    /// Number of windows.
     pub fn len(&self) -> usize {
         self.0.iter().map(WindowLoader::len).sum()
     }
@@ -273,7 +267,6 @@ impl<'d> JoinedWindows<'d> {
         self.len() == 0
     }
 
-    /// Frame rate of the poses.
     pub fn fps(&self) -> FrameRate {
         self.0[0].fps()
     }
@@ -313,7 +306,6 @@ fn joined(parts: &[WindowBatch]) -> Result<WindowBatch> {
     })
 }
 
-/// Row of a feature in the mask of joints and angles.
 fn mask_row(feature: usize) -> usize {
     if feature < N_FEATURES { feature / 3 } else { feature - N_FEATURES + N_BONES }
 }

@@ -16,7 +16,6 @@ use std::sync::Mutex;
 /// Elements per task; fixed, so that results do not depend on the number of threads.
 const GRAIN: usize = 32 * 1024;
 
-/// Settings of the optimiser.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Config {
     pub beta1: f64,
@@ -55,7 +54,6 @@ struct AdamSlot {
     moments: MomentStorage,
 }
 
-/// Moments of a tensor, on its device.
 enum MomentStorage {
     Cpu(RefCell<AdamMoments>),
     /// Tensors on another device, updated by the fallback.

@@ -34,7 +34,6 @@ impl DeviceMoments {
         Ok(())
     }
 
-    /// Updates the moments, and moves `var` against `grad`.
     pub fn update(&mut self, var: &Var, grad: &Tensor, scalars: &AdamScalars) -> Result<()> {
         let AdamScalars { beta1, beta2, eps, scale, rate, correction, keep } = *scalars;
         let of = f64::from;
@@ -53,12 +52,10 @@ impl DeviceMoments {
     }
 }
 
-/// Sum of the squared elements of a gradient.
 pub fn sum_of_squares(grad: &Tensor) -> Result<f64> {
     grad.sqr()?.sum_all()?.to_scalar::<f32>().map(f64::from)
 }
 
-/// Scalars of one update.
 #[derive(Clone, Copy)]
 pub struct AdamScalars {
     pub beta1: f32,

@@ -1,6 +1,6 @@
 //! A folder of motion captures: `NAME.bvh` with its sound `NAME.wav`, and optionally a transcript with the same stem.
 
-use super::sequence::{PoseSequence, SequenceSplits};
+use super::segments::{PoseSequence, SequenceSplits};
 use crate::generate::seq2seq::architecture;
 use anyhow::{Context, Result, bail, ensure};
 use ndarray::{Array2, s};
@@ -74,13 +74,11 @@ impl CaptureFolder {
         Ok(Self { dir: dir.to_owned(), rate, mapping, captures })
     }
 
-    /// Name of the folder.
     pub fn name(&self) -> String {
         let dir = self.dir.canonicalize().unwrap_or_else(|_| self.dir.clone());
         dir.file_name().map_or_else(|| "captures".to_owned(), |name| name.to_string_lossy().into_owned())
     }
 
-    /// Path of the folder.
     pub fn dir(&self) -> &Path {
         &self.dir
     }
@@ -122,7 +120,6 @@ impl CaptureFolder {
         Ok(SequenceSplits { train, held_out, notes })
     }
 
-    /// Sequence of a capture, and notes on its motion and its transcript.
     fn sequence(
         &self,
         capture: &Capture,

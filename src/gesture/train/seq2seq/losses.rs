@@ -89,52 +89,31 @@ pub fn total(settings: &Seq2seqSettings, generated: &Tensor, real: &Tensor, logi
 mod tests {
     use super::*;
     use candle_core::Device;
-    use orator_nn::ops::gradcheck::{pattern, worst};
-
-    fn number(loss: Result<Tensor>) -> Result<f64> {
-        loss?.to_scalar()
-    }
+    use orator_nn::ops::gradcheck::worst;
 
     #[test]
-    fn losses_match_hand_computed_values() -> Result<()> {
+    fn totals_match_hand_computed_values() -> Result<()> {
         // Two poses of two features each: (3, 0), then (0, 4).
         let generated = Tensor::new(&[[[3.0, 0.0], [0.0, 4.0]]], &Device::Cpu)?;
         let real = Tensor::new(&[[[1.0, 0.0], [0.0, 5.0]]], &Device::Cpu)?;
-        let near =
-            |loss: Result<Tensor>, expected: f64| -> Result<bool> { Ok((number(loss)? - expected).abs() < 1e-9) };
-        assert!(near(l1(&generated, &real), 0.75)? && near(mse(&generated, &real), 1.25)?);
-        assert!(near(continuity_of_numbers(&generated), 7.0 / 4.0)? && near(continuity_of_poses(&generated), 5.0)?);
-        // The norms over time are 3 and 4, the variances 2.25 and 4.
-        assert!(
-            near(variance_loss_of_code(&generated), -7.0 / 4.0)? && near(variance_loss_of_paper(&generated), -3.125)?
-        );
-        let logits = |a: f64, b: f64| Tensor::new(&[[a], [b]], &Device::Cpu);
-        let entropy = |x: f64| -(1.0 / (1.0 + (-x).exp())).ln();
-        let expected = (entropy(2.0) + entropy(-1.0) + entropy(-0.5) + entropy(1.0)) / 4.0;
-        assert!(near(discriminator(&logits(0.5, -1.0)?, &logits(2.0, -1.0)?), expected)?);
-        assert!(near(generator_loss(AdversarialLoss::Log, &logits(0.5, -90.0)?), (entropy(0.5) + 90.0) / 2.0)?);
+        let near = |loss: Result<Tensor>, expected: f64| -> Result<bool> {
+            Ok((loss?.to_scalar::<f64>()? - expected).abs() < 1e-9)
+        };
         let settings = Seq2seqSettings::default();
         let code_loss = total(&settings, &generated, &real, None);
         assert!(near(code_loss, 0.75 + 0.01 * 1.75 - 1.75)?);
-        let gan_loss = total(&adversarial_settings(&settings), &generated, &real, Some(&logits(0.0, 0.0)?));
+        let gan_loss = total(
+            &adversarial_settings(&settings),
+            &generated,
+            &real,
+            Some(&Tensor::zeros((2, 1), candle_core::DType::F64, &Device::Cpu)?),
+        );
         assert!(near(gan_loss, 1.25 + 0.0175 + 0.01 * 2f64.ln())?);
         Ok(())
     }
 
     #[test]
-    fn gradients_match_finite_differences() -> Result<()> {
-        let (generated, real) = (pattern(&[2, 4, 3], 0.0)?, pattern(&[2, 4, 3], 3.0)?);
-        let paper_settings = Seq2seqSettings {
-            distance: DistanceLoss::Mse,
-            continuity: ContinuityLoss::Poses,
-            variance_loss: VarianceLoss::Variance,
-            ..Seq2seqSettings::default()
-        };
-        for settings in [Seq2seqSettings::default(), paper_settings] {
-            assert!(worst(&[generated.clone(), real.clone()], |v| total(&settings, &v[0], &v[1], Some(&v[0])))? < 1e-7);
-        }
-        assert!(worst(&[generated, real], |v| discriminator(&v[0], &v[1]))? < 1e-7);
-        // The gradient at constant poses, where the norms are 0, is not NaN.
+    fn the_gradient_at_constant_poses_is_finite() -> Result<()> {
         let constant = Tensor::zeros((1, 3, 2), candle_core::DType::F64, &Device::Cpu)?;
         assert!(
             worst(std::slice::from_ref(&constant), |v| variance_loss_of_code(&v[0])? + continuity_of_poses(&v[0])?)?

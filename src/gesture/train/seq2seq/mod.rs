@@ -1,12 +1,10 @@
 //! Training of FineMotion's sequence-to-sequence networks (`nn::seq2seq`). Data flow: `source` (a dataset, or
-//! `captures`) -> `sequence` -> `segments` -> `step` (network, `losses`, optimiser) -> `validate`; `train` is the loop.
+//! `captures`) -> `segments` -> `step` (network, `losses`, optimiser) -> `validate`; `train` is the loop.
 
 pub mod captures;
 pub mod losses;
 pub mod reading;
-pub mod rollout_previous;
 pub mod segments;
-pub mod sequence;
 pub mod source;
 pub mod step;
 pub mod train;

@@ -9,7 +9,6 @@ use orator_base::types::time::FrameRate;
 use orator_dataset::config::{FineMotionReading, SeamState, Seq2seqConfig, Seq2seqSettings, SequenceNetwork, number};
 use serde_json::{Value, json};
 
-/// Value of a key in one reading.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum ReadingValue {
     Number(f64),

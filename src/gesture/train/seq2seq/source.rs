@@ -2,11 +2,11 @@
 //! sequences.
 
 use super::captures::CaptureFolder;
-use super::sequence::{PoseSequence, SequenceSplits};
+use super::segments::{PoseSequence, SequenceSplits};
 use crate::generate::representation::Representation;
 use crate::generate::seq2seq::architecture;
 use crate::generate::seq2seq::poses::PoseFormat;
-use crate::train::gan::speaker_metadata::normalisation;
+use crate::train::gan::speakers::normalisation;
 use anyhow::{Result, bail, ensure};
 use orator_base::types::sound::SAMPLE_RATE;
 use orator_base::types::time::FrameRate;
@@ -15,7 +15,6 @@ use orator_dataset::{Dataset, Split};
 use orator_formats::bvh::exponential_maps::FPS;
 use rayon::prelude::*;
 
-/// Training data.
 #[derive(Clone, Copy)]
 pub enum TrainingSource<'a> {
     Dataset(&'a Dataset),
@@ -31,7 +30,6 @@ impl TrainingSource<'_> {
         }
     }
 
-    /// Path of the folder, for messages.
     pub fn path(&self) -> String {
         match self {
             Self::Dataset(dataset) => dataset.dir().display().to_string(),
@@ -39,7 +37,6 @@ impl TrainingSource<'_> {
         }
     }
 
-    /// Frame rate of the poses.
     pub fn fps(&self) -> FrameRate {
         match self {
             Self::Dataset(dataset) => dataset.info().fps,
@@ -55,7 +52,6 @@ impl TrainingSource<'_> {
         }
     }
 
-    /// Hash of the data.
     pub fn hash(&self) -> Result<String> {
         match self {
             Self::Dataset(dataset) => dataset.hash(),

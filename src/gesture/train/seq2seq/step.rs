@@ -4,9 +4,8 @@ use super::losses;
 use super::segments::SegmentBatch;
 use super::validate::SequenceValidation;
 use crate::generate::model::BEST;
-use crate::generate::seq2seq::architecture::{self, Architecture};
+use crate::generate::seq2seq::architecture::{self, Architecture, PADDING, UNKNOWN};
 use crate::generate::seq2seq::metadata::{NETWORK, SequenceMetadata};
-use crate::generate::seq2seq::vocabulary::{PADDING, UNKNOWN};
 use crate::train::gan::losses::number;
 use crate::train::optim::adam::{self, Adam};
 use crate::train::resume;
@@ -44,12 +43,10 @@ pub struct SequenceLosses {
     pub gradient_norm: f64,
 }
 
-/// Metadata of a checkpoint.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct SequenceState {
     pub speaker: SequenceMetadata,
     pub settings: Seq2seqSettings,
-    /// Number of completed steps.
     pub step: usize,
     /// Step and score of the best validation so far.
     pub best: Option<(usize, f32)>,
@@ -72,7 +69,6 @@ pub struct SequenceTrainer {
     adversary: Option<Adversary>,
     /// Settings of the loss, which differ from `settings` for the adversarial network.
     loss: Seq2seqSettings,
-    /// Number of completed steps.
     pub step: usize,
     /// Step and score of the best validation so far.
     pub best: Option<(usize, f32)>,
@@ -107,7 +103,6 @@ impl SequenceTrainer {
         })
     }
 
-    /// Parameters of the network.
     pub fn params(&self) -> &Params {
         &self.params
     }

@@ -3,16 +3,13 @@
 //! everything else is stored in the checkpoint.
 
 use super::reading;
-use super::rollout_previous::roll_out_previous;
-use super::segments::SegmentLoader;
-use super::sequence::{PoseSequence, SequenceSplits};
+use super::segments::{PoseSequence, SegmentLoader, SequenceSplits, roll_out_previous};
 use super::source::TrainingSource;
 use super::step::{SequenceLosses, SequenceState, SequenceTrainer};
 use super::validate::{SequenceValidation, ValidationSegments};
 pub use crate::generate::model::BEST;
-use crate::generate::seq2seq::architecture::{self, network_config};
+use crate::generate::seq2seq::architecture::{self, PADDING, UNKNOWN, Vocabulary, network_config};
 use crate::generate::seq2seq::metadata::SequenceMetadata;
-use crate::generate::seq2seq::vocabulary::{PADDING, UNKNOWN, Vocabulary};
 use crate::train::epochs::{self, EpochSchedule, StepReport, TrainingOutcome, ValidatedStep, ValidatedTraining};
 use crate::train::log;
 use crate::train::no_window::{self, NeededFrames};
@@ -239,7 +236,6 @@ fn initialise_scales(trainer: &SequenceTrainer, train: &[PoseSequence]) -> Resul
     Ok(baseline.set_scale(&tensor(scales)?, &tensor(noise)?)?)
 }
 
-/// A trainer with its training and validation segments.
 struct SequenceTraining<'a> {
     trainer: &'a mut SequenceTrainer,
     loader: &'a SegmentLoader,

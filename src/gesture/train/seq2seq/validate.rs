@@ -10,19 +10,15 @@ use orator_nn::Mode;
 use orator_nn::seq2seq::predict::GesturePredictor;
 use serde::{Deserialize, Serialize};
 
-/// Largest number of segments in a validation.
 const MAX_SEGMENTS: usize = 256;
 
-/// Segments to validate on.
 pub struct ValidationSegments {
     split: &'static str,
     batches: Vec<SegmentBatch>,
 }
 
-/// Metrics of a validation.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SequenceValidation {
-    /// Evaluated split.
     pub split: String,
     pub n_segments: usize,
     /// Mean absolute error of the known features.
@@ -59,7 +55,6 @@ impl ValidationSegments {
         Ok(Self { split, batches })
     }
 
-    /// Metrics of the network on the segments.
     pub fn validate(&self, network: &dyn GesturePredictor) -> Result<SequenceValidation> {
         let mut sums = Sums::default();
         for batch in &self.batches {

@@ -13,7 +13,7 @@ use orator_dataset::{Dataset, Sample, Split};
 use orator_formats::transcript::Word;
 use orator_gesture::generate::seq2seq::architecture::Architecture;
 use orator_gesture::generate::trained::TrainedSpeaker;
-use orator_gesture::metrics::movement::energy::MotionEnergy;
+use orator_gesture::metrics::movement::derivatives::MotionEnergy;
 use orator_gesture::metrics::position::pck::{CorrectKeypoints, PckAxes};
 use orator_test_support::rule::baselines::{RuleBaselines, frame_log_mel};
 use orator_test_support::rule::dataset::{RULE_OF_WORDS, SpokenClip};

@@ -19,7 +19,6 @@ pub fn chunk_rows(batch: usize) -> usize {
     if batch < MIN_DIVIDED { batch.max(1) } else { batch.div_ceil(batch.div_ceil(CHUNK).next_multiple_of(2)) }
 }
 
-/// Sizes of the input and of the state.
 #[derive(Clone, Copy, Debug)]
 pub struct GruSizes {
     pub input: usize,

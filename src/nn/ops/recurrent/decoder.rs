@@ -22,7 +22,6 @@ pub struct TruePoses<'a> {
     pub taken: &'a [bool],
 }
 
-/// Inputs of a decoder.
 pub struct DecoderInputs<'a> {
     /// Poses [B, P, X] that are read before the first step; the last one is read again at the first step.
     pub previous: &'a Tensor,
@@ -34,7 +33,6 @@ pub struct DecoderInputs<'a> {
     pub truth: Option<&'a TruePoses<'a>>,
 }
 
-/// Weights of a decoder.
 pub struct DecoderWeights<'a> {
     /// Weights of the GRU as one flat tensor.
     pub gru: &'a Tensor,

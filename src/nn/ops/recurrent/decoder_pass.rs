@@ -6,14 +6,12 @@ use crate::cpu::tensor::{Matrix, Scalar, add_product};
 use crate::cpu::vectorised::{Attended, DropMask, attend, attend_backward, drop_out};
 use candle_core::Result;
 
-/// Sizes of a decoder and its batch.
 pub struct DecoderSizes {
     pub batch: usize,
     pub n_previous: usize,
     pub n_steps: usize,
     /// Sizes of pose and state.
     pub cell: GruSizes,
-    /// Number of keys of each sequence.
     pub n_keys: Vec<usize>,
     /// Number of rows per chunk.
     pub chunk: usize,
@@ -28,7 +26,6 @@ impl DecoderSizes {
         1 + self.n_keys.len()
     }
 
-    /// Number of keys of all sequences.
     pub fn all_keys(&self) -> usize {
         self.n_keys.iter().sum()
     }
@@ -52,10 +49,6 @@ impl DecoderSizes {
         self.cell.n_weights() + self.cell.input * (self.n_read() * self.cell.hidden + 1)
     }
 
-    /// Checks the shapes of starts, keys and weights.
-    ///
-    /// # Errors
-    /// They do not have these sizes.
     pub fn check(&self, start: &[usize], keys: &[usize], n_weights: usize) -> Result<()> {
         let fits = start == [self.batch, self.start_len()]
             && keys == [self.batch, self.all_keys(), self.cell.hidden]

@@ -78,7 +78,6 @@ pub fn drop_mask(p: f64, mode: &mut Mode) -> Option<DropMask> {
     }
 }
 
-/// Options of a GRU.
 #[derive(Clone, Copy, Debug)]
 pub struct GruOptions {
     /// 1: forward; 2: forward and backward in time, concatenated in the result.
@@ -103,7 +102,6 @@ struct GruOp {
     saved: SavedChunks,
 }
 
-/// Sizes of one pass.
 struct PassSizes {
     batch: usize,
     n_steps: usize,
@@ -128,12 +126,10 @@ impl GruOp {
         candle_core::bail!("gru: input {x:?} does not fit initial states {first:?} and {n_weights} weights")
     }
 
-    /// Number of steps of a direction.
     fn steps(&self, direction: usize, s: &PassSizes) -> usize {
         if self.options.last && direction == 1 { 1 } else { s.n_steps }
     }
 
-    /// Time index of step `k` of a direction.
     fn time(direction: usize, k: usize, s: &PassSizes) -> usize {
         if direction == 1 { s.n_steps - 1 - k } else { k }
     }

@@ -1,6 +1,7 @@
-//! Hands of the speaker: `tracker` detects them from frame to frame, `visibility` decides which of the detected points
-//! are visible.
+//! Hands of the speaker: `tracker` detects them from frame to frame, with `arm_search` where one is not at its
+//! previous position; `visibility` decides which of the detected points are visible.
 
+mod arm_search;
 pub mod tracker;
 pub mod visibility;
 

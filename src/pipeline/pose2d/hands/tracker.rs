@@ -1,7 +1,8 @@
-//! Hand tracking: each hand is searched at its previous position, else at its arm, else at detected palms; then hands
-//! that are the other hand, duplicates, or of the wrong handedness are rejected. Repeated unsuccessful searches become
-//! less frequent.
+//! Hand tracking: each hand is searched at its previous position, else at its arm (`search_arm`), else at detected
+//! palms; then hands that are the other hand, duplicates, or of the wrong handedness are rejected. Repeated
+//! unsuccessful searches become less frequent. "Body width" below is the result of `body_width`.
 
+use super::arm_search::search_arm;
 use super::visibility::{centre, distance};
 use crate::pose2d::decode::ScoredPoint;
 use crate::pose2d::detector::PalmDetector;
@@ -15,10 +16,21 @@ use orator_media::opencv::warp::Region;
 
 /// Elbow and wrist of the left and right arm.
 const ARMS: [(usize, usize); 2] = [(coco::L_ELBOW, coco::L_WRIST), (coco::R_ELBOW, coco::R_WRIST)];
-/// Largest distance of a hand from the wrist of its arm, in shoulder widths; half as much if the other arm's wrist is
+/// Bones that bound the body width from below, and the ratios of body width to bone and to trunk length. They are low,
+/// so that the shoulders decide in a frontal view: on rendered persons an arm bone measures up to 1.14 and the trunk
+/// up to 1.7 shoulder widths.
+const WIDTH_BONES: [(usize, usize); 4] = [
+    (coco::L_SHOULDER, coco::L_ELBOW),
+    (coco::R_SHOULDER, coco::R_ELBOW),
+    (coco::L_ELBOW, coco::L_WRIST),
+    (coco::R_ELBOW, coco::R_WRIST),
+];
+const WIDTH_PER_BONE: f64 = 0.9;
+const WIDTH_PER_TRUNK: f64 = 0.6;
+/// Largest distance of a hand from the wrist of its arm, in body widths; half as much if the other arm's wrist is
 /// closer, since a hand model may switch hands where they overlap.
 const MAX_WRIST_DISTANCE: f64 = 0.5;
-/// Two hands whose centres are closer than this, in shoulder widths, are one.
+/// Two hands whose centres are closer than this, in body widths, are one.
 const MIN_HAND_DISTANCE: f64 = 0.08;
 /// A palm whose square is closer than this to a detected hand, in sides of the square, belongs to that hand.
 const MIN_PALM_DISTANCE: f64 = 0.25;
@@ -31,7 +43,7 @@ const MIN_SIDE_PROBABILITY: f64 = 0.3;
 const N_PROMPT_SEARCHES: u32 = 3;
 /// Largest number of doublings of the pause.
 const MAX_DOUBLINGS: u32 = 2;
-/// An arm whose wrist moved by more than this since the last unsuccessful search, in shoulder widths, is searched at
+/// An arm whose wrist moved by more than this since the last unsuccessful search, in body widths, is searched at
 /// once.
 const MIN_WRIST_MOVEMENT: f64 = 0.15;
 
@@ -93,6 +105,7 @@ impl HandTracker {
     ) -> Result<[Option<DetectedHand>; 2]> {
         let now = self.n_frames;
         self.n_frames += 1;
+        let width = body_width(body, settings.joint_score);
         let is_lost = |hand: &Option<DetectedHand>| hand.as_ref().is_none_or(|hand| hand.score < settings.hand_score);
         let (mut hands, mut searched) = ([None, None], [false; 2]);
         for (side, (elbow, wrist)) in ARMS.into_iter().enumerate() {
@@ -101,16 +114,13 @@ impl HandTracker {
                 hands[side] = self.model.find(image, region)?;
             }
             let is_due = now >= track.pause.next
-                || track
-                    .wrist
-                    .is_none_or(|before| distance(before, body[wrist]) > MIN_WRIST_MOVEMENT * shoulder_px(body));
-            let is_wrong = hands[side].as_ref().is_some_and(|hand| !matches_side(hand, side));
-            if (is_lost(&hands[side]) || is_wrong) && is_due && body[wrist][2] > settings.joint_score {
+                || track.wrist.is_none_or(|before| distance(before, body[wrist]) > MIN_WRIST_MOVEMENT * width);
+            let is_fine = |hand: &DetectedHand| hand.score >= settings.hand_score && matches_side(hand, side);
+            if !hands[side].as_ref().is_some_and(is_fine) && is_due && body[wrist][2] > settings.joint_score {
                 let [from, to] = [elbow, wrist].map(|at| [body[at][0], body[at][1]]);
-                let found = self.beyond_wrist(image, &region::beyond_wrist(from, to, shoulder_px(body)), settings)?;
-                hands[side] = better_of(hands[side].take(), found, |hand| {
-                    hand.score >= settings.hand_score && matches_side(hand, side)
-                });
+                let square = region::beyond_wrist(from, to, width);
+                let find = |region: &Region| self.model.find(image, region);
+                hands[side] = search_arm(hands[side].take(), &square, settings.hand_score, is_fine, find)?;
                 searched[side] = true;
             }
         }
@@ -130,22 +140,6 @@ impl HandTracker {
             }
         }
         Ok(hands)
-    }
-
-    /// Hand in the estimated square at the end of an arm; the model runs again if the square around the result
-    /// differs.
-    fn beyond_wrist(
-        &mut self,
-        image: &Image,
-        square: &Region,
-        settings: &Pose2dConfig,
-    ) -> Result<Option<DetectedHand>> {
-        let Some(rough) = self.model.find(image, square)? else { return Ok(None) };
-        let own = rough.next_region();
-        if rough.score >= settings.hand_score && region::are_similar(square, &own) {
-            return Ok(Some(rough));
-        }
-        self.model.find(image, &own)
     }
 
     /// Detects palms and assigns hands where one is lost.
@@ -183,20 +177,22 @@ impl HandTracker {
 /// Rejects hands with a low score, hands that are not at their arm, and duplicates of the other hand.
 pub fn reject_implausible(hands: &mut [Option<DetectedHand>; 2], body: &[ScoredPoint; 17], settings: &Pose2dConfig) {
     let [left, right] = ARMS.map(|(_, wrist)| body[wrist]);
+    let width = body_width(body, settings.joint_score);
     for (hand, [own, other]) in hands.iter_mut().zip([[left, right], [right, left]]) {
         hand.take_if(|hand| {
             let [to_own, to_other] = [own, other].map(|wrist| distance(hand.points[0], wrist));
             let is_nearer_other = other[2] > settings.joint_score && to_other < to_own;
             let most = if is_nearer_other { MAX_WRIST_DISTANCE / 2.0 } else { MAX_WRIST_DISTANCE };
-            let is_detached = own[2] > settings.joint_score && to_own > most * shoulder_px(body);
+            let is_detached = own[2] > settings.joint_score && to_own > most * width;
             hand.score < settings.hand_score || is_detached
         });
     }
     if let [Some(left), Some(right)] = &hands
-        && distance(centre(left), centre(right)) < MIN_HAND_DISTANCE * shoulder_px(body)
+        && distance(centre(left), centre(right)) < MIN_HAND_DISTANCE * width
     {
-        let is_right = is_right(left, body);
-        hands[usize::from(!is_right)] = None;
+        let right_probability = |hand: &DetectedHand| hand.right.unwrap_or_else(|| f64::from(is_right(hand, body)));
+        let is_left = left.score * (1.0 - right_probability(left)) >= right.score * right_probability(right);
+        hands[usize::from(is_left)] = None;
     }
 }
 
@@ -211,33 +207,32 @@ fn matches_side(hand: &DetectedHand, side: usize) -> bool {
     hand.right.is_none_or(|right| [1.0 - right, right][side] >= MIN_SIDE_PROBABILITY)
 }
 
-/// The acceptable one of two hands, else the one with the higher score; the first on a tie.
-fn better_of(
-    a: Option<DetectedHand>,
-    b: Option<DetectedHand>,
-    is_fine: impl Fn(&DetectedHand) -> bool,
-) -> Option<DetectedHand> {
-    match (a, b) {
-        (Some(a), Some(b)) => Some(if (is_fine(&b), b.score) > (is_fine(&a), a.score) { b } else { a }),
-        (a, b) => a.or(b),
-    }
-}
-
-fn shoulder_px(body: &[ScoredPoint; 17]) -> f64 {
-    distance(body[coco::L_SHOULDER], body[coco::R_SHOULDER])
+/// Shoulder width as in a frontal view, px: at least what trunk and arms imply, since the distance between the
+/// shoulders shrinks as the person turns.
+fn body_width(body: &[ScoredPoint; 17], joint_score: f64) -> f64 {
+    let is_visible = |joint: usize| body[joint][2] > joint_score;
+    let middle = |a: usize, b: usize| [0, 1, 2].map(|k| (body[a][k] + body[b][k]) / 2.0);
+    let trunk = [coco::L_HIP, coco::R_HIP].into_iter().all(is_visible).then(|| {
+        let shoulders = middle(coco::L_SHOULDER, coco::R_SHOULDER);
+        WIDTH_PER_TRUNK * distance(shoulders, middle(coco::L_HIP, coco::R_HIP))
+    });
+    let bones = WIDTH_BONES.into_iter().filter(|&(from, to)| is_visible(from) && is_visible(to));
+    let lengths = bones.map(|(from, to)| WIDTH_PER_BONE * distance(body[from], body[to]));
+    lengths.chain(trunk).fold(distance(body[coco::L_SHOULDER], body[coco::R_SHOULDER]), f64::max)
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::arm_search::better_of;
     use super::*;
 
     /// Shoulders 100 px apart, wrists at x = 190 (left) and 110 (right).
     fn body() -> [ScoredPoint; 17] {
-        let mut body = [[0.0, 0.0, 0.9]; 17];
+        let mut body = [[0.0; 3]; 17];
         let positions =
             [(coco::L_SHOULDER, 200.0), (coco::R_SHOULDER, 100.0), (coco::L_WRIST, 190.0), (coco::R_WRIST, 110.0)];
         for (joint, x) in positions {
-            body[joint][0] = x;
+            body[joint] = [x, 0.0, 0.9];
         }
         body
     }
@@ -269,11 +264,30 @@ mod tests {
     }
 
     #[test]
+    fn the_body_width_of_a_turned_person_is_that_of_trunk_and_arms() {
+        let mut turned = body();
+        assert_eq!(body_width(&turned, 0.3), 100.0);
+        turned[coco::L_SHOULDER][0] = 104.0;
+        assert_eq!(body_width(&turned, 0.3), 4.0);
+        turned[coco::L_ELBOW] = [104.0, 80.0, 0.9];
+        assert_eq!(body_width(&turned, 0.3), 0.9 * 86.0_f64.hypot(80.0), "the forearm");
+        turned[coco::L_ELBOW][2] = 0.1;
+        turned[coco::L_HIP] = [104.0, 150.0, 0.9];
+        turned[coco::R_HIP] = [100.0, 150.0, 0.9];
+        assert_eq!(body_width(&turned, 0.3), 90.0);
+        // A hand that is 40 px from its wrist, ten times the distance between the shoulders.
+        assert_eq!(accepted([hand(230.0, 0.1), None], &turned), [true, false]);
+    }
+
+    #[test]
     fn a_duplicate_hand_is_assigned_by_handedness() {
         let mut crossed = body();
         crossed[coco::L_WRIST][0] = 110.0;
         assert_eq!(accepted([hand(112.0, 0.9), hand(110.0, 0.9)], &crossed), [false, true]);
         assert_eq!(accepted([hand(112.0, 0.1), hand(110.0, 0.9)], &crossed), [true, false]);
+        let mut uncertain = hand(112.0, 0.4);
+        uncertain.as_mut().unwrap().score = 0.6;
+        assert_eq!(accepted([uncertain, hand(110.0, 0.9)], &crossed), [false, true], "the other hand is more certain");
     }
 
     #[test]

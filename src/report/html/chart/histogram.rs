@@ -1,7 +1,7 @@
-//! Histogram with a threshold; bins on the failing side have another colour.
+//! Histogram with a threshold, bins on the failing side in another colour; and overlaid distributions as lines.
 
-use super::scale::{Scale, drawing, line, px, rect, text_at};
-use crate::html::node::Node;
+use super::scale::{Scale, drawing, line, px, rect, stroke, text_at};
+use crate::html::node::{Node, node};
 use orator_base::text::{number, with_unit};
 
 /// Counts in bins of equal width from `low` to `high`; the outer bins include values outside the range.
@@ -35,7 +35,6 @@ impl Counts {
         self.bins.iter().sum()
     }
 
-    /// Lower edge of bin `bin`.
     pub fn edge(&self, bin: usize) -> f64 {
         self.low + (self.high - self.low) * bin as f64 / self.bins.len() as f64
     }
@@ -56,7 +55,6 @@ impl Counts {
     }
 }
 
-/// Threshold drawn in a histogram.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ThresholdLine {
     pub value: f64,
@@ -109,6 +107,41 @@ pub fn histogram(label: &str, counts: &Counts, unit: &str, threshold: Option<Thr
         ));
     }
     svg
+}
+
+/// Card with overlaid distributions (CSS class, counts); `medians` is the text with their medians.
+pub fn card(title: &str, unit: &str, lines: &[(&str, &Counts)], medians: String) -> Node {
+    node("div")
+        .class("card speed")
+        .child(node("h3").text(title))
+        .child(profile(&format!("{title}: {medians}"), unit, lines))
+        .child(node("small").text(medians))
+}
+
+/// Drawing of the distributions; heights are proportional to the square root of the share. All must have the same bins.
+fn profile(label: &str, unit: &str, lines: &[(&str, &Counts)]) -> Node {
+    const HEIGHT: f64 = 130.0;
+    const TOP: f64 = 10.0;
+    const FLOOR: f64 = 100.0;
+    let mut svg = drawing(WIDTH, HEIGHT, label);
+    let Some((_, first)) = lines.first() else { return svg };
+    let x = Scale { low: first.low, high: first.high, from: LEFT, to: RIGHT };
+    let share = |counts: &Counts, bin: usize| counts.bins[bin] as f64 / counts.total().max(1) as f64;
+    let shares = |counts: &Counts| (0..counts.bins.len()).map(|bin| share(counts, bin)).fold(0.0, f64::max);
+    let max = lines.iter().map(|(_, counts)| shares(counts)).fold(1e-9, f64::max);
+    for (class, counts) in lines.iter().filter(|(_, counts)| counts.total() > 0) {
+        let y = |bin: usize| FLOOR - (share(counts, bin) / max).sqrt() * (FLOOR - TOP);
+        let middle = |bin: usize| (counts.edge(bin) + counts.edge(bin + 1)) / 2.0;
+        svg = svg.child(stroke(class, (0..counts.bins.len()).map(|bin| [x.at(middle(bin)), y(bin)])));
+        let median = x.at(counts.quantile(0.5));
+        svg = svg.child(line(&format!("middle {class}"), [median, TOP], [median, FLOOR]));
+    }
+    svg = svg.child(line("axis", [LEFT, FLOOR], [RIGHT, FLOOR]));
+    for tick in x.ticks(5) {
+        let anchor = if tick <= first.low { "start" } else { "middle" };
+        svg = svg.child(text_at("tick", [x.at(tick), FLOOR + 15.0], anchor, &number(tick)));
+    }
+    svg.child(text_at("tick", [RIGHT, FLOOR + 28.0], "end", unit))
 }
 
 #[cfg(test)]

@@ -1,6 +1,7 @@
-//! Line chart over training steps, with horizontal lines for comparison and one step marked.
+//! Line chart over training steps, with horizontal lines for comparison and one step marked; and curve of the seconds
+//! that each value of a threshold would keep.
 
-use super::scale::{Scale, circle, drawing, line, stroke, text_at};
+use super::scale::{Scale, circle, drawing, line, path_data, px, stroke, text_at};
 use crate::html::node::{Node, legend, node};
 use orator_base::text::number;
 
@@ -11,7 +12,6 @@ const FLOOR: f64 = 160.0;
 const LEFT: f64 = 44.0;
 const RIGHT: f64 = 350.0;
 
-/// Line chart.
 #[derive(Clone, Debug, Default)]
 pub struct LineChart {
     pub title: String,
@@ -20,11 +20,9 @@ pub struct LineChart {
     pub lines: Vec<ChartLine>,
     /// Horizontal lines across the whole width.
     pub levels: Vec<ChartLevel>,
-    /// Marked step.
     pub marked: Option<f64>,
 }
 
-/// Line of a chart.
 #[derive(Clone, Debug)]
 pub struct ChartLine {
     pub name: String,
@@ -34,7 +32,6 @@ pub struct ChartLine {
     pub points: Vec<[f64; 2]>,
 }
 
-/// Horizontal line of a chart.
 #[derive(Clone, Debug)]
 pub struct ChartLevel {
     pub name: String,
@@ -118,6 +115,33 @@ impl LineChart {
     }
 }
 
+/// Curve of `values` on an axis from 0 to `max`; a script moves the dot from the step `marked` to the positions in
+/// `data-xs` and `data-ys`.
+pub fn curve(label: &str, values: &[f64], max: f64, marked: usize) -> Node {
+    const WIDTH: f64 = 300.0;
+    const HEIGHT: f64 = 56.0;
+    const TOP: f64 = 6.0;
+    const FLOOR: f64 = 50.0;
+    // These margins align the first and last step with the thumb of a slider at its ends.
+    const LEFT: f64 = 8.0;
+    const RIGHT: f64 = 292.0;
+    let x = Scale { low: 0.0, high: values.len().saturating_sub(1) as f64, from: LEFT, to: RIGHT };
+    let y = Scale { low: 0.0, high: max.max(1e-9), from: FLOOR, to: TOP };
+    let points: Vec<[f64; 2]> = values.iter().enumerate().map(|(i, &value)| [x.at(i as f64), y.at(value)]).collect();
+    let at = points.get(marked).copied().unwrap_or([LEFT, FLOOR]);
+    let all = |axis: usize| points.iter().map(|point| px(point[axis])).collect::<Vec<_>>().join(" ");
+    let outline = path_data(points.iter().copied().chain([[RIGHT, FLOOR], [LEFT, FLOOR]])) + "Z";
+    drawing(WIDTH, HEIGHT, label)
+        .class("curve")
+        .attr("data-xs", all(0))
+        .attr("data-ys", all(1))
+        .child(node("path").class("area").attr("d", outline))
+        .child(stroke("", points))
+        .child(line("axis", [LEFT, FLOOR], [RIGHT, FLOOR]))
+        .child(line("configured", [at[0], TOP], [at[0], FLOOR]))
+        .child(circle("dot", at, 4.5))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -139,5 +163,12 @@ mod tests {
         let empty = LineChart::default();
         assert!(empty.is_empty() && empty.card().to_string().contains("<svg") && !chart.is_empty());
         assert_eq!(empty.ranges(), [[0.0, 1.0], [0.0, 1.0]]);
+    }
+
+    #[test]
+    fn the_marked_step_is_on_the_line() {
+        let drawn = curve("", &[0.0, 5.0, 10.0], 10.0, 1).to_string();
+        assert!(drawn.contains("cx=\"150\" cy=\"28\"") && drawn.contains("data-xs=\"8 150 292\""), "{drawn}");
+        assert!(curve("", &[], 0.0, 3).to_string().contains("<svg"));
     }
 }

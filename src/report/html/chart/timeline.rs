@@ -1,14 +1,16 @@
-//! Timeline of a video: its intervals side by side with widths by duration. It is an HTML list, so it can be read by
-//! screen readers, navigated by keyboard (`page.js`) and drawn at any width.
+//! Time axes. Timeline of a video: its intervals side by side, an HTML list, which can be read by screen readers,
+//! navigated by keyboard (`page.js`) and drawn at any width. Tracks below one another: lines, and events as short
+//! strokes; a script may move the line `at` over them between `data-left` and `data-right`, the positions of the first
+//! and last second.
 
+use super::scale::{Scale, drawing, line, path_data, px, text_at};
 use crate::html::node::{Node, node};
+use orator_base::text::number;
 
-/// Interval of a timeline.
 #[derive(Clone, Debug)]
 pub struct TimelineSpan {
     pub start_secs: f64,
     pub end_secs: f64,
-    /// CSS class of its colour.
     pub class: String,
     /// Label, shown if there is room.
     pub word: String,
@@ -59,6 +61,69 @@ fn drawn(spans: &[TimelineSpan], total_secs: f64, max_spans: usize) -> Vec<Timel
     merged.collect()
 }
 
+const WIDTH: f64 = 720.0;
+const TRACK: f64 = 66.0;
+const GAP: f64 = 22.0;
+const FOOT: f64 = 20.0;
+const LEFT: f64 = 4.0;
+const RIGHT: f64 = 716.0;
+
+#[derive(Clone, Debug, Default)]
+pub struct Track {
+    /// Name with unit.
+    pub name: String,
+    /// CSS class and points (second, value) of each line; larger values are higher, non-finite values are gaps.
+    pub lines: Vec<(&'static str, Vec<[f64; 2]>)>,
+    /// CSS class and times of events, seconds. The first set is drawn at the bottom of the track, the others above it.
+    pub marks: Vec<(&'static str, Vec<f64>)>,
+}
+
+/// Chart with a time axis of `secs` seconds.
+pub fn tracks(label: &str, secs: f64, tracks: &[Track]) -> Node {
+    let height = tracks.len() as f64 * (TRACK + GAP) + FOOT;
+    let x = Scale { low: 0.0, high: secs.max(1e-9), from: LEFT, to: RIGHT };
+    let mut svg =
+        drawing(WIDTH, height, label).class("tracks").attr("data-left", px(LEFT)).attr("data-right", px(RIGHT));
+    for (i, track) in tracks.iter().enumerate() {
+        let top = i as f64 * (TRACK + GAP) + GAP;
+        let floor = top + TRACK;
+        svg = svg.child(text_at("name", [LEFT + 6.0, top - 6.0], "start", &track.name));
+        svg = svg.child(line("grid", [LEFT, floor], [RIGHT, floor]));
+        let values = track.lines.iter().flat_map(|(_, points)| points.iter().map(|point| point[1]));
+        let [low, high] = values
+            .filter(|value| value.is_finite())
+            .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], v| [low.min(v), high.max(v)]);
+        let y = Scale { low, high, from: floor - 2.0, to: top };
+        for (class, points) in &track.lines {
+            let runs = points.split(|point| point.iter().any(|v| !v.is_finite())).filter(|run| run.len() > 1);
+            let drawn: Vec<String> =
+                runs.map(|run| path_data(run.iter().map(|[secs, value]| [x.at(*secs), y.at(*value)]))).collect();
+            if !drawn.is_empty() {
+                svg = svg.child(node("path").class(format!("stroke {class}")).attr("d", drawn.join(" ")));
+            }
+        }
+        let n = track.marks.len().max(1) as f64;
+        for (k, (class, moments)) in track.marks.iter().enumerate() {
+            // The marks share the full height of a track without lines.
+            let part = if track.lines.is_empty() { TRACK / n } else { 12.0 };
+            let base = floor - k as f64 * part;
+            let drawn: Vec<String> = moments
+                .iter()
+                .map(|moment| format!("M{} {}V{}", px(x.at(*moment)), px(base), px(base - part + 2.0)))
+                .collect();
+            if !drawn.is_empty() {
+                svg = svg.child(node("path").class(format!("moment {class}")).attr("d", drawn.join("")));
+            }
+        }
+    }
+    let foot = height - FOOT;
+    for tick in x.ticks(10) {
+        let anchor = if tick <= 0.0 { "start" } else { "middle" };
+        svg = svg.child(text_at("tick", [x.at(tick), foot + 15.0], anchor, &format!("{} s", number(tick))));
+    }
+    svg.child(line("at", [LEFT, GAP], [LEFT, foot]))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -80,5 +145,18 @@ mod tests {
         let many = of(100_000);
         assert!(many.matches("<li").count() <= 1001 && many.contains("short intervals, the longest"));
         assert_eq!(timeline("", 0.0, &[], 9).to_string().matches("<li").count(), 0);
+    }
+
+    #[test]
+    fn lines_have_gaps_and_marks_are_in_their_track() {
+        let track = Track {
+            name: "height <m>".to_owned(),
+            lines: vec![("predicted", vec![[0.0, 1.0], [1.0, 2.0], [2.0, f64::NAN], [3.0, 1.0], [4.0, 2.0]])],
+            marks: vec![("onset", vec![2.0])],
+        };
+        let drawn = tracks("a", 4.0, &[track.clone(), Track { lines: Vec::new(), ..track }]).to_string();
+        assert!(drawn.contains("M4 86 L182 22 M538 86 L716 22"), "{drawn}");
+        assert!(drawn.contains("height &lt;m&gt;") && drawn.matches("moment onset").count() == 2, "{drawn}");
+        assert!(tracks("", 0.0, &[]).to_string().contains("<svg"));
     }
 }

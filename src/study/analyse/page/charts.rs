@@ -1,9 +1,9 @@
 //! Charts of a task: proportions and differences with intervals, scores, preference steps, strengths.
 
 use crate::analyse::conclusions::scope;
-use crate::analyse::number_format::{bare_p, counted};
 use crate::analyse::result::{PairAnalysis, ShareAnalysis, ShareMeasure, StudyAnalysis, TaskAnalysis};
 use crate::analyse::statistic::StatisticMethod;
+use crate::analyse::text::{bare_p, counted};
 use crate::plan::TaskDesign;
 use crate::stats::estimate::ConfidenceInterval;
 use orator_base::text::number;
@@ -13,7 +13,6 @@ use orator_report::html::{Node, legend, node, table};
 /// Names of the five preference steps, from the second condition to the first.
 const STEPS: [&str; 5] = ["second, clearly", "second, slightly", "no preference", "first, slightly", "first, clearly"];
 
-/// Charts of a task.
 pub(super) fn task(task: &TaskAnalysis, analysis: &StudyAnalysis) -> Vec<Node> {
     let parts = [
         (!task.shares.is_empty()).then(|| shares(task, analysis)),
@@ -41,7 +40,6 @@ fn ends(values: impl Iterator<Item = f64>) -> [f64; 2] {
     [low - room, high + room]
 }
 
-/// Ends of an interval, multiplied by `factor`.
 fn scaled(interval: Option<ConfidenceInterval>, factor: f64) -> Option<[f64; 2]> {
     interval.map(|ends| [factor * ends.low, factor * ends.high])
 }

@@ -1,12 +1,11 @@
 //! Assembles the page. The output depends on the analysis only.
 
 use super::{charts, tables};
-use crate::analyse::number_format::{counted, list};
 use crate::analyse::result::{StudyAnalysis, TaskAnalysis, TestOutcome};
+use crate::analyse::text::{counted, list};
 use orator_report::html::{Node, Page, Section, node};
 use serde_json::Value;
 
-/// HTML of the page.
 pub fn html(analysis: &StudyAnalysis) -> String {
     let section = |id, title, body| Section { id, title, body };
     let mut sections = vec![section("meaning", "Conclusions", meaning(analysis))];
@@ -52,7 +51,6 @@ fn per_task(tasks: &[TaskAnalysis], body: impl Fn(&TaskAnalysis) -> Vec<Node>) -
     tasks.iter().flat_map(|task| title(task).into_iter().chain(body(task))).collect()
 }
 
-/// Conclusions and notes.
 fn meaning(analysis: &StudyAnalysis) -> Vec<Node> {
     let card = |task: &TaskAnalysis| {
         let conclusion = task.pooled().map(|share| share.conclusion);

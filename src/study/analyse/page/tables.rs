@@ -1,15 +1,14 @@
 //! Tables of all statistics of a task with their registration status, of the hypotheses and of the exclusions.
 
 use crate::analyse::conclusions::scope;
-use crate::analyse::number_format::{bare_p, count, counted, percent, points};
-use crate::analyse::result::{ClipShare, ShareAnalysis, ShareMeasure, StudyAnalysis, TaskAnalysis};
+use crate::analyse::result::{ClipShare, ShareAnalysis, StudyAnalysis, TaskAnalysis};
 use crate::analyse::statistic::{StatisticOrigin, StatisticRow, StatisticSet, TestResult};
+use crate::analyse::text::{bare_p, count, counted, percent, points};
 use crate::analyse::votes::read::RejectedRow;
 use crate::stats::estimate::ConfidenceInterval;
 use orator_base::text::number;
 use orator_report::html::{Node, node, table};
 
-/// Columns of the table of statistics.
 const COLUMNS: [&str; 6] = ["Method", "Interval", "Statistic (df)", "p", "p after Holm", "Status"];
 
 /// Table of a task's statistics, grouped by quantity.
@@ -69,7 +68,6 @@ pub(super) fn task(task: &TaskAnalysis) -> Vec<Node> {
     body
 }
 
-/// Table of the shares per clip.
 fn clips(task: &TaskAnalysis) -> Node {
     let row = |of: &ClipShare| {
         let cell = |text: String| node("td").class("num").text(text);
@@ -78,24 +76,15 @@ fn clips(task: &TaskAnalysis) -> Node {
         let cells = [successes, votes, percent(of.share)].map(cell);
         node("tr").child(name).child(node("td").text(&of.speaker)).children(cells)
     };
-    let what = task.shares.first().map_or("", |share| measure_name(share.measure));
+    let what = task.shares.first().map_or("", |share| share.measure.name());
     let head = [("Clip", ""), ("Speaker", ""), (what, "num"), ("Votes", "num"), ("Share", "num")]
         .map(|(title, class)| node("th").attr("scope", "col").class(class).text(title));
     let rows = task.clips.iter().map(row);
     node("div").class("scroll").attr("tabindex", "0").child(table("figures clips", head, rows))
 }
 
-fn measure_name(measure: ShareMeasure) -> &'static str {
-    match measure {
-        ShareMeasure::GeneratedChosen => "generated motion chosen",
-        ShareMeasure::MatchedChosen => "matching motion chosen",
-        ShareMeasure::Correct => "correct",
-        ShareMeasure::JudgedReal => "judged real",
-    }
-}
-
 fn share_title(share: &ShareAnalysis) -> String {
-    let (what, scope, percent) = (measure_name(share.measure), scope(share), percent(share.share));
+    let (what, scope, percent) = (share.measure.name(), scope(share), percent(share.share));
     let sd = share.participant_sd.map(|sd| format!("; standard deviation over participants {:.1} points", 100.0 * sd));
     let sd = sd.unwrap_or_default();
     let (successes, votes) = (count(share.n_successes as usize), counted(share.n_votes as usize, "vote"));
@@ -103,7 +92,6 @@ fn share_title(share: &ShareAnalysis) -> String {
     format!("{scope}: {what} in {successes} of {votes}, {percent} ({sizes}{sd})")
 }
 
-/// Numbers of participants and of clips.
 fn sizes([participants, clips]: [usize; 2]) -> String {
     format!("{}, {}", counted(participants, "participant"), counted(clips, "clip"))
 }
@@ -153,7 +141,6 @@ fn statistic_row(
         .child(node("td").class("mark").child(mark))
 }
 
-/// Registered hypotheses with their outcomes.
 pub(super) fn hypotheses(analysis: &StudyAnalysis) -> Vec<Node> {
     let rows = analysis.hypotheses.iter().flat_map(|hypothesis| {
         let title = group(&format!("{}: {} ({}).", hypothesis.task, hypothesis.claim, hypothesis.statistic));

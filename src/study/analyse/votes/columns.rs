@@ -10,7 +10,6 @@ use std::collections::BTreeMap;
 /// Additional columns of simpler tables: one condition, whether the answer was correct, one score, a preference step.
 const SHORT_FORMS: [&str; 4] = ["condition", "correct", "score", "step"];
 
-/// Names of all known fields.
 fn fields() -> impl Iterator<Item = &'static str> {
     VOTE_COLUMNS.into_iter().chain(SHORT_FORMS)
 }
@@ -45,7 +44,6 @@ impl ColumnNames {
         Ok(Self(names))
     }
 
-    /// Column name of a field in the file.
     fn of(&self, field: &'static str) -> &str {
         self.0.get(field).map_or(field, String::as_str)
     }
@@ -214,7 +212,6 @@ fn json_cells(object: &Map<String, Value>, names: &ColumnNames) -> std::result::
     Ok(RowCells { values, has_decimal_comma: false })
 }
 
-/// JSON value as text of a table cell.
 fn text(value: &Value) -> String {
     match value {
         Value::Null => String::new(),

@@ -15,7 +15,6 @@ use std::path::Path;
 /// Maximum file size, bytes.
 const MAX_BYTES: u64 = 1 << 30;
 
-/// Votes read from a source.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct VotesRead {
     pub votes: Vec<StudyVote>,
@@ -24,7 +23,6 @@ pub struct VotesRead {
     pub absent: Vec<&'static str>,
 }
 
-/// Row of a table that is not a valid vote.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RejectedRow {
     /// Line in the file, from 1.

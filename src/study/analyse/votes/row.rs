@@ -6,7 +6,6 @@ use serde::Deserialize;
 use serde::de::IntoDeserializer as _;
 use std::collections::BTreeMap;
 
-/// Maximum number of rows.
 pub const MAX_ROWS: usize = 2_000_000;
 
 /// Default condition names for tables that do not name them.
@@ -15,7 +14,6 @@ const GENERATED: &str = "generated";
 /// Maximum length of a name, characters.
 const MAX_NAME_CHARS: usize = 200;
 
-/// Cells of a row by field, trimmed.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RowCells {
     pub values: BTreeMap<&'static str, String>,
@@ -53,7 +51,6 @@ impl RowCells {
         }
     }
 
-    /// Integer from `low` to `high`.
     fn integer(&self, field: &str, [low, high]: [i64; 2]) -> RowResult<Option<i64>> {
         let Some(number) = self.number(field)? else { return Ok(None) };
         let is_right = number.fract() == 0.0 && number >= low as f64 && number <= high as f64;
@@ -119,7 +116,6 @@ pub fn vote(cells: &RowCells, design: Option<TaskDesign>) -> RowResult<StudyVote
     Ok(vote)
 }
 
-/// Default name of a task.
 fn title(design: TaskDesign) -> &'static str {
     match design {
         TaskDesign::Turing => "real-or-generated",

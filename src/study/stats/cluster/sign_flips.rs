@@ -62,7 +62,6 @@ pub struct SideBlock {
 }
 
 impl SideBlock {
-    /// Adds a trial.
     pub fn push(&mut self, real_left: bool, chosen_left: bool) {
         self.trials += 1;
         self.real_left += u64::from(real_left);
@@ -104,7 +103,7 @@ pub fn side_p(blocks: &[SideBlock]) -> Result<f64, StatisticsError> {
 mod tests {
     use super::super::crossed::crossed_estimate;
     use super::*;
-    use crate::simulate::{CrossedDesign, CrossedEffects, crossed_votes};
+    use crate::power::{CrossedDesign, CrossedEffects, crossed_votes};
 
     fn votes(stream: u64, share: f64) -> Vec<ClipVote> {
         let design = CrossedDesign { n_participants: 30, n_trials: 20, n_clips: 20 };

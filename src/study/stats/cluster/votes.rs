@@ -50,7 +50,6 @@ impl VoteGroups {
     }
 }
 
-/// Scores of the concatenated votes of all cells.
 pub(in super::super) fn scores(cells: &[&[ClipVote]]) -> Vec<f64> {
     cells.iter().flat_map(|votes| votes.iter().map(|vote| vote.score)).collect()
 }

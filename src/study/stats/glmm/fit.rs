@@ -1,9 +1,9 @@
 //! Mixed logistic regression: log odds of success = intercept + random intercept of the participant + random intercept
 //! of the clip, both normally distributed. Fitted by maximum likelihood with the Laplace approximation, like
-//! `glmer(score ~ 1 + (1 | participant) + (1 | clip), family = binomial)` of lme4 (Bates et al. 2015).
+//! `glmer(score ~ 1 + (1 | participant) + (1 | clip), family = binomial)` of lme4 (Bates et al. 2015). The likelihood
+//! is maximised by BFGS (Broyden, Fletcher, Goldfarb, Shanno 1970) with central differences.
 
 use super::laplace::Laplace;
-use super::minimum::{curvature, minimum};
 use crate::stats::cluster::votes::{CLIP, ClipVote, PARTICIPANT, VoteGroups, scores};
 use crate::stats::estimate::{ConfidenceInterval, StatisticsError, StudentEstimate, at_least};
 use ndarray::{Array1, Array2, array};
@@ -14,7 +14,6 @@ const INITIAL_SD: f64 = 0.4;
 /// Standard deviation below which a variance component is set to 0, log odds.
 const MIN_SD: f64 = 1e-3;
 
-/// Fitted model.
 #[derive(Clone, Debug)]
 pub struct MixedLogit {
     /// Log odds of a participant and clip with effect 0. Its t distribution has min(participants, clips) - 1 degrees of
@@ -143,11 +142,99 @@ fn is_positive_definite(matrix: &Array2<f64>) -> bool {
     true
 }
 
-/// Compares fits with lme4 (`fixtures/reference/study_glmm.R`), and tests votes without a fit and simulated studies.
+const MAX_STEPS: usize = 200;
+/// Steps of the finite differences for gradients and Hessians.
+const GRADIENT_STEP: f64 = 1e-3;
+const CURVATURE_STEP: f64 = 0.02;
+/// Maximum gradient component at convergence.
+const GRADIENT_TOLERANCE: f64 = 1e-4;
+
+pub(super) struct Minimum {
+    pub at: Array1<f64>,
+    pub value: f64,
+    pub converged: bool,
+}
+
+fn moved(at: &Array1<f64>, moves: &[(usize, f64)]) -> Array1<f64> {
+    let mut moved = at.clone();
+    moves.iter().for_each(|(k, step)| moved[*k] += step);
+    moved
+}
+
+fn gradient_at(f: &mut impl FnMut(&Array1<f64>) -> f64, at: &Array1<f64>) -> Array1<f64> {
+    (0..at.len())
+        .map(|k| (f(&moved(at, &[(k, GRADIENT_STEP)])) - f(&moved(at, &[(k, -GRADIENT_STEP)]))) / (2.0 * GRADIENT_STEP))
+        .collect()
+}
+
+/// Minimises `f` from `start`; a step is at most 5 in each parameter.
+pub(super) fn minimum(mut f: impl FnMut(&Array1<f64>) -> f64, start: Array1<f64>) -> Minimum {
+    let n = start.len();
+    let (mut at, mut inverse) = (start, Array2::<f64>::eye(n));
+    let (mut value, mut gradient) = (f(&at), gradient_at(&mut f, &at));
+    for _ in 0..MAX_STEPS {
+        if gradient.iter().all(|v| v.abs() < GRADIENT_TOLERANCE) {
+            return Minimum { at, value, converged: true };
+        }
+        let mut direction = -inverse.dot(&gradient);
+        if direction.dot(&gradient) >= 0.0 {
+            inverse = Array2::eye(n);
+            direction = -gradient.clone();
+        }
+        let longest = direction.iter().fold(0.0f64, |max, v| max.max(v.abs()));
+        direction *= (5.0 / longest).min(1.0);
+        let descent = direction.dot(&gradient);
+        let mut share = 1.0;
+        let (next, next_value) = loop {
+            let next = &at + &(&direction * share);
+            let next_value = f(&next);
+            if next_value <= value + 1e-4 * share * descent {
+                break (next, next_value);
+            }
+            share *= 0.4;
+            if share < 1e-7 {
+                // Finite differences cannot resolve a descent direction.
+                let converged = gradient.iter().all(|v| v.abs() < 100.0 * GRADIENT_TOLERANCE);
+                return Minimum { at, value, converged };
+            }
+        };
+        let next_gradient = gradient_at(&mut f, &next);
+        let (step, change) = (&next - &at, &next_gradient - &gradient);
+        let along = step.dot(&change);
+        if along > 1e-12 {
+            let turned = inverse.dot(&change);
+            let factor = (1.0 + change.dot(&turned) / along) / along;
+            for i in 0..n {
+                for j in 0..n {
+                    inverse[[i, j]] += factor * step[i] * step[j] - (turned[i] * step[j] + step[i] * turned[j]) / along;
+                }
+            }
+        }
+        (at, value, gradient) = (next, next_value, next_gradient);
+    }
+    Minimum { at, value, converged: false }
+}
+
+/// Hessian [n, n] by central differences.
+pub(super) fn curvature(mut f: impl FnMut(&Array1<f64>) -> f64, at: &Array1<f64>) -> Array2<f64> {
+    let (n, h) = (at.len(), CURVATURE_STEP);
+    let centre = f(at);
+    let mut second = Array2::zeros((n, n));
+    for i in 0..n {
+        second[[i, i]] = (f(&moved(at, &[(i, h)])) + f(&moved(at, &[(i, -h)])) - 2.0 * centre) / (h * h);
+        for j in 0..i {
+            let mut corner = |a: f64, b: f64| f(&moved(at, &[(i, a), (j, b)]));
+            let mixed = (corner(h, h) + corner(-h, -h) - corner(h, -h) - corner(-h, h)) / (4.0 * h * h);
+            (second[[i, j]], second[[j, i]]) = (mixed, mixed);
+        }
+    }
+    second
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::simulate::{CrossedDesign, CrossedEffects, crossed_votes};
+    use crate::power::{CrossedDesign, CrossedEffects, crossed_votes};
     use rayon::prelude::*;
     use serde_json::Value;
     use std::collections::BTreeMap;

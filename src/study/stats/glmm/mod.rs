@@ -1,7 +1,6 @@
 //! Mixed-effects logistic regression of votes with crossed random intercepts of participants and clips: `fit` is the
-//! model, `laplace` its likelihood, `minimum` the optimiser.
+//! model with its optimiser, `laplace` its likelihood.
 
 mod laplace;
-mod minimum;
 
 pub mod fit;

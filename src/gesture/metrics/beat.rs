@@ -1,12 +1,16 @@
-//! Beat consistency: whether motion has beats at the onsets of the sound. The metric of the emage convention (Liu et
-//! al. 2024), and a simpler one of this project.
+//! Beat metrics: alignment of the beats of the motion with those of the sound. Beat alignment of AIST++ (Li et al.
+//! 2021, `tools/calculate_beat_scores.py` in their repository): how near the beats of the motion are to those of the
+//! sound; a motion with a single aligned beat scores 1. Beat consistency of the trimodal convention (Liu et al. 2022 on
+//! the dataset of Yoon et al.; `get_BCscore` of Yi et al. 2023), whose beats are minima of the change of the angle
+//! between neighbouring bones, of the emage convention (Liu et al. 2024), and a simpler one of this project.
 
-use crate::metrics::body_part::BodyPart;
-use crate::metrics::definition::{Better, Definition, MetricFamily};
+use crate::metrics::definition::{Better, BodyPart, Definition, MetricFamily};
 use crate::metrics::pair::PairedFrames;
+use crate::metrics::sums::BlockSums;
 use orator_base::math::vec3::{self, Vec3};
-use orator_base::types::skeleton::{L_ELBOW, L_WRIST, N_JOINTS, R_ELBOW, R_WRIST};
+use orator_base::types::skeleton::{L_ELBOW, L_SHOULDER, L_WRIST, N_JOINTS, NECK, R_ELBOW, R_SHOULDER, R_WRIST};
 use serde_json::json;
+use std::f64::consts::PI;
 
 /// Indices of the strict local minima, which are lower than `order` neighbours on either side (fewer at the borders,
 /// but never the first or last), as in scipy's `argrelextrema(np.less)`. No value is lower than NaN.
@@ -158,6 +162,139 @@ fn abs_deviations(positions: &[Vec3]) -> Vec<Vec3> {
     positions.iter().map(|p| std::array::from_fn(|k| (p[k] - mean[k]).abs())).collect()
 }
 
+/// Frame rate of the original code, in which `SIGMA_FRAMES` and `AIST_ORDER` are given.
+const AIST_FPS: f64 = 60.0;
+const SIGMA_FRAMES: f64 = 3.0;
+const AIST_ORDER: f64 = 10.0;
+
+/// Beat alignment for data at `fps`.
+pub(crate) fn aist(fps: f64) -> MetricFamily {
+    let order = ((AIST_ORDER / AIST_FPS * fps).round() as usize).max(1);
+    let definition = Definition {
+        formula: "per interval the mean over the beats of the MOTION of exp(-d^2 / 2 sigma^2), d to the nearest onset, \
+                  both in whole frames; 0 for an interval without a beat; mean over intervals, long or short alike. \
+                  Beats: strict local minima of the summed way of joints 1-6 from frame to frame (0 in the first), \
+                  among `order` frames on either side (10 at 60 frames a second); sigma 3 frames at 60 a second. \
+                  Theirs: beats of music instead of onsets, 24 joints of SMPL",
+        undefined: "no interval has audio with an onset",
+        parameters: json!({"sigma_secs": SIGMA_FRAMES / AIST_FPS, "order_frames": order, "joints": BodyPart::Body.joints()}),
+        ..Definition::new("beat_alignment", BodyPart::Body.name(), "1", Better::NearerTruth)
+    };
+    MetricFamily::mean_of_both(definition.with_truth("beat_alignment_of_real"), move |pair, blocks| {
+        let Some(onsets) = pair.interval.onsets else { return };
+        let n = pair.n_frames();
+        let frames = onsets.iter().map(|onset| (onset * pair.fps).round()).filter(|t| *t < n as f64);
+        let onsets: Vec<f64> = frames.collect();
+        if onsets.is_empty() {
+            return;
+        }
+        let sigma = SIGMA_FRAMES / AIST_FPS * pair.fps;
+        for (i, poses) in [&pair.predicted, &pair.ground_truth].into_iter().enumerate() {
+            let beats = minima(&envelope(pair, poses), order);
+            for &t in &beats {
+                blocks.at(t)[i] += beat_proximity(t as f64, &onsets, sigma) / beats.len() as f64;
+            }
+        }
+        if (0..n).any(|t| pair.n_non_finite(t) > 0) {
+            blocks.at(0)[0] = f64::NAN;
+        }
+        // The weight of the interval is spread evenly over its frames.
+        for t in 0..n {
+            blocks.at(t)[2] += 1.0 / n as f64;
+        }
+    })
+}
+
+/// Sum of the distances that joints 1-6 moved since the previous frame, 0 in the first frame; NaN where one is not
+/// visible.
+fn envelope(pair: &PairedFrames, poses: &[[Vec3; N_JOINTS]]) -> Vec<f64> {
+    let joints = BodyPart::Body.joints();
+    let at = |t: usize| match t {
+        0 => 0.0,
+        _ if joints.iter().all(|joint| pair.is_visible(t - 1, 2, *joint)) => {
+            joints.iter().map(|joint| vec3::norm(vec3::sub(poses[t][*joint], poses[t - 1][*joint]))).sum()
+        }
+        _ => f64::NAN,
+    };
+    (0..pair.n_frames()).map(at).collect()
+}
+
+/// Three joints of two neighbouring bones, and the mean change of their angle in the original dataset, half turns per
+/// frame.
+const TRIMODAL_ANGLES: [([usize; 3], f64); 4] = [
+    ([NECK, R_SHOULDER, R_ELBOW], 0.003_454_075_893_387_198_4),
+    ([R_SHOULDER, R_ELBOW, R_WRIST], 0.007_043_459_918_349_981),
+    ([NECK, L_SHOULDER, L_ELBOW], 0.003_493_624_273_687_601),
+    ([L_SHOULDER, L_ELBOW, L_WRIST], 0.007_205_077_446_997_166),
+];
+/// Frame rate of the original dataset.
+const TRIMODAL_FPS: f64 = 15.0;
+const TRIMODAL_SIGMA: f64 = 0.1;
+/// Smallest depth of a minimum below one of its neighbours.
+const TRIMODAL_DROP: f64 = 0.01;
+
+/// Beat consistency for data at `fps`.
+pub(crate) fn trimodal(fps: f64) -> MetricFamily {
+    // Mean change of an angle per frame of the data.
+    let angles = TRIMODAL_ANGLES.map(|(joints, mean)| (joints, mean * (TRIMODAL_FPS / fps)));
+    let definition = Definition {
+        formula: "sum over intervals, angles and onsets of exp(-d^2 / 2 sigma^2), d to the nearest beat of the angle, \
+                  divided by the number of onsets of all angles that have a beat in the interval (an angle without \
+                  is left out). Angles in half turns between neck-shoulder, upper arm and forearm; |change from frame \
+                  to frame| / average change / 4, 0 in the first frame; beats: minima among 3 frames at least `drop` \
+                  below one neighbour",
+        undefined: "there is no audio, no onset in it, or no angle has a beat",
+        parameters: json!({"sigma_secs": TRIMODAL_SIGMA, "drop": TRIMODAL_DROP, "average_change": angles.map(|(_, mean)| mean)}),
+        ..Definition::new("beat_consistency", "arms", "1", Better::NearerTruth)
+    };
+    let measure = move |pair: &PairedFrames, blocks: &mut BlockSums| {
+        let Some(onsets) = pair.interval.onsets else { return };
+        for (joints, mean) in angles {
+            for (i, poses) in [&pair.predicted, &pair.ground_truth].into_iter().enumerate() {
+                let beats = beats(pair, poses, joints, mean);
+                for &onset in onsets.iter().filter(|onset| (**onset * pair.fps) < pair.n_frames() as f64) {
+                    let sums = &mut blocks.at((onset * pair.fps) as usize)[2 * i..2 * i + 2];
+                    match &beats {
+                        None => sums[0] = f64::NAN,
+                        Some(beats) if beats.is_empty() => {}
+                        Some(beats) => {
+                            sums[0] += beat_proximity(onset, beats, TRIMODAL_SIGMA);
+                            sums[1] += 1.0;
+                        }
+                    }
+                }
+            }
+        }
+    };
+    let definitions = definition.with_truth("beat_consistency_of_real").into();
+    MetricFamily::new(definitions, 4, measure, |sums| vec![sums[0] / sums[1], sums[2] / sums[3]])
+}
+
+/// Times in seconds of the beats of an angle, whose mean change is `mean` half turns per frame; `None` if a
+/// predicted joint is not finite.
+fn beats(pair: &PairedFrames, poses: &[[Vec3; N_JOINTS]], joints: [usize; 3], mean: f64) -> Option<Vec<f64>> {
+    let visible = |t: usize| joints.iter().all(|joint| pair.visible[t][*joint]);
+    let angle = |t: usize| {
+        let [a, b, c] = joints.map(|joint| poses[t][joint]);
+        let (first, second) = (vec3::sub(b, a), vec3::sub(c, b));
+        let cosine = (0..3).map(|k| first[k] * second[k]).sum::<f64>() / (vec3::norm(first) * vec3::norm(second));
+        cosine.clamp(-1.0, 1.0).acos() / PI
+    };
+    if (0..pair.n_frames()).any(|t| visible(t) && joints.iter().any(|joint| !poses[t][*joint][0].is_finite())) {
+        return None;
+    }
+    let change = |t: usize| match t {
+        0 => 0.0,
+        _ if visible(t) && visible(t - 1) => (angle(t) - angle(t - 1)).abs() / mean / TRIMODAL_ANGLES.len() as f64,
+        _ => f64::NAN,
+    };
+    let changes: Vec<f64> = (0..pair.n_frames()).map(change).collect();
+    let is_beat =
+        |w: &[f64]| w[1] < w[0] && w[1] < w[2] && (w[0] - w[1] >= TRIMODAL_DROP || w[2] - w[1] >= TRIMODAL_DROP);
+    let beats = changes.windows(3).enumerate().filter(|(_, w)| is_beat(w));
+    Some(beats.map(|(i, _)| (i + 1) as f64 / pair.fps).collect())
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -165,7 +302,7 @@ mod tests {
     #[test]
     fn minima_match_scipy() {
         let golden: serde_json::Value =
-            serde_json::from_str(include_str!("../../../../fixtures/reference/metrics_golden.json")).unwrap();
+            serde_json::from_str(include_str!("../../../fixtures/reference/metrics_golden.json")).unwrap();
         let values: Vec<f64> = serde_json::from_value(golden["minima"]["values"].clone()).unwrap();
         for (order, expected) in golden["minima"]["of_order"].as_object().unwrap() {
             let expected: Vec<usize> = serde_json::from_value(expected.clone()).unwrap();
