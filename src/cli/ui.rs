@@ -10,7 +10,7 @@ use std::fmt;
 use std::io::{ErrorKind, IsTerminal, Write};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 /// The terminal, if any. Failing to write output never stops the work.
 pub struct Ui {
@@ -110,11 +110,8 @@ impl Progress for Ui {
         let n_skipped = Arc::new(AtomicU64::new(0));
         let skipped = n_skipped.clone();
         let left = move |state: &ProgressState, out: &mut dyn fmt::Write| {
-            let left = secs_left(state, skipped.load(Ordering::Relaxed));
-            let _ = match left {
-                Some(left) => write!(out, "{}", duration(left.as_secs_f64())),
-                None => write!(out, "unknown time"),
-            };
+            let (done, length) = (state.pos(), state.len().unwrap_or(0));
+            let _ = out.write_str(&time_left(state.elapsed(), done, length, skipped.load(Ordering::Relaxed)));
         };
         let spent = |state: &ProgressState, out: &mut dyn fmt::Write| {
             let _ = write!(out, "{}", duration(state.elapsed().as_secs_f64()));
@@ -124,7 +121,8 @@ impl Progress for Ui {
             .bars
             .add(bar.with_style(style.with_key("left", left).with_key("spent", spent)).with_prefix(label.to_owned()));
         bar.enable_steady_tick(Duration::from_millis(200));
-        Box::new(Bar { bar, n_skipped })
+        let is_hidden = bar.is_hidden();
+        Box::new(Bar::new(bar, is_hidden, n_skipped))
     }
 
     fn is_to_stop(&self) -> bool {
@@ -141,22 +139,59 @@ impl Progress for Ui {
     }
 }
 
-/// Estimated remaining time at the current rate; `None` before any step that took time.
-fn secs_left(state: &ProgressState, n_skipped: u64) -> Option<Duration> {
-    let done = state.pos().saturating_sub(n_skipped);
-    let left = state.len()?.saturating_sub(state.pos());
-    (done > 0).then(|| state.elapsed().mul_f64(left as f64 / done as f64))
+/// Estimated remaining time at the current rate, which is unknown before any step that took time.
+fn time_left(elapsed: Duration, position: u64, length: u64, n_skipped: u64) -> String {
+    match position.saturating_sub(n_skipped) {
+        0 => "unknown time".to_owned(),
+        done => duration(elapsed.as_secs_f64() * length.saturating_sub(position) as f64 / done as f64),
+    }
 }
+
+/// Seconds between the lines of a task if there is no terminal for its bar.
+const LINE_SECS: u64 = 15;
 
 struct Bar {
     bar: ProgressBar,
+    is_hidden: bool,
+    begun: Instant,
+    /// Seconds from the beginning after which the next line is due.
+    next_line: AtomicU64,
     /// Steps that needed no work.
     n_skipped: Arc<AtomicU64>,
+}
+
+impl Bar {
+    fn new(bar: ProgressBar, is_hidden: bool, n_skipped: Arc<AtomicU64>) -> Self {
+        Self { bar, is_hidden, begun: Instant::now(), next_line: AtomicU64::new(LINE_SECS), n_skipped }
+    }
+
+    /// Line that replaces the bar, if one is due.
+    fn line(&self, elapsed: Duration) -> Option<String> {
+        if !self.is_hidden || elapsed.as_secs() < self.next_line.load(Ordering::Relaxed) {
+            return None;
+        }
+        self.next_line.store(elapsed.as_secs() + LINE_SECS, Ordering::Relaxed);
+        let (position, length) = (self.bar.position(), self.bar.length().unwrap_or(0));
+        let done = match length {
+            0 => position.to_string(),
+            PARTS => format!("{} %", 100 * position / PARTS),
+            _ => format!("{position} of {length}"),
+        };
+        let spent = duration(elapsed.as_secs_f64());
+        let left = match length {
+            0 => String::new(),
+            _ => format!(", {} left", time_left(elapsed, position, length, self.n_skipped.load(Ordering::Relaxed))),
+        };
+        Some(format!("{}: {done}, {spent} elapsed{left}", self.bar.prefix()))
+    }
 }
 
 impl Task for Bar {
     fn advance(&self, steps: u64) {
         self.bar.inc(steps);
+        if let Some(line) = self.line(self.begun.elapsed()) {
+            note(&line);
+        }
     }
     fn skip(&self, steps: u64) {
         self.n_skipped.fetch_add(steps, Ordering::Relaxed);
@@ -166,7 +201,9 @@ impl Task for Bar {
         self.bar.set_message(sanitised(text).into_owned());
     }
     fn milestone(&self, line: &str) {
-        if self.bar.is_hidden() {
+        if self.is_hidden {
+            // From now on, the task prints its own lines.
+            self.next_line.store(u64::MAX, Ordering::Relaxed);
             note(line);
         }
     }
@@ -187,4 +224,31 @@ pub fn note(line: &str) {
 pub fn sanitised(text: &str) -> Cow<'_, str> {
     let commands = |letter: char| letter.is_control() && !matches!(letter, '\n' | '\t');
     if text.contains(commands) { text.replace(commands, "\u{fffd}").into() } else { text.into() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use indicatif::ProgressDrawTarget;
+
+    #[test]
+    fn a_task_without_a_terminal_prints_lines() {
+        let bar = |length: u64, n_skipped: u64, is_hidden: bool| {
+            let bar = ProgressBar::with_draw_target(Some(length), ProgressDrawTarget::hidden());
+            let n_skipped = Arc::new(AtomicU64::new(n_skipped));
+            Bar::new(bar.with_prefix("render"), is_hidden, n_skipped)
+        };
+        let at = |bar: &Bar, secs: u64| bar.line(Duration::from_secs(secs));
+        let counted = bar(450, 50, true);
+        counted.bar.inc(100);
+        assert_eq!(at(&counted, LINE_SECS - 1), None);
+        let expected = format!("render: 100 of 450, {} elapsed, {} left", duration(20.0), duration(140.0));
+        assert_eq!(at(&counted, 20), Some(expected));
+        assert_eq!((at(&counted, 34), at(&counted, 35).is_some()), (None, true));
+        counted.milestone("clip 1");
+        assert_eq!(at(&counted, 1_000), None);
+        let parts = bar(PARTS, 0, true);
+        assert!(at(&parts, 60).is_some_and(|line| line.contains("0 %, ") && line.ends_with("unknown time left")));
+        assert_eq!(at(&bar(10, 0, false), 60), None);
+    }
 }

@@ -24,6 +24,8 @@ choices! {
     pub enum NetworkPreset {
         /// Chosen by the recipe; replaced before training.
         Auto,
+        /// `Light` with half the channels, for previews, tests and a few minutes of simple gestures.
+        Small,
         /// Small network for CPUs: convolutions over time only.
         Light,
         /// Network of Ginosar et al. (2019), on which Rebol et al. (2021) build: convolutions over time and frequency.

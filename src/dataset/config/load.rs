@@ -245,7 +245,7 @@ mod tests {
         for (set, expected) in [
             (
                 "gan.preset=ligth",
-                "unknown value \"ligth\": expected one of \"auto\", \"light\", \"paper\" (did you mean light?)",
+                "unknown value \"ligth\": expected one of \"auto\", \"small\", \"light\", \"paper\" (did you mean light?)",
             ),
             ("gan.device=`gpu`", "unknown value \"`gpu`\": expected \"cpu\" or \"cuda\""),
         ] {

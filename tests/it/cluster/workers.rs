@@ -134,7 +134,7 @@ fn an_invalid_video_fails_alone_and_changed_plans_are_rejected() {
     std::fs::write(&plan, &text).unwrap();
     let file = project.dir().join("pipeline.toml");
     let settings = std::fs::read_to_string(&file).unwrap();
-    std::fs::write(&file, settings.replace("lambda_gan = 0.15", "lambda_gan = 0.2")).unwrap();
+    std::fs::write(&file, settings.replace("steps = 800", "steps = 900")).unwrap();
     assert_eq!(project.answer(&["work", "--plan", "work/plan.json"]).code, 0, "training settings are not planned");
     std::fs::write(&file, settings.replace("[pose2d]", "[pose2d]\nperson_every = 7")).unwrap();
     let other = project.answer(&["work", "--plan", "work/plan.json"]);

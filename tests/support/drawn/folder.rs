@@ -35,8 +35,8 @@ MODELS[segment]
 speech = "loudness"                # the speech consists of tones, which the speech model does not classify as speech
 
 [gan]
-learning_rate = 5e-4               # for hundreds of steps on a minute of speech; the defaults are for hours
-lambda_gan = 0.15                  # with 1, the model moves nearly three times as much as the data after 600 steps
+preset = "small"                   # a few minutes of processor time; "auto" is better from ten minutes of speech on
+steps = 800
 "#;
 
 const MARKER_MODELS: &str = r#"[pose2d]
@@ -74,13 +74,16 @@ impl Default for DemoPlan {
 }
 
 impl DemoPlan {
+    /// Longest duration of a video, seconds.
+    pub const MAX_SECS: f64 = 3600.0;
+
     /// Checks the ranges of the values.
     ///
     /// # Errors
     /// A number of videos outside 1..=1000 or a duration outside 1..=3600 s.
     pub fn check(&self) -> anyhow::Result<()> {
         ensure!((1..=1000).contains(&self.n_videos), "invalid --videos {}: expected 1 to 1000", self.n_videos);
-        ensure!((1.0..=3600.0).contains(&self.secs), "invalid --secs {}: expected 1 to 3600", self.secs);
+        ensure!((1.0..=Self::MAX_SECS).contains(&self.secs), "invalid --secs {}: expected 1 to 3600", self.secs);
         Ok(())
     }
 }
@@ -108,8 +111,8 @@ pub fn draw(dir: &Path, plan: &DemoPlan, progress: &dyn Progress) -> anyhow::Res
     Ok(videos)
 }
 
-/// Configuration lines for the splits: the last third of the videos is the test split, the one before it the
-/// validation split; fewer than three are all training.
+/// Configuration lines for the splits: the last videos are the test split (a third of few videos, a sixth of many), a
+/// tenth before them, at least one, is the validation split; fewer than three are all training.
 fn splits(n_videos: usize) -> String {
     if n_videos < 3 {
         return "train = [\"*.mp4\"]".to_owned();
@@ -117,8 +120,9 @@ fn splits(n_videos: usize) -> String {
     let list = |numbers: std::ops::RangeInclusive<usize>| {
         numbers.map(|number| format!("\"clip-{number}.mp4\"")).collect::<Vec<_>>().join(", ")
     };
-    let first_test = n_videos - n_videos / 3 + 1;
+    let first_test = n_videos - (n_videos / 3).min((n_videos / 6).max(2)) + 1;
+    let first_validation = first_test - (n_videos / 10).max(1);
     let (train, validation, test) =
-        (list(1..=first_test - 2), list(first_test - 1..=first_test - 1), list(first_test..=n_videos));
+        (list(1..=first_validation - 1), list(first_validation..=first_test - 1), list(first_test..=n_videos));
     format!("train = [{train}]\nvalidation = [{validation}]\ntest = [{test}]")
 }

@@ -167,7 +167,7 @@ pub fn metadata(
             Representation::bones(normal, loader.poses(PART_FRAMES))?
         }
     };
-    let network = Config::from_preset(preset(settings.preset), normal.n_features());
+    let network = network(settings.preset, normal.n_features());
     let several = n_speakers > 1;
     let network = Config { n_speakers: if several { n_speakers } else { 0 }, speaker_weights: several, ..network };
     let (info, hash) = (dataset.info(), dataset.hash()?);
@@ -203,10 +203,13 @@ pub fn resume(metadata: &mut SpeakerMetadata, dataset: &Dataset, differences: &m
     Ok(())
 }
 
-pub const fn preset(preset: NetworkPreset) -> Preset {
+/// Network with `n_out` outputs for a preset of the configuration. `Small` is `Light` with half the channels.
+fn network(preset: NetworkPreset, n_out: usize) -> Config {
+    let light = Config::from_preset(Preset::Light, n_out);
     match preset {
-        NetworkPreset::Auto | NetworkPreset::Light => Preset::Light,
-        NetworkPreset::Paper => Preset::Paper,
+        NetworkPreset::Auto | NetworkPreset::Light => light,
+        NetworkPreset::Small => Config { width: light.width / 2, ..light },
+        NetworkPreset::Paper => Config::from_preset(Preset::Paper, n_out),
     }
 }
 
@@ -252,6 +255,12 @@ mod tests {
         let normal = Normalisation::new(&table(mean), &table(0.3), vec![0.1 + mean; N_BONES]);
         let network = Config { n_speakers, ..Config::from_preset(Preset::Light, normal.n_features()) };
         SpeakerMetadata::new("host", FrameRate::new(15, 1), "", network, normal, representation)
+    }
+
+    #[test]
+    fn small_is_light_with_half_the_channels() {
+        let [small, light] = [NetworkPreset::Small, NetworkPreset::Light].map(|preset| network(preset, 144));
+        assert_eq!(small, Config { width: 128, ..light });
     }
 
     /// Windows of a mixed batch are decoded as by a network of one speaker.

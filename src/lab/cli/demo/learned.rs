@@ -12,10 +12,16 @@ use orator_gesture::generate::trained::TrainedSpeaker;
 use orator_media::opencv::png;
 use std::path::Path;
 
-pub fn run(dataset: &Path, checkpoint: Option<&Path>, picture: Option<&Path>, ui: &Ui) -> Result<Outcome> {
+pub fn run(
+    dataset: &Path,
+    truth: Option<&Path>,
+    checkpoint: Option<&Path>,
+    picture: Option<&Path>,
+    ui: &Ui,
+) -> Result<Outcome> {
     let dataset = Dataset::open(dataset)?;
     let speaker = checkpoint.map(TrainedSpeaker::open).transpose()?;
-    let learned = learned::measure(&dataset, speaker.as_ref(), ui)?;
+    let learned = learned::measure(&dataset, truth, speaker.as_ref(), ui)?;
     let heads = "predictor                          speed L  speed R  PCK 0.2   energy   pauses       L1";
     let has_words = learned.rows.iter().any(|row| row.positions.is_some());
     let of_words = if has_words { "   positions: all words     isolated words" } else { "" };

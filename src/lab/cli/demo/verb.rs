@@ -6,7 +6,6 @@ use crate::demo::check::pipeline;
 use crate::demo::check::pipeline::{MIN_FRAMES, MIN_JOINTS, Millimetres};
 use crate::demo::check::sheet;
 use crate::demo::host;
-use crate::demo::more_speech;
 use crate::demo::people;
 use crate::demo::people::condition::Condition;
 use crate::demo::people::folder::RenderPlan;
@@ -17,7 +16,6 @@ use orator::cli::ui::Ui;
 use orator_base::stage::workdir::{self, FolderLock};
 use orator_base::text::{counted, length};
 use orator_base::types::time::FrameRate;
-use orator_dataset::Dataset;
 use orator_dataset::config;
 use orator_dataset::info::DatasetInfo;
 use orator_formats::mocap::motion_file;
@@ -69,10 +67,6 @@ enum DemoVerb {
         /// figure in a marker suit for the marker models.
         #[arg(long, conflicts_with = "people")]
         rendered: bool,
-        /// Duration of additional speech of the same figure without video, minutes; it is written to DIR/speech as a
-        /// dataset of audio and joints, for `orator train gan --from`.
-        #[arg(long, value_name = "MIN", conflicts_with = "people", value_parser = clap::value_parser!(u32).range(1..=6000))]
-        speech: Option<u32>,
         /// Duration of each video, seconds; defaults to 30, for rendered persons to 8.
         #[arg(long)]
         secs: Option<f64>,
@@ -116,13 +110,16 @@ enum DemoVerb {
         #[arg(long, default_value_t = 1)]
         seed: u64,
     },
-    /// Measure how much of the rule of `demo speaker` a trained model has learned.
+    /// Measure how much of the rule of a synthetic speaker a trained model has learned.
     ///
     /// The test split is used. Exit code 2: a target is missed.
     Learned {
         /// Dataset folder.
         #[arg(long, value_name = "DIR")]
         dataset: PathBuf,
+        /// Folder `truth` of `demo draw --rendered`, for a dataset built from its videos.
+        #[arg(long, value_name = "DIR")]
+        truth: Option<PathBuf>,
         /// Checkpoint of `orator train gan` or `orator train seq2seq`, or its folder; without it only the baselines
         /// are measured.
         #[arg(long, value_name = "FILE|DIR")]
@@ -147,20 +144,7 @@ enum DemoVerb {
 
 pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     match args.part {
-        DemoVerb::Draw {
-            dir,
-            videos,
-            people,
-            conditions,
-            truth_only,
-            motion,
-            rendered,
-            speech,
-            secs,
-            fps,
-            seed,
-            ..
-        } => {
+        DemoVerb::Draw { dir, videos, people, conditions, truth_only, motion, rendered, secs, fps, seed, .. } => {
             let fps = FrameRate::new(fps.clamp(1, 120), 1);
             if let Some(n_clips) = people {
                 let conditions = Condition::of_names(&conditions)?;
@@ -170,7 +154,7 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
             }
             let defaults = DemoPlan::default();
             let plan = DemoPlan { n_videos: videos, secs: secs.unwrap_or(defaults.secs), fps, seed, ..defaults };
-            draw(&dir, &plan, rendered, speech, ui)
+            draw(&dir, &plan, rendered, ui)
         }
         DemoVerb::Measure { dir } => measure(&dir, ui),
         DemoVerb::Speaker { dir, speech: Some(folder), seed, .. } => {
@@ -183,50 +167,24 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
             let clips = dataset::clips(hours, seed, rule, habits)?;
             write_speaker(&dir, clips.len(), rule, ui, |attempt| dataset::write(attempt, &clips, ui))
         }
-        DemoVerb::Learned { dataset, checkpoint, picture } => {
-            learned::run(&dataset, checkpoint.as_deref(), picture.as_deref(), ui)
+        DemoVerb::Learned { dataset, truth, checkpoint, picture } => {
+            learned::run(&dataset, truth.as_deref(), checkpoint.as_deref(), picture.as_deref(), ui)
         }
         DemoVerb::Sheet { dir, out, motion } => draw_sheet(&dir, &out, motion.as_deref(), ui),
     }
 }
 
-fn draw(dir: &Path, plan: &DemoPlan, rendered: bool, speech: Option<u32>, ui: &Ui) -> Result<Outcome> {
-    let extra = speech.map(|minutes| write_speech(dir, plan, rendered, 60.0 * f64::from(minutes), ui)).transpose()?;
+fn draw(dir: &Path, plan: &DemoPlan, rendered: bool, ui: &Ui) -> Result<Outcome> {
     let videos = if rendered { host::draw(dir, plan, ui)? } else { folder::draw(dir, plan, ui)? };
     let next = format!("orator run -c {}", dir.join("pipeline.toml").display());
-    let mut text = format!(
+    let text = format!(
         "wrote {} of {} to {}",
         counted(videos.len(), "video"),
         length(plan.secs),
         dir.join("videos/host").display()
     );
-    if let Some((secs, dataset)) = &extra {
-        text += &format!("\nwrote {} of additional speech without video to {}", length(*secs), dataset.display());
-    }
-    let extra = extra.map(|(_, dataset)| dataset);
-    ui.summary(&text, Some(&next), json!({ "videos": videos, "speech": extra, "next": next }));
+    ui.summary(&text, Some(&next), json!({ "videos": videos, "next": next }));
     Ok(Outcome::Done)
-}
-
-/// Speech of the demo's figure without video: training duration in seconds, and the dataset. An existing dataset is
-/// reused.
-fn write_speech(dir: &Path, plan: &DemoPlan, rendered: bool, secs: f64, ui: &Ui) -> Result<(f64, PathBuf)> {
-    let out = dir.join("speech");
-    let folder = std::path::absolute(&out)?;
-    if workdir::has_files(&folder) {
-        let existing = Dataset::open(&folder)?;
-        ensure!(
-            existing.info().notes.contains(&more_speech::note(plan, rendered, secs)),
-            "{} contains other speech: expected that of `--seed {}` with this duration and figure; remove it or choose \
-             another folder",
-            out.display(),
-            plan.seed
-        );
-    } else {
-        let _lock = FolderLock::exclusive(&folder)?;
-        workdir::build_folder(&folder, |attempt| more_speech::write(attempt, plan, rendered, secs, ui))?;
-    }
-    Ok((secs, out))
 }
 
 fn render(dir: &Path, plan: &RenderPlan, ui: &Ui) -> Result<Outcome> {
@@ -274,13 +232,7 @@ fn measure(dir: &Path, ui: &Ui) -> Result<Outcome> {
         m.n_drawn,
         100.0 * m.joints
     );
-    text += &m.speech_secs.map_or(String::new(), |speech| {
-        format!(
-            "training data: {} from the videos, {} of additional speech without video\n",
-            length(m.train_secs),
-            length(speech)
-        )
-    });
+    text += &format!("training data: {}\n", length(m.train_secs));
     let targets_met = m.meets_targets();
     let met = if targets_met { "met" } else { "MISSED" };
     let generator =
@@ -304,7 +256,6 @@ fn measure(dir: &Path, ui: &Ui) -> Result<Outcome> {
         "bone_depth_mm": mm(&m.bone_depth), "joints": m.joints, "shoulders_px": m.shoulders_px,
         "generator": generator,
         "n_frames": m.n_frames, "n_drawn": m.n_drawn, "targets_met": targets_met, "train_secs": m.train_secs,
-        "speech_secs": m.speech_secs,
     });
     ui.summary(&text, None, facts);
     Ok(if targets_met { Outcome::Done } else { Outcome::SomeFailed })

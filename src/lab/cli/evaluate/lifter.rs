@@ -19,7 +19,7 @@ pub struct Args {
     #[arg(long, value_enum, default_value = "body")]
     part: LifterPart,
     /// Captured motion: files or folders. body: .bvh, CMU or TED .npz; hands: .bvh with fingers, TED .npz, ICVL or
-    /// NYU label .txt.
+    /// NYU label .txt, and people.json of `orator-lab demo draw --people` (middle part).
     #[arg(long, value_name = "PATH", num_args = 1.., required = true)]
     mocap: Vec<PathBuf>,
     /// body: measure only the takes that match these patterns, each as a separate set, such as 'test_*' or 'walk#1'
@@ -32,9 +32,10 @@ pub struct Args {
     /// Weights written by `orator-lab train lifter --part body`; defaults to the built-in ones.
     #[arg(long, value_name = "FILE")]
     body_weights: Option<PathBuf>,
-    /// Weights written by `orator-lab train lifter --part hands`; defaults to the built-in ones.
-    #[arg(long, value_name = "FILE")]
-    hand_weights: Option<PathBuf>,
+    /// hands: weights written by `orator-lab train lifter --part hands`, of either network, to measure next to the
+    /// built-in ones.
+    #[arg(long, value_name = "FILE", num_args = 1..)]
+    hand_weights: Vec<PathBuf>,
 }
 
 pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
@@ -46,11 +47,7 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
 
 fn body(args: Args, ui: &Ui) -> Result<Outcome> {
     ensure!((1..=100_000).contains(&args.scenes), "invalid --scenes {}: expected 1 to 100000", args.scenes);
-    let settings = config::LiftConfig {
-        body_weights: args.body_weights.unwrap_or_default(),
-        hand_weights: args.hand_weights.unwrap_or_default(),
-        ..Default::default()
-    };
+    let settings = config::LiftConfig { body_weights: args.body_weights.unwrap_or_default(), ..Default::default() };
     let takes = upper_body::read_all(&args.mocap).context("cannot read --mocap")?;
     let sets = if args.takes.is_empty() {
         vec![("all takes".to_owned(), takes)]
@@ -63,12 +60,9 @@ fn body(args: Args, ui: &Ui) -> Result<Outcome> {
 }
 
 fn hands(args: Args, ui: &Ui) -> Result<Outcome> {
-    let rows = hands::evaluate(
-        &*hands::lifter_of(&args.hand_weights.unwrap_or_default())?,
-        &files::read_all(&args.mocap)?,
-        hands::MEASURED,
-        1,
-    )?;
+    let weights = [PathBuf::new()].into_iter().chain(args.hand_weights);
+    let lifters = weights.map(|path| hands::lifter_of(&path)).collect::<Result<Vec<_>>>()?;
+    let rows = hands::evaluate(&lifters, &files::read_all(&args.mocap)?, hands::MEASURED, 1)?;
     ui.summary(&hands::text(&rows), None, serde_json::json!({ "hands": rows }));
     Ok(Outcome::Done)
 }

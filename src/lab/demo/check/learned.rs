@@ -3,8 +3,9 @@
 
 use super::positions::{self, PositionShare, WordPositions};
 use super::traces;
+use crate::demo::host;
 use anyhow::{Result, ensure};
-use ndarray::{Array1, Array2, Array3, ArrayView3};
+use ndarray::{Array1, Array2, Array3, ArrayView3, Axis};
 use orator_base::stage::progress::Progress;
 use orator_base::text::counted;
 use orator_base::types::skeleton::{NECK, is_duplicate};
@@ -22,6 +23,7 @@ use orator_test_support::rule::rule::RuleGestures;
 use orator_test_support::rule::rule::wrist_speeds;
 use orator_test_support::rule::speech_dataset::{is_by_speech, predictable};
 use serde::Serialize;
+use std::path::Path;
 
 /// Metrics of a predictor on the test split.
 #[derive(Clone, Debug, Serialize)]
@@ -86,7 +88,7 @@ const STATIC_SPEED: f64 = 0.05;
 /// A clip of the test split.
 struct TestClip {
     sample: Sample,
-    /// `None` for the second rule.
+    /// `None` for the second rule, and for videos.
     clip: Option<SpokenClip>,
     predictable: Array3<f32>,
     audio: Array2<f64>,
@@ -95,12 +97,18 @@ struct TestClip {
 }
 
 /// Evaluates `speaker` on the test split of the synthetic speaker's `dataset`; without a speaker, only the baselines.
+/// `truth`: folder with the ground truth of the videos that the dataset was built from.
 ///
 /// # Errors
 /// A test split of fewer than two clips; a speaker with another frame rate; a sample that cannot be read.
-pub fn measure(dataset: &Dataset, speaker: Option<&TrainedSpeaker>, progress: &dyn Progress) -> Result<Learned> {
+pub fn measure(
+    dataset: &Dataset,
+    truth: Option<&Path>,
+    speaker: Option<&TrainedSpeaker>,
+    progress: &dyn Progress,
+) -> Result<Learned> {
     let tests: Vec<TestClip> =
-        dataset.samples(Split::Test).iter().map(|s| TestClip::new(dataset.read(s)?)).collect::<Result<_>>()?;
+        dataset.samples(Split::Test).iter().map(|s| TestClip::new(dataset.read(s)?, truth)).collect::<Result<_>>()?;
     ensure!(
         tests.len() > 1,
         "the test split of {} has {}: expected at least 2",
@@ -136,9 +144,13 @@ pub fn measure(dataset: &Dataset, speaker: Option<&TrainedSpeaker>, progress: &d
             predicted: predicted.clone(),
         });
         rows.push(row("generator", predicted.clone()));
-        let mut mismatched = predicted;
-        mismatched.rotate_left(1);
-        rows.push(row("generator, mismatched audio", mismatched));
+        // Clips of videos differ in length: a shorter one is repeated.
+        let mismatched = (0..tests.len()).map(|n| {
+            let other = &predicted[(n + 1) % tests.len()];
+            let frames: Vec<usize> = (0..tests[n].sample.n_frames()).map(|t| t % other.shape()[0].max(1)).collect();
+            other.select(Axis(0), &frames)
+        });
+        rows.push(row("generator, mismatched audio", mismatched.collect()));
         if speaker.reads_words() {
             rows.push(row(OTHER_WORDS, with_words(Some(1))?));
             rows.push(row("generator, without words", with_words(None)?));
@@ -157,7 +169,10 @@ pub fn measure(dataset: &Dataset, speaker: Option<&TrainedSpeaker>, progress: &d
     }
     rows.push(row("nearest neighbour by audio", each(&|test| baselines.nearest(&test.audio))));
     rows.push(row("ground truth", each(&|test| test.sample.motion.joints.clone())));
-    rows.push(row("rule without variation", each(&|test| test.predictable.clone())));
+    if truth.is_none() {
+        // For videos, the rule is known in the axes of the body, not of the camera.
+        rows.push(row("rule without variation", each(&|test| test.predictable.clone())));
+    }
     if judge.has_words() {
         rows.push(row("rule without words", each(&|test| test.rule_without_words(fps))));
     }
@@ -200,9 +215,13 @@ fn word_targets_met(rows: &[LearnedRow], speaker: &TrainedSpeaker) -> bool {
 }
 
 impl TestClip {
-    fn new(sample: Sample) -> Result<Self> {
-        let clip = (!is_by_speech(&sample)).then(|| SpokenClip::from_sample(&sample)).transpose()?;
-        let predictable = clip.map_or_else(|| predictable(&sample), |clip| clip.predictable()).joints;
+    fn new(sample: Sample, truth: Option<&Path>) -> Result<Self> {
+        let has_clip = truth.is_none() && !is_by_speech(&sample);
+        let clip = has_clip.then(|| SpokenClip::from_sample(&sample)).transpose()?;
+        let predictable = match truth {
+            Some(truth) => host::predictable(truth, &sample)?,
+            None => clip.map_or_else(|| predictable(&sample), |clip| clip.predictable()).joints,
+        };
         let audio = frame_log_mel(&sample.sound, sample.n_frames(), sample.motion.fps);
         let all = || Array2::from_elem((sample.n_frames().saturating_sub(1), 2), true);
         let without_word_strokes = clip.map_or_else(all, |clip| positions::without_words(&clip, sample.motion.fps));

@@ -68,9 +68,8 @@ pub struct PipelineCheck {
     /// Number of frames in the dataset, and in the videos.
     pub n_frames: usize,
     pub n_drawn: usize,
-    /// Seconds of training data from the videos, and from `demo draw --speech` if present.
+    /// Seconds of training data.
     pub train_secs: f64,
-    pub speech_secs: Option<f64>,
     /// Share of the dataset's joints with finite values, 0..1; distances are measured on these only.
     pub joints: f64,
     pub lifted: Millimetres,
@@ -125,19 +124,10 @@ pub fn measure(dir: &Path) -> Result<PipelineCheck> {
     let mut measured = measure_keypoints(dir)?;
     let (mut lifted, mut true_joints) = (Vec::new(), Vec::new());
     let dataset = Dataset::open(speaker_dir(&dir.join("work"), StageName::Dataset, "host"))?;
-    measured.train_secs = train_secs(&dataset);
-    let speech = dir.join("speech");
-    if speech.is_dir() {
-        measured.speech_secs = Some(train_secs(&Dataset::open(speech)?));
-    }
+    measured.train_secs = dataset.info().splits.get(Split::Train.name()).map_or(0.0, |split| split.secs);
     for sample in Split::ALL.into_iter().flat_map(|split| dataset.samples(split)) {
         let sample = dataset.read(&sample)?;
-        let (video, first) = sample
-            .key
-            .rsplit_once('-')
-            .with_context(|| format!("invalid sample key `{}`: expected NAME-FRAME", sample.key))?;
-        let first: usize =
-            first.parse().with_context(|| format!("invalid sample key `{}`: expected NAME-FRAME", sample.key))?;
+        let (video, first) = origin(&sample.key)?;
         let truth = truth_of(dir, video)?.drawn;
         let n_frames = sample.n_frames().min(truth.motion.n_frames().saturating_sub(first));
         for start in (0..n_frames).step_by(SEGMENT) {
@@ -168,10 +158,6 @@ pub fn measure(dir: &Path) -> Result<PipelineCheck> {
     Ok(measured)
 }
 
-fn train_secs(dataset: &Dataset) -> f64 {
-    dataset.info().splits.get(Split::Train.name()).map_or(0.0, |split| split.secs)
-}
-
 /// Compares only the keypoints.
 ///
 /// # Errors
@@ -181,7 +167,7 @@ pub fn measure_keypoints(dir: &Path) -> Result<PipelineCheck> {
     let (mut body, mut hands) = (Distances::default(), Distances::default());
     for unit in subfolders(&speaker_dir(&dir.join("work"), StageName::Pose2d, "host"))? {
         let DemoTruth { drawn: truth, shoulders_px } =
-            truth_of(dir, &unit.file_name().unwrap_or_default().to_string_lossy())?;
+            truth_of(dir, stem(&unit.file_name().unwrap_or_default().to_string_lossy()))?;
         measured.shoulders_px = measured.shoulders_px.or(shoulders_px);
         let seen = keypoints_npz::read(&Artifact::Keypoints.within(&unit))?;
         measured.n_drawn += truth.motion.n_frames();
@@ -193,10 +179,23 @@ pub fn measure_keypoints(dir: &Path) -> Result<PipelineCheck> {
     Ok(measured)
 }
 
-/// Ground truth of the video with the work name `<stem>-<8 hex digits>`.
-fn truth_of(dir: &Path, work_name: &str) -> Result<DemoTruth> {
-    let stem = work_name.rsplit_once('-').map_or(work_name, |(stem, _)| stem);
-    DemoTruth::read(&dir.join(format!("truth/{stem}.npz")))
+/// Ground truth of a video.
+fn truth_of(dir: &Path, video: &str) -> Result<DemoTruth> {
+    DemoTruth::read(&dir.join(format!("truth/{video}.npz")))
+}
+
+/// Video with the work name `<stem>-<8 hex digits>`.
+fn stem(work_name: &str) -> &str {
+    work_name.rsplit_once('-').map_or(work_name, |(stem, _)| stem)
+}
+
+/// Video and first frame of the sample with the key `<stem>-<8 hex digits>-<frame>`.
+///
+/// # Errors
+/// A key of another form.
+pub fn origin(key: &str) -> Result<(&str, usize)> {
+    let parts = key.rsplit_once('-').and_then(|(video, first)| Some((stem(video), first.parse().ok()?)));
+    parts.with_context(|| format!("invalid sample key `{key}`: expected NAME-FRAME"))
 }
 
 fn subfolders(folder: &Path) -> Result<Vec<PathBuf>> {

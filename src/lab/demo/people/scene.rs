@@ -146,21 +146,33 @@ impl PersonScene {
         let mut video = VideoWriter::with_crf(path, [width, height], self.fps, Some(self.sound()), self.crf)?;
         let owners = PointOwners::new(&self.actors[0]);
         let mut truths = Vec::with_capacity(self.n_frames);
-        for start in (0..self.n_frames).step_by(BATCH) {
-            let frames = start..(start + BATCH).min(self.n_frames);
-            let drawn: Vec<(Image, FrameTruth)> = frames
-                .into_par_iter()
-                .map_init(|| Renderer::new(self.camera.size), |renderer, frame| self.frame(renderer, &owners, frame))
-                .collect();
-            for (image, truth) in drawn {
-                video.push(&image)?;
-                truths.push(truth);
-                task.advance(1);
-            }
+        let mut drawn = self.frames(&owners, 0);
+        while !drawn.is_empty() {
+            let (mut following, first) = (Vec::new(), truths.len() + drawn.len());
+            rayon::in_place_scope(|scope| -> anyhow::Result<()> {
+                // Rendered while the current frames are encoded.
+                scope.spawn(|_| following = self.frames(&owners, first));
+                for (image, truth) in drawn.drain(..) {
+                    video.push(&image)?;
+                    truths.push(truth);
+                    task.advance(1);
+                }
+                Ok(())
+            })?;
+            drawn = following;
         }
         video.finish()?;
         let speaks = self.actors[0].role.speaks && !self.sound().samples.is_empty();
         Ok(truth::collected(&truths, self.fps, &self.camera, speaks))
+    }
+
+    /// Images and ground truth of the batch of frames that begins with `first`; empty after the last frame.
+    fn frames(&self, owners: &PointOwners, first: usize) -> Vec<(Image, FrameTruth)> {
+        let frames = first..(first + BATCH).min(self.n_frames);
+        frames
+            .into_par_iter()
+            .map_init(|| Renderer::new(self.camera.size), |renderer, frame| self.frame(renderer, owners, frame))
+            .collect()
     }
 
     /// Ground truth without rendering: every point inside the image counts as visible.

@@ -14,7 +14,7 @@ use orator_base::motion::hand_bones::relaxed;
 use orator_base::motion::view::hand::{HandJoints, HandPoints, parent};
 use orator_base::types::pose2d::N_HAND;
 use orator_base::types::skeleton::Side;
-use orator_pipeline::lift::weights;
+use orator_pipeline::lift::weights::{self, HandNetwork};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use serde::Serialize;
@@ -30,7 +30,13 @@ const PALM: f64 = 0.093;
 const PX: f64 = 1000.0;
 
 /// Lifter of right hands: keypoints to joints in any unit, the wrist at 0; `None`: not lifted.
-pub type LiftHands<'a> = dyn Fn(&[HandPoints]) -> Result<Vec<Option<HandJoints>>> + 'a;
+pub type LiftHands = dyn Fn(&[HandPoints]) -> Result<Vec<Option<HandJoints>>>;
+
+/// A lifter with its network and the file of its weights.
+pub struct NamedLifter {
+    network: String,
+    lift: Box<LiftHands>,
+}
 
 /// Errors in mm, medians over all compared points of all hands.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -43,10 +49,12 @@ pub struct HandErrors {
     pub above_30: Option<f64>,
 }
 
-/// Errors on one set of the lifter and of two baselines without a network.
+/// Errors on one set of a lifter and of two baselines without a network.
 #[derive(Clone, Debug, Serialize)]
 pub struct HandRow {
     pub set: String,
+    /// Network of the lifter, and the file of its weights.
+    pub network: String,
     /// Source of the hands' size.
     pub size: &'static str,
     pub n_hands: usize,
@@ -65,18 +73,23 @@ struct ProjectedHand {
     seen: HandPoints,
 }
 
-/// Errors of `lift` on `sets`, for `n_hands` hands each, sampled with `seed`.
-pub fn evaluate(lift: &LiftHands, sets: &[FingerSet], n_hands: usize, seed: u64) -> Result<Vec<HandRow>> {
-    sets.iter().map(|set| row(lift, set, n_hands, seed)).collect()
+/// Errors of each lifter on each of `sets`, for `n_hands` hands per set, sampled with `seed`.
+pub fn evaluate(lifters: &[NamedLifter], sets: &[FingerSet], n_hands: usize, seed: u64) -> Result<Vec<HandRow>> {
+    sets.iter().flat_map(|set| lifters.iter().map(move |lifter| row(lifter, set, n_hands, seed))).collect()
 }
 
 /// Loads a lifter of either network from a weights file (the built-in one if `path` is empty).
-pub fn lifter_of(path: &Path) -> Result<Box<LiftHands<'static>>> {
+pub fn lifter_of(path: &Path) -> Result<NamedLifter> {
     let lifter = weights::hands(path)?;
-    Ok(Box::new(move |seen| lifter.lift(seen, Side::Right)))
+    let kind = match &lifter {
+        HandNetwork::Coordinates(_) => "coordinates",
+        HandNetwork::Heatmap(_) => "heatmap",
+    };
+    let file = path.file_name().map_or("built-in".into(), |name| name.to_string_lossy());
+    Ok(NamedLifter { network: format!("{kind} ({file})"), lift: Box::new(move |seen| lifter.lift(seen, Side::Right)) })
 }
 
-fn row(lift: &LiftHands, set: &FingerSet, n_hands: usize, seed: u64) -> Result<HandRow> {
+fn row(lifter: &NamedLifter, set: &FingerSet, n_hands: usize, seed: u64) -> Result<HandRow> {
     let mut truths = Vec::new();
     for take in &set.takes {
         truths.extend(take.truths()?);
@@ -87,13 +100,14 @@ fn row(lift: &LiftHands, set: &FingerSet, n_hands: usize, seed: u64) -> Result<H
     let shots: Vec<ProjectedHand> =
         (0..n_hands).map(|_| shot(&truths[rng.random_range(0..truths.len())], &mut rng)).collect();
     let seen: Vec<HandPoints> = shots.iter().map(|s| s.seen).collect();
-    let lifted = lift(&seen)?;
+    let lifted = (lifter.lift)(&seen)?;
     let has_knuckles = set.takes.iter().all(|take| take.has_knuckles());
     let sized: Vec<Option<HandJoints>> =
         shots.iter().zip(&lifted).map(|(s, h)| Some(to_size(&s.truth, h.as_ref()?))).collect();
     let of = |hands: &[Option<HandJoints>]| errors(&shots, hands, has_knuckles);
     Ok(HandRow {
         set: set.name.clone(),
+        network: lifter.network.clone(),
         size: set.takes.first().map_or("", |take| take.size.text()),
         n_hands,
         lifted: lifted.iter().filter(|h| h.is_some()).count() as f64 / n_hands.max(1) as f64,
@@ -168,18 +182,19 @@ fn errors(shots: &[ProjectedHand], hands: &[Option<HandJoints>], has_knuckles: b
     }
 }
 
-/// The table as text, one line per set.
+/// The table as text, one line per set and network.
 pub fn text(rows: &[HandRow]) -> String {
     let number = |value: Option<f32>| value.map_or_else(|| "-".to_owned(), |v| format!("{v:.1}"));
     let one = |e: &HandErrors| format!("{:>5} /{:>5.1}", number(e.median_mm), e.aligned_mm);
     let mut lines = vec![format!(
-        "{:<44} {:>13} {:>8} {:>14} {:>14}   size",
-        "hands: median / aligned error, mm", "lifter", ">30 mm", "flat", "relaxed"
+        "{:<34} {:<40} {:>13} {:>8} {:>14} {:>14}   size",
+        "hands: median / aligned error, mm", "network", "lifter", ">30 mm", "flat", "relaxed"
     )];
     lines.extend(rows.iter().map(|row| {
         let above = row.lifter.above_30.map_or_else(|| "-".to_owned(), |share| format!("{:.0} %", 100.0 * share));
         let (lifter, flat, relaxed) = (one(&row.lifter), one(&row.flat), one(&row.relaxed));
-        format!("{:<44} {lifter:>13} {above:>8} {flat:>14} {relaxed:>14}   {}", row.set, row.size)
+        let (set, network, size) = (&row.set, &row.network, row.size);
+        format!("{set:<34} {network:<40} {lifter:>13} {above:>8} {flat:>14} {relaxed:>14}   {size}")
     }));
     lines.join("\n")
 }
@@ -222,14 +237,15 @@ mod tests {
 
     #[test]
     fn the_built_in_lifter_is_far_better_than_no_depth() -> Result<()> {
-        let lift = lifter_of(Path::new(""))?;
+        let lifters = [lifter_of(Path::new(""))?, lifter_of(Path::new(""))?];
         let sets = [resting(Size::Phalanx, |_| true), resting(Size::MiddleEnd, |j| j == 0 || j % 4 != 1 || j == 9)];
-        let rows = evaluate(&*lift, &sets, 300, 5)?;
+        let rows = evaluate(&lifters, &sets, 300, 5)?;
         let median = |e: HandErrors| e.median_mm.unwrap_or(f32::NAN);
         assert!(median(rows[0].lifter) < 20.0, "{rows:?}");
         assert!(median(rows[0].lifter) < 0.5 * median(rows[0].flat), "{rows:?}");
-        assert!(rows[1].lifter.aligned_mm < 20.0 && rows[0].lifted == 1.0, "{rows:?}");
-        assert!(text(&rows).lines().count() == 3);
+        assert!(rows[2].lifter.aligned_mm < 20.0 && rows[0].lifted == 1.0, "{rows:?}");
+        assert_eq!((rows[0].lifter, &*rows[0].network), (rows[1].lifter, "coordinates (built-in)"));
+        assert_eq!(text(&rows).lines().count(), 5);
         Ok(())
     }
 }

@@ -1,15 +1,17 @@
 //! Reads captured or labelled fingers from files and folders: `.bvh` by joint names; `.npz` with SMPL-X `poses` [T,
 //! 165] on an assumed rest hand, or with `human_joints` [T, 43, 3] of TED speakers, without tips; `.txt` labels
-//! (`labels`) with 48 numbers per line (ICVL, bone midpoints) or 42 (NYU, no knuckles, aligned errors only). Reference
-//! lengths: middle proximal phalanx 48 mm; TED wrist to middle knuckle 93.2 mm; NYU the middle finger's last two bones
-//! 51.3 mm.
+//! (`labels`) with 48 numbers per line (ICVL, bone midpoints) or 42 (NYU, no knuckles, aligned errors only);
+//! `people.json` of rendered persons. Reference lengths: middle proximal phalanx 48 mm; TED wrist to middle knuckle
+//! 93.2 mm; NYU the middle finger's last two bones 51.3 mm.
 
 use super::labels;
 use super::take::{FingerTake, Fingers, Size};
+use crate::evaluate::people::clips::ListedClip;
 use crate::mocap::smplx;
-use anyhow::{Result, bail, ensure};
+use crate::rendered_truth::RenderedTruth;
+use anyhow::{Context, Result, bail, ensure};
 use orator_base::types::pose2d::N_HAND;
-use orator_base::types::skeleton::Side;
+use orator_base::types::skeleton::{L_HAND, R_HAND, Side};
 use orator_formats::bvh::read::{Bvh, Positions};
 use orator_formats::mocap::{fingers, ted};
 use orator_formats::npz::Npz;
@@ -63,7 +65,8 @@ pub fn read(path: &Path) -> Result<Vec<FingerTake>> {
         Some("npz") if smplx::is_smplx(path)? => of_smplx(path),
         Some("npz") => of_ted(path),
         Some("txt") => Ok(vec![labels::read(path)?]),
-        _ => bail!("unsupported file {}: expected fingers as .bvh, .npz or .txt", path.display()),
+        Some("json") => of_rendered(path),
+        _ => bail!("unsupported file {}: expected fingers as .bvh, .npz, .txt or people.json", path.display()),
     }
 }
 
@@ -120,9 +123,33 @@ fn of_ted(path: &Path) -> Result<Vec<FingerTake>> {
     Ok([Side::Left, Side::Right].map(take).into())
 }
 
+/// Reads the true hands of rendered persons: the middle part of the clips listed in `people.json`, without generated
+/// fingers on captured motion.
+fn of_rendered(path: &Path) -> Result<Vec<FingerTake>> {
+    let text = std::fs::read_to_string(path).with_context(|| format!("cannot read {}", path.display()))?;
+    let list: Vec<ListedClip> = serde_json::from_str(&text)
+        .with_context(|| format!("{} is not a list of rendered persons (people.json)", path.display()))?;
+    let mut takes = Vec::new();
+    for clip in list.iter().filter(|clip| clip.part == "middle") {
+        let truth = path.with_file_name(&clip.truth);
+        let joints = RenderedTruth::read(&truth)?.joints;
+        for (side, root) in [(Side::Left, L_HAND), (Side::Right, R_HAND)] {
+            if clip.generated_joints.contains(&(root + 9)) {
+                continue;
+            }
+            let point = |t: usize, j: usize| std::array::from_fn(|k| f64::from(joints[[t, root + j, k]]));
+            let frames = (0..joints.shape()[0]).map(|t| std::array::from_fn(|j| Some(point(t, j)))).collect();
+            takes.push(FingerTake::all_counted(&stem(&truth), side, frames, Size::Phalanx));
+        }
+    }
+    ensure!(!takes.is_empty(), "no clip of the part `middle` with fingers in {}", path.display());
+    Ok(takes)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::evaluate::people::clips::tests::exact;
 
     /// A left hand with a thumb and a middle finger.
     const HAND: &str = "HIERARCHY ROOT Hips { OFFSET 0 0 0 CHANNELS 3 Zrotation Xrotation Yrotation
@@ -162,6 +189,26 @@ mod tests {
     }
 
     #[test]
+    fn hands_of_rendered_persons_are_those_of_the_middle_part_with_captured_fingers() {
+        let dir = tempfile::tempdir().unwrap();
+        let truth = exact().truth;
+        truth.write(&dir.path().join("a.npz")).unwrap();
+        let path = dir.path().join("people.json");
+        let clip = |part: &str, truth: &str, generated: &[usize]| {
+            serde_json::json!({
+                "video": "a.mp4", "truth": truth, "condition": "front", "part": part, "generated_joints": generated,
+            })
+        };
+        let generated: Vec<usize> = (1..N_HAND).map(|j| L_HAND + j).collect();
+        let clips = [clip("last", "none.npz", &[]), clip("middle", "a.npz", &[]), clip("middle", "a.npz", &generated)];
+        std::fs::write(&path, serde_json::json!(clips).to_string()).unwrap();
+        let takes = read(&path).unwrap();
+        assert_eq!(takes.iter().map(|take| take.side).collect::<Vec<_>>(), [Side::Left, Side::Right, Side::Right]);
+        let knuckle = [0, 1, 2].map(|k| f64::from(truth.joints[[3, R_HAND + 9, k]]));
+        assert_eq!((takes[1].frames.len(), takes[1].frames[3][9]), (truth.n_frames(), Some(knuckle)));
+    }
+
+    #[test]
     fn the_error_of_a_folder_without_fingers_has_a_reason() {
         let dir = tempfile::tempdir().unwrap();
         let error = |paths: &[PathBuf]| format!("{:#}", read_all(paths).err().unwrap());
@@ -169,6 +216,8 @@ mod tests {
         std::fs::write(dir.path().join("a.txt"), "1 2 3").unwrap();
         assert!(error(&[dir.path().to_owned()]).contains("3 numbers per line"));
         assert!(error(&[dir.path().join("a.fbx")]).contains("a.fbx"));
+        std::fs::write(dir.path().join("people.json"), "[]").unwrap();
+        assert!(error(&[dir.path().join("people.json")]).contains("no clip of the part"));
         assert!(error(&[dir.path().join("none.txt")]).contains("none.txt"));
     }
 }
