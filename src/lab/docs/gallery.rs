@@ -36,7 +36,8 @@ pub static ITEMS: [GalleryItem; 3] = [
         anchor: "film",
         title: "Lifted motion",
         text: "The avatar, with the motion lifted from the video beside it.",
-        command: "orator animate work/lift/host/clip-1-???????? --compare videos/host/clip-1.mp4 --out \"$GALLERY/film.mp4\"\n\
+        command: "orator animate work/lift/host/clip-1-???????? --compare videos/host/clip-1.mp4 \\\n    \
+                  --out \"$GALLERY/film.mp4\"\n\
                   ffmpeg -v error -y -ss 2 -i \"$GALLERY/film.mp4\" -frames:v 1 \"$GALLERY/film.jpg\"",
         picture: "film.jpg",
         link: "film.mp4",
