@@ -1,6 +1,7 @@
 # make demo    the complete pipeline on a synthetic speaker, from a bare machine to a trained model and its motion
 # make demo-quick   the steps of the demo in two minutes, with too little video to learn from
 # make demo-study   a user study of that speaker: films, server, scripted participants in a browser, analysis
+# make docs    the guide as HTML pages in target/docs, with pictures of the demo after `make demo`
 # make check   format, clippy and the quick tests: needs neither root nor other programs, takes a few minutes
 # make test    everything CI runs
 # make test-data   the tests that the last `make test` skipped, with the real data and models in ORATOR_DATA
@@ -12,7 +13,7 @@
 SHELL := /bin/bash
 .SHELLFLAGS := -euo pipefail -c
 .DEFAULT_GOAL := build
-.PHONY: spelling test-data setup runtime models readers aligner browser blender validator vrm driver loader build dist check test prove prove-dist prove-rule prove-people prove-cluster prove-study demo demo-quick demo-study clean-demo
+.PHONY: spelling test-data setup runtime models readers aligner browser blender validator vrm driver loader build dist check test prove prove-dist prove-rule prove-people prove-cluster prove-study demo demo-quick demo-study clean-demo docs
 
 TARGET := $(or $(CARGO_TARGET_DIR),target)
 ORATOR := $(TARGET)/release/orator
@@ -61,6 +62,7 @@ test: dist models readers aligner browser blender validator vrm driver spelling
 	cargo test --release --locked --workspace
 	.ci/prove-dist
 	$(MAKE) demo DEMO=$(TARGET)/demo-test DRAW='--videos 4 --fps 15' STEPS=30
+	$(LAB) docs $(TARGET)/docs-test --demo $(TARGET)/demo-test
 	@if [ -s $(SKIPPED) ]; then echo 'skipped tests:'; sort -u $(SKIPPED); else echo 'no test was skipped'; fi
 	@echo 'make test: all passed'
 
@@ -121,5 +123,11 @@ STUDY := $(TARGET)/demo-study
 demo-study: build browser driver
 	ORATOR=$(ORATOR) .ci/demo-study $(STUDY) 8
 
+# The guide as pages that open from the folder; the pictures of its gallery need a complete demo.
+DOCS := $(TARGET)/docs
+
+docs: build
+	$(LAB) docs $(DOCS) $(if $(wildcard $(DEMO)/contact_sheet.png),--demo $(DEMO))
+
 clean-demo:
-	rm -rf $(DEMO) $(STUDY) $(TARGET)/demo-test $(TARGET)/demo-quick
+	rm -rf $(DEMO) $(STUDY) $(TARGET)/demo-test $(TARGET)/demo-quick $(TARGET)/docs-test

@@ -1,9 +1,13 @@
-//! The guide, one page per topic: `orator guide TOPIC` prints a page, and `cargo doc` includes the pages.
+//! The guide, one page per topic: `orator guide TOPIC` prints a page, and `make docs` writes all pages as HTML.
 
 mod topics;
 
 pub use topics::{TOPICS, Topic};
 
+#[doc = include_str!("tutorial.md")]
+pub mod tutorial {}
+#[doc = include_str!("questions.md")]
+pub mod questions {}
 #[doc = include_str!("dataset.md")]
 pub mod dataset {}
 #[doc = include_str!("lifting.md")]

@@ -18,7 +18,9 @@ macro_rules! topic {
 }
 
 /// Every page, in reading order.
-pub const TOPICS: [Topic; 15] = [
+pub const TOPICS: [Topic; 17] = [
+    topic!("tutorial", "from videos to generated motion: every command with its output"),
+    topic!("questions", "minutes of video, own rig, own language, phone videos, seated speakers"),
     topic!("dataset", "files of a dataset, rejected seconds, transcripts, splits, import and removal"),
     topic!("lifting", "2D keypoints to 3D joints: input, output, errors, custom lifters"),
     topic!("keypoints", "keypoints of OpenPose, MMPose, AlphaPose, MediaPipe and PATS instead of videos"),
@@ -41,12 +43,14 @@ mod tests {
     use super::TOPICS;
 
     #[test]
-    fn every_page_has_one_title_and_no_line_too_wide_for_a_terminal() {
+    fn every_page_has_one_title_and_no_line_too_wide_for_a_terminal_and_the_guide_is_short() {
         for topic in TOPICS {
             let titles = topic.text.lines().filter(|line| line.starts_with("# ")).count();
             assert!(topic.text.starts_with("# ") && titles >= 1, "{} has no title", topic.name);
             let wide = topic.text.lines().find(|line| line.chars().count() > 120 && !line.starts_with('|'));
             assert_eq!(wide, None, "{}", topic.name);
         }
+        let n_lines: usize = TOPICS.iter().map(|topic| topic.text.lines().count()).sum();
+        assert!(n_lines <= 1800, "{n_lines} lines");
     }
 }

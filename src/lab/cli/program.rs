@@ -1,13 +1,14 @@
 //! `orator-lab`: the verbs, and the entry point.
 
-use super::{demo, evaluate, train};
+use super::{demo, docs, evaluate, train};
 use anyhow::Result;
 use clap::{Parser, Subcommand};
 use orator::cli::ui::Ui;
 use orator::cli::{Outcome, run_program};
 use std::process::ExitCode;
 
-/// Synthetic speakers with known motion, and training and evaluation of the lifters that `orator` ships.
+/// Synthetic speakers with known motion, training and evaluation of the lifters that `orator` ships, and the guide as a
+/// site.
 #[derive(Parser)]
 #[command(
     name = "orator-lab",
@@ -29,6 +30,7 @@ enum Verb {
     Demo(demo::Args),
     Train(train::Args),
     Evaluate(evaluate::Args),
+    Docs(docs::Args),
 }
 
 /// Parses the command line, runs the verb, reports an error, and returns the exit code.
@@ -41,6 +43,7 @@ fn run(cli: Cli, ui: &Ui) -> Result<Outcome> {
         Verb::Demo(args) => demo::run(args, ui),
         Verb::Train(args) => train::run(args, ui),
         Verb::Evaluate(args) => evaluate::run(args, ui),
+        Verb::Docs(args) => docs::run(&args, ui),
     }
 }
 

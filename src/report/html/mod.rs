@@ -5,4 +5,4 @@
 pub mod chart;
 pub mod node;
 
-pub use node::{Node, Page, Section, jpeg, legend, node, table, video};
+pub use node::{Node, Page, Section, html_file, jpeg, legend, node, page_head, table, video};

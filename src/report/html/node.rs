@@ -140,13 +140,6 @@ impl Page {
         });
         // In JSON, `<` occurs only inside strings, where the escape is equivalent; it cannot close the script element.
         let data = self.data.to_string().replace('<', "\\u003c");
-        let head = node("head")
-            .child(node("meta").attr("charset", "utf-8"))
-            .child(node("meta").attr("http-equiv", "Content-Security-Policy").attr("content", POLICY))
-            .child(node("meta").attr("name", "viewport").attr("content", "width=device-width, initial-scale=1"))
-            .child(node("meta").attr("name", "color-scheme").attr("content", "light dark"))
-            .child(node("title").text(&self.title))
-            .child(node("style").verbatim(STYLE).verbatim(self.style));
         let top = node("header")
             .child(node("h1").text(&self.title))
             .child(node("p").class("lead").text(&self.lead))
@@ -158,8 +151,24 @@ impl Page {
             .child(node("div").id("tip").attr("role", "status").flag("hidden"))
             .child(node("script").attr("type", "application/json").id("data").verbatim(&data))
             .child(node("script").verbatim(SCRIPT).verbatim(self.script));
-        format!("<!doctype html>\n{}\n", node("html").attr("lang", "en").child(head).child(body))
+        html_file(page_head(&self.title, self.style), body)
     }
+}
+
+/// Head of a page, with the shared style followed by `style`.
+pub fn page_head(title: &str, style: &'static str) -> Node {
+    node("head")
+        .child(node("meta").attr("charset", "utf-8"))
+        .child(node("meta").attr("http-equiv", "Content-Security-Policy").attr("content", POLICY))
+        .child(node("meta").attr("name", "viewport").attr("content", "width=device-width, initial-scale=1"))
+        .child(node("meta").attr("name", "color-scheme").attr("content", "light dark"))
+        .child(node("title").text(title))
+        .child(node("style").verbatim(STYLE).verbatim(style))
+}
+
+/// Text of a file with this head and body.
+pub fn html_file(head: Node, body: Node) -> String {
+    format!("<!doctype html>\n{}\n", node("html").attr("lang", "en").child(head).child(body))
 }
 
 /// Embedded JPEG image of `width` x `height` px, loaded lazily, with `description` as its alternative text.

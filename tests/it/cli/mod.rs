@@ -1,4 +1,4 @@
-//! Subcommands, examples, library use and error texts of the program.
+//! Subcommands, guide, examples, library use and error texts of the program.
 
 pub(crate) mod bench;
 pub(crate) mod completions;
@@ -8,3 +8,5 @@ pub(crate) mod examples;
 pub(crate) mod guide;
 pub(crate) mod library;
 pub(crate) mod models_verb;
+pub(crate) mod site;
+pub(crate) mod tutorial;
