@@ -34,7 +34,7 @@ use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-/// Animate a video, or convert motion to BVH, FBX, glTF, VRM, video and other formats.
+/// Animate a video, or convert motion to BVH, FBX, glTF, VRM and video.
 ///
 /// Joint positions become rotations of a full body, smoothed and limited to possible joint angles.
 ///
