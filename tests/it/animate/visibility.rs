@@ -84,7 +84,7 @@ fn a_video_is_animated_and_lifted_where_the_speaker_is_visible() {
     let n_frames = answer.json["n_frames"].as_u64().unwrap();
     let detected = &answer.json["report"]["detected"];
     assert!((44..=46).contains(&n_frames) && answer.json["film_has_sound"] == true, "{}", answer.json);
-    assert!(10 * detected["left_arm"].as_u64().unwrap() >= 9 * n_frames, "{detected}");
+    assert!(10 * detected["left_arm"].as_u64().unwrap() >= 8 * n_frames, "{detected}");
     assert_eq!(answer.json["next"], "orator animate videos/host/clip-1.mp4 --out film.bvh");
     assert!(project.dir().join("film.mp4").is_file());
     let lifted = project.answer(&["lift", video, "--out", "joints.npz"]);

@@ -14,7 +14,7 @@ use orator_base::types::skeleton::{L_ELBOW, L_SHOULDER, L_WRIST, NECK};
 const SAME_LENGTH: f64 = 0.03;
 /// Elbow angles, degrees (0 is straight), between which the weight of the wrist's position rises from 0 to 1: in a
 /// straight arm a small change of the distance moves the elbow a lot.
-const STRAIGHT_DEGREES: [f64; 2] = [10.0, 30.0];
+const STRAIGHT_DEGREES: [f64; 2] = [20.0, 45.0];
 
 /// Turns the left upper arm and forearm, given by their directions in the clavicle's axes, so that the wrist is at its
 /// smoothed position relative to the neck. `metres`: clavicle, upper arm, forearm; `chest`, `clavicle`: world rotations.
