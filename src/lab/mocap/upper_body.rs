@@ -373,7 +373,7 @@ mod tests {
         let path = dir.path().join("cut.bvh");
         std::fs::write(&path, cut).unwrap();
         let text = format!("{:#}", read(&path).unwrap_err());
-        assert!(text.contains("cut.bvh") && text.contains("70 frames x 39"), "{text}");
+        assert!(text.contains("cut.bvh") && text.contains("states 70: expected one line of 39 values"), "{text}");
     }
 
     #[test]
