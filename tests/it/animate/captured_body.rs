@@ -217,6 +217,28 @@ fn a_capture_with_z_up_keeps_its_postures() {
 }
 
 #[test]
+fn a_capture_is_unchanged_on_its_own_skeleton() {
+    let folder = tempfile::tempdir().unwrap();
+    let dir = folder.path();
+    // The shoulders are below the neck at rest and the head in front of it; only the limbs move.
+    let mut clip = capture(true);
+    for name in ["Hips", "Spine", "Spine1", "Neck", "Head"] {
+        let joint = clip.skeleton.find(name).unwrap();
+        clip.local.iter_mut().for_each(|frame| frame[joint] = Rotation::IDENTITY);
+    }
+    std::fs::write(dir.join("in.bvh"), clip.to_bvh()).unwrap();
+    done(dir, "in.bvh --retarget in.bvh --out out.bvh --smoothing none --no-constraints");
+    let found = bvh_poses(&dir.join("out.bvh"));
+    assert_eq!(found.len(), N_FRAMES);
+    for (t, (found, expected)) in found.iter().zip(&poses(&clip)).enumerate() {
+        for joint in ["Head", "LeftArm", "LeftForeArm", "LeftHand", "RightArm", "RightHand", "LeftFoot"] {
+            let difference = sub(direction(found, ["Hips", joint]), direction(expected, ["Hips", joint]));
+            assert!(10.0 * norm(difference) < 0.1, "frame {t}, {joint}: {difference:?} cm");
+        }
+    }
+}
+
+#[test]
 fn missing_and_replaced_parts_move_as_without_a_capture() {
     let folder = tempfile::tempdir().unwrap();
     let dir = folder.path();

@@ -27,6 +27,9 @@ const MAX_CM: f64 = 1e6;
 const LEG_RATIOS: Range<f64> = 0.4..2.5;
 const UP: Vec3 = [0.0, 1.0, 0.0];
 const DOWN: Vec3 = [0.0, -1.0, 0.0];
+/// Clavicles of the rig, with the ends of these bones and their directions at rest.
+const CLAVICLES: [(&str, &str, Vec3); 2] =
+    [("LeftShoulder", "LeftArm", [1.0, 0.0, 0.0]), ("RightShoulder", "RightArm", [-1.0, 0.0, 0.0])];
 const LEGS: [[&str; 3]; 2] = [["LeftUpLeg", "LeftLeg", "LeftFoot"], ["RightUpLeg", "RightLeg", "RightFoot"]];
 
 /// Part of the body that a capture may contain in addition to the arms.
@@ -58,6 +61,8 @@ impl CapturedPart {
 #[derive(Clone, Debug)]
 pub struct CapturedBody {
     bones: Vec<(CapturedBone, RotationTrack)>,
+    /// Rotations of bones of the rig in the rest pose of the capture.
+    rest: Vec<(&'static str, Rotation)>,
     /// Position of the hips by frame, cm.
     hips: Vec<Vec3>,
     /// Left, right: rest offsets of upper leg, lower leg, foot and end of the foot from their parents, cm.
@@ -91,6 +96,7 @@ impl CapturedBody {
         let map = BoneMap::detect(&user).ok()?;
         let reference = ReferencePose::of(&user, &map).ok()?;
         let bones = captured_bones(&map)?;
+        let rest = if reference.is_rest_pose { rest_rotations(&reference, &map, &bones) } else { Vec::new() };
         let positions = bvh.positions(Positions::Auto);
         let alignment = mocap::bvh::unrotated_alignment(bvh, &positions, units).ok()?;
         let (axes, cm) = (alignment.rotation(), alignment.metres * CM);
@@ -133,12 +139,13 @@ impl CapturedBody {
             ])
         };
         let [left, right] = LEGS.map(leg);
-        Some(Self { hips, legs: left.zip(right).map(|(left, right)| [left, right]), bones })
+        Some(Self { hips, legs: left.zip(right).map(|(left, right)| [left, right]), bones, rest })
     }
 
     /// The body without a part, which then moves as without a capture.
     pub fn without(mut self, part: CapturedPart) -> Self {
         self.bones.retain(|(bone, _)| bone.part != part);
+        self.rest.retain(|(ours, _)| part != CapturedPart::Head || *ours != "Neck");
         self
     }
 
@@ -148,8 +155,11 @@ impl CapturedBody {
         CapturedPart::ALL.into_iter().filter(has).collect()
     }
 
-    /// Gives the legs of a rig the captured lengths, unless these are implausible for its arms.
+    /// Gives a rig the rest pose of the capture, and its legs the captured lengths unless these are implausible for its
+    /// arms.
     pub fn fit(&self, rig: &mut Rig) {
+        let rest = self.rest.iter().filter_map(|(ours, turn)| Some((rig.skeleton.find(ours)?, *turn))).collect();
+        rig.rest = rest;
         let Some(legs) = self.legs.filter(|_| self.parts().contains(&CapturedPart::Legs)) else { return };
         let joints = rig.legs;
         let is_plausible = |(&joint, offset): (&usize, &Option<Vec3>)| {
@@ -229,6 +239,23 @@ fn captured_bones(map: &BoneMap) -> Option<Vec<CapturedBone>> {
         bones.extend(legs.map(|(ours, joint, to)| bone(CapturedPart::Legs, ours, joint, to.map(|to| (to, DOWN)))));
     }
     Some(bones)
+}
+
+/// Rotations of the rig's trunk, neck and clavicles in the rest pose of a capture. The clavicles of the rig start at
+/// the neck, or at the middle of the shoulders.
+fn rest_rotations(reference: &ReferencePose, map: &BoneMap, bones: &[CapturedBone]) -> Vec<(&'static str, Rotation)> {
+    let position = |joint: usize| reference.joints[joint].position;
+    let turn = |ours: &'static str, rest: Vec3, from: usize, to: usize| {
+        let direction = unit(reference.axes.inverse().turn(sub(position(to), position(from))), 1e-9)?;
+        Some((ours, Rotation::between(rest, direction)))
+    };
+    let trunk = bones.iter().filter(|bone| bone.part != CapturedPart::Legs);
+    let trunk = trunk.filter_map(|bone| turn(bone.ours, UP, bone.joint, bone.to?.0));
+    let clavicles = CLAVICLES.into_iter().filter_map(|(ours, arm, rest)| match map.joint("Neck") {
+        Some(neck) => turn(ours, rest, neck, map.joint(arm)?),
+        None => Some((ours, Rotation::IDENTITY)),
+    });
+    trunk.chain(clavicles).collect()
 }
 
 /// The first child of a joint that does not coincide with it.

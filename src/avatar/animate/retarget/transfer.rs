@@ -225,6 +225,10 @@ fn rest_turn(rig: &Rig, joint: usize, map: &BoneMap, reference: ComparedPoses) -
             },
         };
     }
+    // A user's skeleton is at rest when the captured one is.
+    if let Some(turn) = rig.rest.get(&joint).filter(|_| is_rest_pose) {
+        return Some(turn.inverse());
+    }
     // The trunk of a rest pose is upright even if its joints lie on a curve.
     if is_rest_pose && ["Hips", "Spine", "Chest", "Neck", "Head"].contains(&name) {
         return None;

@@ -5,10 +5,12 @@
 use super::hinge::Hinge;
 use crate::animate::solve::positions::{JointPositions, palm_frame};
 use orator_base::math::order::upper_median;
+use orator_base::math::rotation::Rotation;
 use orator_base::math::vec3::{Vec3, across, cross, dot, norm, scale};
 use orator_base::motion::fk::Skeleton;
 use orator_base::types::pose3d::Motion;
 use orator_base::types::skeleton::{self, L_ELBOW, L_HAND, L_SHOULDER, L_WRIST, N_JOINTS, NECK, R_HAND};
+use std::collections::BTreeMap;
 
 /// Centimetres per metre.
 pub const CM: f64 = 100.0;
@@ -67,6 +69,8 @@ pub struct Rig {
     pub legs: [[usize; 4]; 2],
     /// Joint of the skeleton at the position of each of a motion's 49 joints (bone ends included).
     pub positions: [usize; N_JOINTS],
+    /// World rotations of joints whose rest pose in a capture differs from that of the rig.
+    pub rest: BTreeMap<usize, Rotation>,
 }
 
 impl Rig {
@@ -104,7 +108,8 @@ impl Rig {
             let foot = bones.push(&format!("{side}Foot"), Some(lower), up(-0.42), false);
             [upper, lower, foot, bones.push("", Some(foot), [0.0, -0.08 * body, 0.16 * body], true)]
         });
-        Self { skeleton: bones, root: up(0.04 + 0.42 + 0.42 + 0.08), spine, chest, neck, head, arms, legs, positions }
+        let (root, rest) = (up(0.04 + 0.42 + 0.42 + 0.08), BTreeMap::new());
+        Self { skeleton: bones, root, spine, chest, neck, head, arms, legs, positions, rest }
     }
 }
 
