@@ -167,7 +167,10 @@ fn joint_map(
     for (side, wrist, root) in [(Side::Left, L_WRIST, L_HAND), (Side::Right, R_WRIST, R_HAND)] {
         let hand = fingers::hand(bvh, side).or_else(|| fingers::matched_hand(bvh, &matched.joints, side));
         let hand = hand.unwrap_or_default();
-        map[wrist] = map[wrist].or(hand[0]);
+        // The forearm of a skeleton without hands ends at the wrist.
+        let is_end = |joint: &JointChannels, elbow| joint.channels.is_empty() && joint.parent == Some(elbow);
+        let end = |elbow: usize| bvh.joints.iter().position(|joint| is_end(joint, elbow));
+        map[wrist] = map[wrist].or(hand[0]).or_else(|| map[wrist - 1].and_then(end));
         map[root + 1..root + hand.len()].copy_from_slice(&hand[1..]);
         map[root] = map[wrist];
     }

@@ -1,5 +1,7 @@
-//! BVH files as other programs write them: frame counts, frame times, encodings and units of length.
+//! BVH files as other programs write them: frame counts, frame times, encodings, units of length and forearms without
+//! hands.
 
+use orator_base::types::skeleton::{L_ELBOW, L_HAND, L_WRIST, R_ELBOW, R_WRIST};
 use orator_base::types::time::FrameRate;
 use orator_dataset::import::find::TakeFiles;
 use orator_dataset::import::take::{ImportedTake, TakeLimits, TakeOutcome};
@@ -105,4 +107,34 @@ fn a_given_unit_replaces_the_detected_one() {
         let (code, _, printed) = animate(dir.path(), args);
         assert!(code != 0 && printed.contains(expected), "{args}: {printed}");
     }
+}
+
+#[test]
+fn a_forearm_without_a_hand_ends_at_the_wrist() {
+    let arm = |side: &str, sign: f64| {
+        format!(
+            "JOINT {side}Arm\n{{\nOFFSET {} 45 0\nCHANNELS 3 Zrotation Xrotation Yrotation\nJOINT {side}ForeArm\n{{\n\
+             OFFSET {} 0 0\nCHANNELS 3 Zrotation Xrotation Yrotation\nEnd Site\n{{\nOFFSET {} 0 0\n}}\n}}\n}}\n",
+            18.0 * sign,
+            29.0 * sign,
+            24.0 * sign
+        )
+    };
+    let text = format!(
+        "HIERARCHY\nROOT Hips\n{{\nOFFSET 0 0 0\nCHANNELS 3 Zrotation Xrotation Yrotation\nJOINT Neck\n{{\n\
+         OFFSET 0 50 0\nCHANNELS 3 Zrotation Xrotation Yrotation\nEnd Site\n{{\nOFFSET 0 20 0\n}}\n}}\n{}{}}}\n\
+         MOTION\nFrames: 2\nFrame Time: 0.0333333\n{}\n{}\n",
+        arm("Left", 1.0),
+        arm("Right", -1.0),
+        ["0"; 18].join(" "),
+        ["0"; 18].join(" ")
+    );
+    let take = bvh::from_text(&text).unwrap();
+    let joints = &take.motion.joints;
+    for (elbow, wrist) in [(L_ELBOW, L_WRIST), (R_ELBOW, R_WRIST), (L_ELBOW, L_HAND)] {
+        let square = |k: usize| f64::from(joints[[1, wrist, k]] - joints[[1, elbow, k]]).powi(2);
+        let metres = (0..3).map(square).sum::<f64>().sqrt();
+        assert!((metres - 0.24).abs() < 1e-6 && take.motion.mask[[1, wrist]], "{metres} m");
+    }
+    assert!(take.motion.mask[[0, L_WRIST]] && !take.motion.mask[[0, L_HAND + 1]]);
 }
