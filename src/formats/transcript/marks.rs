@@ -1,5 +1,5 @@
-//! Marks in transcripts that are not spoken words: sounds (`[Music]`, `(applause)`, musical notes), pauses (`sp`, `sil`)
-//! and the noise and unknown words of aligners (`{LG}`, `<unk>`).
+//! Marks in transcripts that are not spoken words: sounds (`[Music]`, `(applause)`, musical notes), dashes, pauses (`sp`,
+//! `sil`) and the noise and unknown words of aligners (`{LG}`, `<unk>`).
 
 /// Labels of pauses and noise: Penn aligner, Montreal aligner, Kaldi.
 const PAUSES: [&str; 4] = ["sp", "sil", "spn", "nsn"];
@@ -39,7 +39,7 @@ fn bare(token: &str) -> &str {
 }
 
 fn is_mark(token: &str) -> bool {
-    let is_sign = !token.is_empty() && token.chars().all(|c| "♪♫♬>".contains(c));
+    let is_sign = !token.is_empty() && token.chars().all(|c| "♪♫♬>-–—…".contains(c));
     is_sign || BRACKETS.iter().any(|brackets| is_enclosed(bare(token), *brackets))
 }
 
@@ -71,11 +71,15 @@ mod tests {
             "{SL}",
             "♪ ♪",
             ">>",
+            "-",
+            "---",
+            "– —",
             " ",
         ] {
             assert_eq!(of(mark), "", "{mark}");
         }
         assert_eq!(of("[Music]  so (coughs) well, [loud noise] {NS} now"), "so well, now");
+        assert_eq!(of("- Are you? - Well-known, -5 …"), "Are you? Well-known, -5");
         // Text that only resembles a mark.
         let long = "[a b c d e f g h i";
         for words in ["word(s) (as he said) ok", "Sil lay", "[", "a ] b", "3 < 4", "& <", "()", long] {
