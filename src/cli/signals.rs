@@ -2,13 +2,16 @@
 //! it can continue and exits at once on the second signal.
 
 use super::ui::note;
-use std::sync::atomic::{AtomicU8, Ordering};
+use std::sync::atomic::{AtomicU8, AtomicUsize, Ordering};
 use std::sync::{Arc, LazyLock};
 use tokio::runtime::{Builder, Runtime};
 use tokio::signal::unix::{SignalKind, signal};
 
 /// Runtime that receives signals. It uses a socket pair, which a restricted process can no longer open.
 static RUNTIME: LazyLock<Option<Runtime>> = LazyLock::new(|| Builder::new_current_thread().enable_all().build().ok());
+
+/// Number of calls of `on_signal`; the handler of the last one is active.
+static N_HANDLERS: AtomicUsize = AtomicUsize::new(0);
 
 /// Opens the resources for signals without starting a thread. Call this before the process is restricted.
 pub fn prepare() {
@@ -59,22 +62,27 @@ fn end(code: u8, saved: &str) {
     std::process::exit(i32::from(code));
 }
 
-/// Calls `handler` with the exit code of each signal, on a separate thread. If signals cannot be received, they exit the
-/// program by default.
+/// Calls `handler`, which replaces that of an earlier call, with the exit code of each signal, on a separate thread. If
+/// signals cannot be received, they exit the program by default.
 fn on_signal(mut handler: impl FnMut(u8) + Send + 'static) {
     let Some(runtime) = &*RUNTIME else { return };
     let guard = runtime.enter();
     let (interrupt, terminate) = (signal(SignalKind::interrupt()), signal(SignalKind::terminate()));
     drop(guard);
     let (Ok(mut interrupt), Ok(mut terminate)) = (interrupt, terminate) else { return };
+    let number = N_HANDLERS.fetch_add(1, Ordering::Relaxed) + 1;
     std::thread::spawn(move || {
         runtime.block_on(async {
             loop {
                 // 128 plus the signal number, as in shells.
-                handler(tokio::select! {
+                let code = tokio::select! {
                     _ = interrupt.recv() => 130,
                     _ = terminate.recv() => 143,
-                });
+                };
+                if number != N_HANDLERS.load(Ordering::Relaxed) {
+                    break;
+                }
+                handler(code);
             }
         });
     });

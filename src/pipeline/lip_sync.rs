@@ -24,7 +24,8 @@ const MIN_KNOWN_SECS: f64 = 3.0;
 const MIN_LIP_DEVIATION: f64 = 0.06;
 /// Correlation of lips and own voice that is tested against 0, the correlation with unrelated voices.
 const OWN_CORRELATION: f64 = 0.25;
-/// Independent samples per second: the correlation of unrelated pairs deviates from 0 by 1 / sqrt(9 * seconds).
+/// Independent samples per second, at most one a frame: the correlation of unrelated pairs deviates from 0 by
+/// 1 / sqrt(9 * seconds).
 const INDEPENDENT_PER_SEC: f64 = 9.0;
 /// Limit of the normalised signals in standard deviations.
 const MAX_DEVIATIONS: f64 = 3.0;
@@ -175,7 +176,7 @@ impl PairSums {
             let limited = |value: f64| value.clamp(-MAX_DEVIATIONS, MAX_DEVIATIONS);
             let product = limited((lips - x / n) / lip_deviation) * limited((voice - y / n) / voice_deviation);
             let per_sample = OWN_CORRELATION * (product - OWN_CORRELATION / 2.0);
-            (is_known * per_sample * INDEPENDENT_PER_SEC / fps).exp()
+            (is_known * per_sample * (INDEPENDENT_PER_SEC / fps).min(1.0)).exp()
         };
         let ratios: Vec<f64> = self.0.windows(2).map(likelihood_ratio).collect();
         let change = (CHANGES_PER_SEC / fps).min(0.5);

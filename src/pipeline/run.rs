@@ -158,8 +158,10 @@ impl Pipeline {
         for name in StageName::ALL.into_iter().filter(|name| selection.has(*name)) {
             stages::build(name, self.config(), self.all_videos(), &[])?;
         }
-        let _lock = workdir::lock(&settings.work.dir)
-            .context("cannot start the run; choose another work folder with --set work.dir=FOLDER")?;
+        let _lock = workdir::lock(&settings.work.dir).context(
+            "cannot start the run; another work folder can be set as `dir` under [work] in pipeline.toml or with \
+                 --set work.dir=FOLDER",
+        )?;
         for videos in &remaining {
             // An interrupted replacement of a dataset is undone now, since its record is read before the dataset stage
             // runs.

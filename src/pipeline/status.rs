@@ -124,14 +124,7 @@ impl Pipeline {
             let ready = stages::ready(self.config(), &videos, &hashes).unwrap_or_default();
             let check = StatusCheck { pipeline: self, hashes: &hashes, videos: &videos, ready: &ready };
             let of_videos = StageName::OF_VIDEOS.map(|name| (name, check.stage(name)));
-            let lift =
-                of_videos.iter().find_map(|(name, stage)| stage.as_ref().ok().filter(|_| *name == StageName::Lift));
-            // Weights that cannot be read are reported as a failure of the stage.
-            let is_stale = lift
-                .and_then(|lift| stale_results::has_other_lifter(&**lift, &videos.units, work, &hashes).ok())
-                .unwrap_or(false);
-            has_other_lifter.insert(videos.speaker.clone(), is_stale);
-            let mut speaker_waits_for = None;
+            let (mut speaker_waits_for, mut usable) = (None, Vec::new());
             let mut total = TimeBudget::of_speaker(&videos.speaker);
             for unit in &videos.units {
                 let mut waits_for = None;
@@ -139,6 +132,7 @@ impl Pipeline {
                     of_videos.iter().map(|(name, stage)| check.at(*name, stage, unit, &mut waits_for)).collect();
                 // A dataset is built without the videos that failed, but waits for those that are still pending.
                 let failed = stage_statuses.iter().find(|status| status.state == UnitState::Failed);
+                usable.extend(failed.is_none().then(|| unit.clone()));
                 speaker_waits_for = speaker_waits_for.or(waits_for.filter(|_| failed.is_none()));
                 let video_progress = match (failed, waits_for) {
                     (Some(UnitStatus { stage, reason, .. }), _) => {
@@ -153,6 +147,13 @@ impl Pipeline {
                 report.time_budget.push(budget);
                 report.units.extend(stage_statuses);
             }
+            let lift =
+                of_videos.iter().find_map(|(name, stage)| stage.as_ref().ok().filter(|_| *name == StageName::Lift));
+            // The dataset does not contain failed videos. Weights that cannot be read are a failure of the stage.
+            let is_stale = lift
+                .and_then(|lift| stale_results::has_other_lifter(&**lift, &usable, work, &hashes).ok())
+                .unwrap_or(false);
+            has_other_lifter.insert(videos.speaker.clone(), is_stale);
             report.total.add(&total);
             report.time_budget.push(total);
             let stage = check.stage(StageName::Dataset);

@@ -2,11 +2,12 @@
 
 use crate::cli::Outcome;
 use crate::cli::ui::Ui;
-use anyhow::{Context, Result, ensure};
+use anyhow::{Context, Result, bail, ensure};
 use orator_base::stage::workdir;
 use orator_dataset::config::DEFAULT_FILE;
 use orator_dataset::config::patterns::{VIDEO_EXTENSIONS, has_extension};
 use serde_json::json;
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 /// Create a project folder with a commented pipeline.toml.
@@ -20,6 +21,7 @@ pub struct Args {
 
 /// Absolute path of a video as text.
 fn video(path: &Path) -> Result<String> {
+    ensure!(path.exists(), "{} does not exist: expected a video", path.display());
     ensure!(
         path.is_file() && has_extension(path, &VIDEO_EXTENSIONS),
         "{} is not a video: expected a file that ends in {}",
@@ -34,6 +36,12 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     let file = args.dir.join("pipeline.toml");
     ensure!(!file.exists(), "{} already exists; nothing was changed", file.display());
     let videos: Vec<String> = args.videos.iter().map(|path| video(path)).collect::<Result<_>>()?;
+    let mut files = BTreeMap::new();
+    for path in &args.videos {
+        if let Some(other) = files.insert(path.canonicalize().unwrap_or_else(|_| path.clone()), path) {
+            bail!("{} and {} are the same file: give each video once", other.display(), path.display());
+        }
+    }
     for folder in ["videos/host", "models"] {
         let folder = args.dir.join(folder);
         std::fs::create_dir_all(&folder).with_context(|| format!("cannot create the folder {}", folder.display()))?;

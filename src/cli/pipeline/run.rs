@@ -6,6 +6,7 @@ use crate::cli::config_args::ConfigArgs;
 use crate::cli::sandbox::this_program;
 use crate::cli::setup::models::with_models;
 use crate::cli::signals;
+use crate::cli::train::stopped::{report_stopped, stop_on_signal};
 use crate::cli::ui::Ui;
 use anyhow::Result;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
@@ -112,7 +113,11 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     let mut facts = json!(report);
     let mut outcome = if n_failed == 0 { Outcome::Done } else { Outcome::SomeFailed };
     if args.train {
-        let trained = train_speakers(&pipeline, &report.datasets, ui)?;
+        stop_on_signal(ui);
+        let trained = match train_speakers(&pipeline, &report.datasets, ui) {
+            Ok(trained) => trained,
+            Err(error) => return report_stopped(error, ui),
+        };
         lines.push(trained.text);
         facts["models"] = json!(trained.facts);
         next = trained.next.unwrap_or(next);

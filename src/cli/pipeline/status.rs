@@ -54,6 +54,10 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     }
     let is_new = |unit: &UnitStatus| matches!(unit.state, UnitState::Stale | UnitState::NeverDone);
     let is_trained = |model: &ModelStatus| model.state == UnitState::UpToDate;
+    let speakers = &pipeline.config().settings.speaker;
+    let trains_again = |model: &ModelStatus| {
+        model.state == UnitState::Stale && speakers.iter().any(|of| model.name == format!("gan/{}", of.name))
+    };
     let next = match report.models.first() {
         _ if !report.datasets_are_up_to_date() => {
             if report.units.iter().any(is_new) {
@@ -69,8 +73,9 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
             let model = work.join(&first.name);
             format!("orator generate --checkpoint {} --audio speech.wav --out motion.bvh", model.display())
         }
-        _ if report.models.iter().any(|model| model.state == UnitState::Stale) => format!("orator run --train{flags}"),
-        _ => format!("orator train gan{flags}"),
+        _ if report.models.iter().any(trains_again) => format!("orator run --train{flags}"),
+        // Models of other networks or of several speakers.
+        _ => report.stale.first().map_or_else(|| format!("orator train gan{flags}"), |stale| stale.command.clone()),
     };
     let mut facts = json!(report);
     facts["next"] = json!(next);

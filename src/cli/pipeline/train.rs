@@ -32,34 +32,34 @@ const MAX_FILM_SECS: f64 = 20.0;
 /// Trains, evaluates and shows the models of the speakers with these dataset folders.
 ///
 /// # Errors
-/// The status of the models cannot be determined; failures of a speaker are part of the results.
+/// A training that was stopped on request; failures of a speaker are part of the results.
 pub(super) fn train_speakers(pipeline: &Pipeline, datasets: &[PathBuf], ui: &Ui) -> Result<TrainedModels> {
     let mut config = pipeline.config().clone();
     let has_dataset = |name: &str| datasets.iter().any(|dir| dir.file_name().is_some_and(|of| of == name));
     config.settings.speaker.retain(|speaker| has_dataset(&speaker.name));
-    let stale: Vec<String> = pipeline
-        .status(&[])?
-        .models
-        .into_iter()
-        .filter_map(|model| (model.state == UnitState::Stale).then_some(model.name))
-        .collect();
     train_all(&config, ui, |speaker| {
         let folders = SpeakerFolders::new(&config.settings.work.dir, speaker);
-        if stale.contains(&format!("gan/{speaker}")) {
+        // Determined here, since another process may have trained the model during the training of other speakers.
+        let models = pipeline.status(std::slice::from_ref(speaker))?.models;
+        if models.iter().any(|model| model.name == format!("gan/{speaker}") && model.state == UnitState::Stale) {
             move_aside(&folders.model)?;
         }
         with_results(train_speaker(&config, speaker, ui)?, &folders, ui)
     })
 }
 
-/// Moves a stale model beside itself, where it replaces an earlier one.
+/// Moves a stale model beside itself, where it replaces an earlier one. The earlier one is removed first: an exchange
+/// that is killed would leave it in the place of the model.
 fn move_aside(model: &Path) -> Result<()> {
-    let _model = FolderLock::exclusive(model)?;
-    // Fails while another process trains the model.
-    drop(workdir::lock(model)?);
     let mut name = model.file_name().unwrap_or_default().to_os_string();
     name.push(OLD_MODEL);
-    workdir::replace_folder(model, &model.with_file_name(name))
+    let old = model.with_file_name(name);
+    // Fails while another process trains or reads one of the models.
+    let _locks = [FolderLock::exclusive(model)?, FolderLock::exclusive(&old)?];
+    drop(workdir::lock(model)?);
+    workdir::remove(&old)
+        .and_then(|()| std::fs::rename(model, &old))
+        .with_context(|| format!("cannot move {} to {}", model.display(), old.display()))
 }
 
 /// Adds the evaluation to the result of a training. If the model cannot be evaluated, it remains and the reason is
@@ -137,4 +137,25 @@ fn write_film(path: &Path, clips: &EvalClips, ui: &Ui) -> Result<()> {
         second_panel: SecondPanel::Motion { performance: &truth, labels: ["generated", "truth"] },
     };
     workdir::replace(path, |attempt| film::write(attempt, content, ui))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_stale_model_replaces_the_one_that_was_moved_before() {
+        let dir = tempfile::tempdir().unwrap();
+        let [model, old] = ["host", "host-old"].map(|name| dir.path().join(name));
+        for text in ["first", "second"] {
+            std::fs::create_dir(&model).unwrap();
+            std::fs::write(model.join("best.safetensors"), text).unwrap();
+            move_aside(&model).unwrap();
+            assert!(!model.exists());
+            assert_eq!(std::fs::read_to_string(old.join("best.safetensors")).unwrap(), text);
+        }
+        std::fs::create_dir(&model).unwrap();
+        let _training = FolderLock::shared(&model).unwrap();
+        assert!(move_aside(&model).is_err() && model.exists() && old.exists());
+    }
 }

@@ -8,6 +8,12 @@ use orator_cluster::job::shell;
 use serde_json::json;
 use std::path::Path;
 
+/// From now on, the first Ctrl-C or SIGTERM stops a training after the current step, with a checkpoint.
+pub fn stop_on_signal(ui: &Ui) {
+    const STOPPING: &str = "stopping after the current step and saving a checkpoint; a second signal exits at once";
+    ui.enable_stop_requests(STOPPING, "the newest checkpoint is saved; run the same command again to resume");
+}
+
 /// Prints the report of a training that stopped on request; returns any other error.
 pub fn report_stopped(error: anyhow::Error, ui: &Ui) -> Result<Outcome> {
     let stopped: StoppedTraining = error.downcast()?;

@@ -27,9 +27,7 @@ enum Network {
 }
 
 pub fn run(args: Args, ui: &Ui) -> anyhow::Result<Outcome> {
-    const STOPPING: &str = "stopping after the current step and saving a checkpoint; a second signal exits at once";
-    const SAVED: &str = "the newest checkpoint is saved; run the same command again to resume";
-    ui.enable_stop_requests(STOPPING, SAVED);
+    stopped::stop_on_signal(ui);
     let ended = match args.network {
         Network::Gan(args) => gan::run(args, ui),
         Network::Seq2seq(args) => seq2seq::run(args, ui),

@@ -153,13 +153,16 @@ impl Reader {
                 }
                 continue;
             }
+            let plain = key.replacen(&format!(".{ADVANCED}."), ".", 1);
             let Some(default) = table.get_mut(name.get_ref().as_ref()) else {
                 let advanced = is_section.then(|| ADVANCED.to_owned());
-                let near = did_you_mean(name.get_ref(), table.keys().chain(&advanced));
+                let near = match former::REPLACED.iter().find(|(replaced, _)| plain == *replaced) {
+                    Some((_, by)) => format!(": {by}"),
+                    None => did_you_mean(name.get_ref(), table.keys().chain(&advanced)),
+                };
                 self.problem(&key, location, format!("unknown key{near}"));
                 continue;
             };
-            let plain = key.replacen(&format!(".{ADVANCED}."), ".", 1);
             if let (Value::Table(inner), DeValue::Table(written)) = (&mut *default, value.get_ref()) {
                 self.merge(written, inner, &format!("{key}."), location_at);
                 continue;

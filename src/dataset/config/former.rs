@@ -23,6 +23,10 @@ pub(super) const RENAMED: [(&str, &str); 11] = [
     ("seq2seq.hears_context", "seq2seq.audio_context"),
 ];
 
+/// Former keys whose values have no equivalent, with what replaced them.
+pub(super) const REPLACED: [(&str, &str); 1] =
+    [("segment.min_lip_sync", "replaced by min_own_voice, a probability instead of a correlation")];
+
 /// Former value of `gan.recipe`, with its current name.
 const RENAMED_RECIPE: (&str, &str) = ("paper", "rebol2021");
 

@@ -183,6 +183,13 @@ mod tests {
     }
 
     #[test]
+    fn a_replaced_key_is_named_with_its_replacement() {
+        let message = "unknown key: replaced by min_own_voice, a probability instead of a correlation";
+        let expected = ["line 2: segment", "--set: segment.advanced"].map(|at| format!("{at}.min_lip_sync: {message}"));
+        assert_eq!(problems("[segment]\nmin_lip_sync = 0.1\n", &["segment.advanced.min_lip_sync=0.1"]), expected);
+    }
+
+    #[test]
     fn a_number_too_large_for_its_type_is_named() {
         let text = "[extract]\nfps = 5000000000\n[dataset]\ntest = 7.0\n";
         assert_eq!(

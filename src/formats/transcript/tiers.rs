@@ -6,6 +6,9 @@ use anyhow::{Result, ensure};
 /// Vowels of ARPAbet, which aligners write with a digit for the stress.
 const VOWELS: [&str; 15] = ["AA", "AE", "AH", "AO", "AW", "AY", "EH", "ER", "EY", "IH", "IY", "OW", "OY", "UH", "UW"];
 
+/// Maximum number of tiers that a message names.
+const MAX_NAMED: usize = 40;
+
 /// Words of the tier of `speaker`, given all interval tiers with their names. Tiers with `word` in their name (`ORT` of
 /// WebMAUS) take precedence; if there are none, tiers of phones are excluded.
 pub(super) fn words_of(mut tiers: Vec<(String, Vec<Word>)>, speaker: &str) -> Result<Vec<Word>> {
@@ -24,14 +27,14 @@ pub(super) fn words_of(mut tiers: Vec<(String, Vec<Word>)>, speaker: &str) -> Re
             "the words of the speaker may be in any of the tiers {}: give the speaker the name of one ({}) with \
              --speaker or `name` under [[speaker]], rename one to `words`, or delete the others",
             names(&tiers),
-            tiers.iter().map(|(name, _)| owner(name)).collect::<Vec<_>>().join(", ")
+            tiers.iter().take(MAX_NAMED).map(|(name, _)| owner(name)).collect::<Vec<_>>().join(", ")
         )
     };
     Ok(tiers.swap_remove(chosen).1)
 }
 
 fn names(tiers: &[(String, Vec<Word>)]) -> String {
-    tiers.iter().map(|(name, _)| format!("`{name}`")).collect::<Vec<_>>().join(", ")
+    tiers.iter().take(MAX_NAMED).map(|(name, _)| format!("`{name}`")).collect::<Vec<_>>().join(", ")
 }
 
 /// Letters and digits in lower case.
@@ -92,7 +95,7 @@ mod tests {
         let error = |names: &[&str]| chosen(names, "carl").unwrap_err().to_string();
         let several = error(&["Ben - words", "Anna - words"]);
         assert!(several.contains("`Ben - words`, `Anna - words`") && several.contains("(Ben, Anna)"), "{several}");
-        assert!(error(&["Ben", "Anna"]).contains("--speaker"));
+        assert!(error(&["Ben", "Anna"]).contains("--speaker") && error(&["Ben"; 1_000]).len() < 2_000);
         assert!(error(&["phones", "Syllables", "MAU"]).contains("`phones`, `Syllables`, `MAU`"));
         assert!(error(&["AH0"]).contains("contain phones") && error(&[]).contains("no interval tier"));
     }

@@ -127,6 +127,10 @@ fn status_names_results_of_an_older_lifter_and_the_commands_that_rebuild_them() 
     record["fingerprint"]["settings"]["lift"]["hand_weights"] = json!("file");
     fs::write(&path, record.to_string()).unwrap();
     assert_eq!(stale().len(), 2);
+    // A video that fails is not in the dataset.
+    fs::write(project.video("clip-1.mp4"), "no video").unwrap();
+    assert_eq!(project.run(&["--only", "extract"]).code, 2);
+    assert_eq!(stale(), Vec::<[String; 3]>::new());
 }
 
 #[test]

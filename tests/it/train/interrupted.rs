@@ -42,7 +42,7 @@ fn train(dir: &Path, network: &str, out: &str) -> Command {
 }
 
 /// Starts a training, signals it at the first line with `prefix`, and returns exit code, answer and progress lines.
-fn signalled(mut training: Command, prefix: &str, signal: Signal) -> (Option<i32>, Value, String) {
+pub(crate) fn signalled(mut training: Command, prefix: &str, signal: Signal) -> (Option<i32>, Value, String) {
     let mut child = training.spawn().unwrap();
     let mut text = String::new();
     let mut lines = BufReader::new(child.stderr.take().unwrap());

@@ -1,9 +1,12 @@
 //! One command from videos to a model: `orator init DIR VIDEO...`, `orator run --train`, and the models in
 //! `orator status`.
 
+use super::interrupted::signalled;
 use orator_test_support::drawn::folder::DemoPlan;
 use orator_test_support::project::Project;
+use rustix::process::Signal;
 use std::fs;
+use std::process::Stdio;
 
 #[test]
 fn init_lists_the_videos() {
@@ -19,6 +22,10 @@ fn init_lists_the_videos() {
     assert!(text.contains(&format!("videos = [\"{}\"]", clip.display())), "{text:.1000}");
     let wrong = project.answer(&["init", "other", "pipeline.toml"]);
     assert!(wrong.code == 1 && wrong.errors.contains("pipeline.toml is not a video"), "{}", wrong.errors);
+    let missing = project.answer(&["init", "other", "gone.mp4"]);
+    assert!(missing.code == 1 && missing.errors.contains("gone.mp4 does not exist"), "{}", missing.errors);
+    let twice = project.answer(&["init", "other", "videos/host/clip-1.mp4", "videos/../videos/host/clip-1.mp4"]);
+    assert!(twice.code == 1 && twice.errors.contains("are the same file"), "{}", twice.errors);
     assert!(!project.dir().join("other").exists());
 }
 
@@ -62,6 +69,28 @@ fn a_run_trains_evaluates_and_trains_anew_when_the_dataset_changes() {
     assert_eq!(fs::read(project.work().join("gan/host-old/best.safetensors")).unwrap(), before);
     let (fresh, _) = models(&changed);
     assert_eq!((fresh.as_array().unwrap().len(), &fresh[0]["state"]), (1, &"fresh".into()));
+    // A stale model of another network, which `run --train` does not train.
+    let other = project.work().join("seq2seq/host");
+    fs::create_dir_all(&other).unwrap();
+    fs::copy(project.work().join("gan/host-old/best.safetensors"), other.join("best.safetensors")).unwrap();
+    let (_, next) = models(&changed);
+    assert!(next.starts_with("orator train seq2seq --speaker host --out "), "{next}");
+}
+
+#[test]
+fn a_signal_during_the_training_saves_a_checkpoint_from_which_it_resumes() {
+    let plan = DemoPlan { n_videos: 3, secs: 6.0, size: [640, 480], ..DemoPlan::default() };
+    let project = Project::drawn("run-train-stopped", &plan);
+    let short = ["--set", "gan.steps=20", "--set", "gan.epoch_steps=20", "--set", "gan.batch=2"];
+    let mut command = project.command(&[&["run", "--train"], &short[..]].concat());
+    command.stdout(Stdio::piped()).stderr(Stdio::piped());
+    let (code, answer, errors) = signalled(command, "step 1 of 20: ", Signal::INT);
+    assert_eq!((code, &answer["stopped"]), (Some(130), &true.into()), "{answer} {errors}");
+    let step = answer["step"].as_u64().unwrap();
+    assert!((1..20).contains(&step), "{answer}");
+    let resumed = project.run(&[&["--train"], &short[..]].concat());
+    assert!(resumed.code == 0 && resumed.errors.contains("resuming from"), "{}", resumed.errors);
+    assert!(!project.work().join("gan/host-old").exists());
 }
 
 #[test]

@@ -138,14 +138,15 @@ impl GlbRig {
     }
 }
 
-/// Nodes that a VRM file (1.0 or 0.x) assigns to humanoid bones, with the names of these bones.
+/// Nodes that a VRM file (1.0 or 0.x) assigns to humanoid bones, with the names of these bones; at most `MAX_JOINTS`.
 fn humanoid_nodes(scene: &Value) -> Vec<(&str, usize)> {
     let node = |bone: &Value| bone["node"].as_u64().map(|node| node as usize);
     let bones = |extension: &str| &scene["extensions"][extension]["humanoid"]["humanBones"];
     let current = bones("VRMC_vrm").as_object().into_iter().flatten();
     let former = bones("VRM").as_array().into_iter().flatten();
     let current = current.filter_map(|(name, bone)| Some((name.as_str(), node(bone)?)));
-    current.chain(former.filter_map(|bone| Some((bone["bone"].as_str()?, node(bone)?)))).collect()
+    let former = former.filter_map(|bone| Some((bone["bone"].as_str()?, node(bone)?)));
+    current.chain(former).take(MAX_JOINTS).collect()
 }
 
 /// Splits a GLB file into its scene and its binary data.
