@@ -66,12 +66,14 @@ pub struct Args {
     /// Weights written by `orator-lab train lifter --part hands`, of either network; defaults to the built-in ones.
     #[arg(long, value_name = "FILE")]
     hand_weights: Option<PathBuf>,
-    /// Standard deviation of the Gaussian that smooths the arms, in frames at 15 fps; 0 disables it.
-    #[arg(long, value_name = "FRAMES", default_value_t = config::LiftConfig::default().smooth_arms)]
-    smooth_arms: f64,
-    /// Standard deviation of the Gaussian that smooths the hands, in frames at 15 fps; 0 disables it.
-    #[arg(long, value_name = "FRAMES", default_value_t = config::LiftConfig::default().smooth_hands)]
-    smooth_hands: f64,
+    /// Standard deviation of the Gaussian that smooths the arms, in frames at 15 fps; 0 disables it. Defaults to 0.8, for a
+    /// video to that of pipeline.toml.
+    #[arg(long, value_name = "FRAMES")]
+    smooth_arms: Option<f64>,
+    /// Standard deviation of the Gaussian that smooths the hands, in frames at 15 fps; 0 disables it. Defaults to 1.5, for a
+    /// video to that of pipeline.toml.
+    #[arg(long, value_name = "FRAMES")]
+    smooth_hands: Option<f64>,
 }
 
 fn size(text: &str) -> Result<[u32; 2], String> {
@@ -128,7 +130,7 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
         bail!("--extra {}: expected a file that ends in .npy", path.display());
     }
     ensure!(args.extra.as_ref() != Some(&args.out), "--out and --extra name the same file {}", args.out.display());
-    for sigma in [args.smooth_arms, args.smooth_hands] {
+    for sigma in [args.smooth_arms, args.smooth_hands].into_iter().flatten() {
         ensure!(
             (0.0..=100.0).contains(&sigma),
             "--smooth-arms and --smooth-hands: expected 0 to 100 frames, found {sigma}"
@@ -139,13 +141,14 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
         "{} is a video: --input-fps and --size apply to keypoints only",
         args.keypoints.display()
     );
+    let base = video.as_ref().map(|video| video.settings.lift.clone()).unwrap_or_default();
     let settings = config::LiftConfig {
-        body_weights: args.body_weights.clone().unwrap_or_default(),
-        hand_weights: args.hand_weights.clone().unwrap_or_default(),
-        smooth_arms: args.smooth_arms,
-        smooth_hands: args.smooth_hands,
-        level: args.level,
-        ..config::LiftConfig::default()
+        body_weights: args.body_weights.clone().unwrap_or(base.body_weights),
+        hand_weights: args.hand_weights.clone().unwrap_or(base.hand_weights),
+        smooth_arms: args.smooth_arms.unwrap_or(base.smooth_arms),
+        smooth_hands: args.smooth_hands.unwrap_or(base.smooth_hands),
+        level: args.level || base.level,
+        ..base
     };
     let (keypoints, lifted, mut notes, secs) = if let Some(video) = &video {
         let started = Instant::now();
