@@ -42,9 +42,10 @@ pub fn reach(
         let (Some(wrist), Some(along), Some(fore)) = (wrist, along[t].as_mut(), fore[t].as_mut()) else { continue };
         let to = sub(clavicle[t].inverse().turn(chest[t].turn(scale(wrist, forearm))), [shoulder, 0.0, 0.0]);
         let weight = smoothstep(STRAIGHT_DEGREES, dot(*along, *fore).clamp(-1.0, 1.0).acos().to_degrees());
-        let [elbow, _] = solve_two_bone([0.0; 3], scale(*along, upper), to, [upper, forearm]);
-        let elbow = add(scale(*along, upper * (1.0 - weight)), scale(elbow, weight));
-        *along = unit(elbow, 1e-9).unwrap_or(*along);
-        *fore = unit(sub(to, scale(*along, upper)), 1e-9).unwrap_or(*fore);
+        let before = [scale(*along, upper), add(scale(*along, upper), scale(*fore, forearm))];
+        let [elbow, _] = solve_two_bone([0.0; 3], before[0], to, [upper, forearm]);
+        let weighted = |from: Vec3, to: Vec3| add(scale(from, 1.0 - weight), scale(to, weight));
+        *along = unit(weighted(before[0], elbow), 1e-9).unwrap_or(*along);
+        *fore = unit(sub(weighted(before[1], to), scale(*along, upper)), 1e-9).unwrap_or(*fore);
     }
 }
