@@ -13,7 +13,7 @@ use orator_base::types::pose2d::Keypoints;
 use orator_dataset::config::patterns::{VIDEO_EXTENSIONS, has_extension};
 use orator_dataset::config::{Config, LiftConfig, Settings, SpeakerConfig, videos};
 use orator_pipeline::lift::{LiftStage, Lifted};
-use orator_pipeline::{Pipeline, Selection};
+use orator_pipeline::{Pipeline, Selection, UnitState, UnitStatus};
 use std::os::unix::process::CommandExt as _;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -45,10 +45,16 @@ impl VisibleVideo {
         let pipeline = Pipeline::open(with_only(config, path)?)?.with_processes(this_program());
         let settings = pipeline.config().settings.clone();
         if std::env::var_os(DETECTED).is_none() {
-            let selection = Selection { to: StageName::Pose2d, ..Selection::default() };
-            let report = with_models(&settings, ui, || pipeline.run(&selection, ui))?;
-            if let Some(failure) = report.failures.first() {
-                bail!("{}: {}", path.display(), failure.error);
+            let is_stale = |unit: &UnitStatus| {
+                matches!(unit.stage, StageName::Extract | StageName::Pose2d) && unit.state != UnitState::UpToDate
+            };
+            // Detected keypoints are used even while a run holds the work folder, or where it can only be read.
+            if pipeline.status(&[]).map_or(true, |status| status.units.iter().any(is_stale)) {
+                let selection = Selection { to: StageName::Pose2d, ..Selection::default() };
+                let report = with_models(&settings, ui, || pipeline.run(&selection, ui))?;
+                if let Some(failure) = report.failures.first() {
+                    bail!("{}: {}", path.display(), failure.error);
+                }
             }
             let error = Command::new(this_program()).args(std::env::args_os().skip(1)).env(DETECTED, "1").exec();
             bail!("cannot start the program again: {error}");

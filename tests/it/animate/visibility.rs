@@ -7,6 +7,7 @@ use ndarray::s;
 use orator_avatar::animate::export::film::{Film, FilmSource, SIZE, SecondPanel};
 use orator_avatar::animate::export::film_avatar::FilmCamera;
 use orator_avatar::animate::{AnimationOptions, perform};
+use orator_base::stage::workdir;
 use orator_base::types::image::Image;
 use orator_base::types::skeleton::{L_HAND, L_WRIST, R_ELBOW, R_HAND, R_WRIST};
 use orator_formats::joints_npz;
@@ -91,6 +92,10 @@ fn a_video_is_animated_and_lifted_where_the_speaker_is_visible() {
     assert_eq!(lifted.code, 0, "{}", lifted.errors);
     assert!(lifted.json["arms"].as_f64().unwrap() > 0.9, "{}", lifted.json);
     assert_eq!(joints_npz::read(&project.dir().join("joints.npz")).unwrap().n_frames() as u64, n_frames);
+    // While another process holds the work folder, detected keypoints are used.
+    let held = workdir::lock(&project.work()).unwrap();
+    assert_eq!(project.answer(&["lift", video, "--out", "again.npz"]).code, 0);
+    drop(held);
     // The project's own results are used, and a run accepts nothing of this video.
     let folders = |speaker: &str| std::fs::read_dir(project.work().join("pose2d").join(speaker)).into_iter().flatten();
     assert_eq!((folders("host").count() > 0, folders("video").count()), (true, 0));
