@@ -64,10 +64,11 @@ pub fn regression(landmarks: &[f32], score: f32, n_points: usize) -> Result<Vec<
 }
 
 /// Depths of the points of a regression, in px of the input: the third of three values a row; `None` for rows of other
-/// lengths or values that are not finite.
+/// lengths, values that are not finite, or depths that are all zero.
 pub fn depths(landmarks: &[f32], n_points: usize) -> Option<Vec<f64>> {
     let fits = n_points > 0 && landmarks.len() == 3 * n_points && landmarks.iter().all(|number| number.is_finite());
-    fits.then(|| landmarks.chunks_exact(3).map(|row| f64::from(row[2])).collect())
+    let depths: Vec<f64> = landmarks.chunks_exact(3).map(|row| f64::from(row[2])).collect();
+    (fits && depths.iter().any(|depth| *depth != 0.0)).then_some(depths)
 }
 
 /// Score 0..1 from an output that is a probability or a logit.
@@ -97,6 +98,7 @@ mod tests {
         let rows = [1.0, 2.0, 9.0, 3.0, 4.0, 9.0];
         assert_eq!(regression(&rows, 0.5, 2).unwrap(), [[1.0, 2.0, 0.5], [3.0, 4.0, 0.5]]);
         assert_eq!((depths(&rows, 2), depths(&rows, 3)), (Some(vec![9.0, 9.0]), None));
+        assert_eq!(depths(&[1.0, 2.0, 0.0, 3.0, 4.0, 0.0], 2), None);
         assert_eq!(regression(&rows, f32::NAN, 2).unwrap(), [[0.0; 3]; 2]);
         assert!(
             regression(&rows, 0.5, 4).is_err()
