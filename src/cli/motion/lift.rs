@@ -26,7 +26,7 @@ use std::time::Instant;
 /// Everything in which the speaker is visible is lifted, fit for training or not. The keypoints of a video are detected
 /// in the work folder of pipeline.toml in the current folder, else in `work`; `orator animate VIDEO` shows the motion.
 ///
-/// Other INPUTs are: a folder of OpenPose (one JSON file per frame); JSON of MMPose, AlphaPose or COCO-WholeBody;
+/// Other inputs: a folder of OpenPose (one JSON file per frame); JSON of MMPose, AlphaPose or COCO-WholeBody;
 /// arrays of MediaPipe or PATS (.npy, .npz); or the .npz of this program. The format is detected from the content.
 /// The .npz of this program holds `body` [T,17,3] (COCO-17; x px, y px, score) and optionally `left_hand` and
 /// `right_hand` [T,21,3] (wrist, then thumb to little finger, each from base to tip), `fps` and `image_size`.
