@@ -57,13 +57,16 @@ impl JointPositions {
         std::array::from_fn(|point| self.position(t, L_HAND + point))
     }
 
-    /// Replaces the given points of the left hand by frame, and with its first point the wrist.
+    /// Replaces the given points of the left hand by frame.
     pub fn with_left_hand(&self, hands: &[Option<HandPositions>]) -> Self {
         let mut positions = self.positions.clone();
         for (frame, hand) in positions.iter_mut().zip(hands) {
             let Some(hand) = hand else { continue };
+            // The wrist moves with the hand, also where the two do not coincide.
+            if let (Some(root), Some(moved), Some(wrist)) = (frame[L_HAND], hand[0], &mut frame[L_WRIST]) {
+                *wrist = add(*wrist, sub(moved, root));
+            }
             frame[L_HAND..R_HAND].iter_mut().zip(hand).for_each(|(joint, point)| *joint = point.or(*joint));
-            frame[L_WRIST] = hand[0].or(frame[L_WRIST]);
         }
         Self { positions, hand_errors: self.hand_errors.clone() }
     }
