@@ -146,8 +146,7 @@ pub struct MelStream<I> {
 }
 
 impl<I: Iterator<Item = Result<Vec<f32>>>> MelStream<I> {
-    /// Stream over `pieces` of `n_samples` samples in total, of which `n_mel_frames` spectrogram frames will be
-    /// requested.
+    /// Stream over `pieces` with `n_samples` samples in total, which computes the first `n_mel_frames` spectrogram frames.
     pub fn new(pieces: I, n_samples: usize, n_mel_frames: usize) -> Self {
         let end = mel::n_samples(n_mel_frames);
         let period = period(n_samples);
@@ -232,7 +231,7 @@ mod tests {
             assert_eq!(numbers(&part), numbers(&expected));
             most = most.max(stream.samples.len());
         }
-        assert!(most < 32_000, "{most} samples at hand");
+        assert!(most < 32_000, "{most} samples in memory");
     }
 
     #[test]

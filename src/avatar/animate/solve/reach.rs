@@ -34,7 +34,7 @@ pub fn reach(
         return;
     }
     let [shoulder, upper, forearm] = metres;
-    // In lengths of the forearm, so that the filter's tolerance is an angle of it.
+    // In units of the forearm's length, because the filter's tolerance is an angle.
     let from_neck = |t: usize| Some(scale(chest[t].inverse().turn(positions.offset(t, NECK, L_WRIST)?), 1.0 / forearm));
     let mut wrists: Vec<Option<Vec3>> = (0..positions.n_frames()).map(from_neck).collect();
     filter.runs(&mut wrists, &[]);

@@ -81,7 +81,7 @@ fn second_difference(window: &PointWindow) -> Vec3 {
     std::array::from_fn(|k| a[k] - 2.0 * b[k] + c[k])
 }
 
-/// P-MPJPE of all joints, the body, or the hands, of which each (21 joints) is aligned separately.
+/// P-MPJPE of all joints, of the body, or of the hands. The two hands, of 21 joints each, are aligned separately.
 pub(crate) fn p_mpjpe(part: BodyPart) -> MetricFamily {
     // Groups of joints that are aligned together.
     let groups: Vec<Vec<usize>> = match part {
