@@ -90,6 +90,7 @@ mod tests {
             n_clips: 1,
             points: Vec::new(),
             hands: hands::HandCounts { other_hand: 0.25, ..Default::default() },
+            hand_depth: Default::default(),
             head: head::HeadErrors::default(),
             seconds: accepted::AcceptedSeconds { precision: 0.5, ..Default::default() },
             mask: accepted::MaskCounts::default(),

@@ -82,11 +82,12 @@ fn points(rows: &[ConditionRow]) -> Grid {
 }
 
 fn hands(rows: &[ConditionRow]) -> Grid {
-    let cells = |ConditionRow { condition, hands: h, head, .. }: &ConditionRow| {
+    let cells = |ConditionRow { condition, hands: h, hand_depth, head, .. }: &ConditionRow| {
         let mut cells = vec![h.n_visible.to_string()];
         cells.extend([h.missed, h.other_hand, h.swapped, h.misplaced].map(percent));
         cells.push(h.n_hidden.to_string());
         cells.extend([h.false_positives, h.median, h.p95].map(percent));
+        cells.extend([hand_depth.hand, hand_depth.forearm].map(|correlation| number(correlation, 2)));
         cells.extend([head.yaw, head.pitch, head.roll].map(|degrees| number(degrees, 1)));
         cells.push(percent(head.found));
         (condition.clone(), cells)
@@ -95,7 +96,8 @@ fn hands(rows: &[ConditionRow]) -> Grid {
         title: "hands and head",
         note: "Visible hands in all frames, and % of them missed, detected on the other hand, swapped, misplaced; \
                hidden hands, and % of them detected (false positives); error of the points of correct hands, % of the \
-               shoulder width. Head: mean absolute error of the angles, degrees, and % of the frames with angles.",
+               shoulder width. Depth: correlation of the depth of the hand model's direction with that of the true \
+               hand and forearm. Head: mean absolute error of the angles, degrees, and % of the frames with angles.",
         heads: heads(&[
             "visible",
             "missed",
@@ -106,6 +108,8 @@ fn hands(rows: &[ConditionRow]) -> Grid {
             "false pos.",
             "median",
             "95 %",
+            "depth: hand",
+            "forearm",
             "yaw",
             "pitch",
             "roll",

@@ -3,6 +3,7 @@
 
 use super::accepted::{AcceptedSeconds, MaskCounts};
 use super::clips::{self, RenderedClip};
+use super::hand_depth::HandDepth;
 use super::hands::HandCounts;
 use super::head::HeadErrors;
 use super::joints::{self, LiftedErrors};
@@ -29,6 +30,7 @@ pub struct ConditionRow {
     pub n_clips: usize,
     pub points: Vec<PointErrors>,
     pub hands: HandCounts,
+    pub hand_depth: HandDepth,
     pub head: HeadErrors,
     pub seconds: AcceptedSeconds,
     pub mask: MaskCounts,
@@ -79,6 +81,7 @@ fn row(set: &str, condition: &str, clips: &[&RenderedClip], lifter: &Lifter) -> 
         n_clips: clips.len(),
         points: points::errors(clips),
         hands: HandCounts::measure(clips),
+        hand_depth: HandDepth::measure(clips),
         head: HeadErrors::measure(clips),
         seconds: AcceptedSeconds::measure(clips),
         mask: MaskCounts::measure(clips.iter().copied().zip(&motions)),
