@@ -71,6 +71,7 @@ mod tests {
     use super::*;
     use crate::transcript::word;
 
+    /// Words of the chosen tier. Each tier contains its own name.
     fn chosen(names: &[&str], speaker: &str) -> Result<String> {
         let tier = |name: &&str| {
             let mut words = Vec::new();
@@ -85,8 +86,8 @@ mod tests {
     fn the_tier_of_the_speaker_is_chosen_or_asked_for() {
         let of = |names: &[&str], speaker: &str| chosen(names, speaker).unwrap();
         assert_eq!(of(&["phones", "Words", "other"], "anna"), "Words");
-        assert_eq!(of(&["Ben Ray - words", "Ben Ray - phones", "Anna - words"], "anna"), "Anna - words");
-        assert_eq!(of(&["Ben Ray - words", "Anna - words"], "ben-ray"), "Ben Ray - words");
+        assert_eq!(of(&["Ben Ray - words", "Ben Ray - phones", "Anna - words"], "anna"), "Anna words");
+        assert_eq!(of(&["Ben Ray - words", "Anna - words"], "ben-ray"), "Ben Ray words");
         assert_eq!(of(&["word_ben", "word_anna"], "anna"), "word_anna");
         assert_eq!(of(&["Ben", "Anna", "phones"], "Anna"), "Anna");
         assert_eq!(of(&["Ben", "phones"], "anna"), "Ben");

@@ -8,9 +8,9 @@ use orator::cli::ui::Ui;
 use orator_base::stage::workdir;
 use orator_base::text::{counted, length};
 use orator_dataset::Dataset;
-use orator_gesture::generate::trained::TrainedSpeaker;
+use orator_gesture::evaluate::clips::checkpoint::EvaluatedCheckpoint;
 use orator_media::opencv::png;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 pub fn run(
     dataset: &Path,
@@ -20,8 +20,9 @@ pub fn run(
     ui: &Ui,
 ) -> Result<Outcome> {
     let dataset = Dataset::open(dataset)?;
-    let speaker = checkpoint.map(TrainedSpeaker::open).transpose()?;
-    let learned = learned::measure(&dataset, truth, speaker.as_ref(), ui)?;
+    let checkpoints: Vec<PathBuf> = checkpoint.into_iter().map(Path::to_path_buf).collect();
+    let speakers = EvaluatedCheckpoint::open_all(&checkpoints, &dataset.info().speaker)?;
+    let learned = learned::measure(&dataset, truth, speakers.first(), ui)?;
     let heads = "predictor                          speed L  speed R  PCK 0.2   energy   pauses       L1";
     let has_words = learned.rows.iter().any(|row| row.positions.is_some());
     let of_words = if has_words { "   positions: all words     isolated words" } else { "" };
@@ -66,10 +67,13 @@ pub fn run(
             if met { "met" } else { "MISSED" }
         );
     } else if let Some(met) = learned.targets_met {
+        let speed = match truth {
+            Some(_) => format!("{} times that of the ground truth", learned::MIN_SHARE_OF_LIFTED),
+            None => learned::MIN_CORRELATION.to_string(),
+        };
         text += &format!(
-            "\ntargets: speed {}, PCK {} times that of mismatched audio and of the mean pose, energy {:.0} to {:.0} %: \
-             {}",
-            learned::MIN_CORRELATION,
+            "\ntargets: speed {speed}, PCK {} times that of mismatched audio and of the mean pose, energy {:.0} to {:.0} \
+             %: {}",
             learned::MIN_PCK,
             100.0 * learned::ENERGY.start(),
             100.0 * learned::ENERGY.end(),
