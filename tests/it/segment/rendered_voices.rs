@@ -3,7 +3,7 @@
 //! prove-people`) names the work folder of a run with the face model on rendered persons; all its clips are measured.
 
 use crate::fixtures::clips::ffmpeg;
-use crate::fixtures::media::voices::{TalkingClip, WINDOW_SECS, area};
+use crate::fixtures::media::voices::{TalkingClip, WINDOW_SECS, area, rejected};
 use orator_base::stage::progress::Silent;
 use orator_base::types::time::FrameRate;
 use orator_formats::keypoints_npz;
@@ -20,11 +20,16 @@ const SECS: f64 = 7.0;
 /// estimated within one frame.
 fn measure(clips: &[TalkingClip]) -> [f64; 2] {
     let (mut own, mut other, mut errors) = (Vec::new(), Vec::new(), Vec::new());
+    let mut of_frames = [Vec::new(), Vec::new()];
     for (index, clip) in clips.iter().enumerate() {
         own.extend(clip.windows(&clip.voice, 0.0));
+        of_frames[0].extend(clip.own_voice(&clip.voice, 0.0));
         let others = (1..clips.len().min(5)).map(|step| &clips[(index + step * 7) % clips.len()]);
         let other_clips = others.filter(|other_clip| other_clip.name != clip.name);
-        other_clips.for_each(|other_clip| other.extend(clip.windows(&other_clip.voice, 0.0)));
+        other_clips.for_each(|other_clip| {
+            other.extend(clip.windows(&other_clip.voice, 0.0));
+            of_frames[1].extend(clip.own_voice(&other_clip.voice, 0.0));
+        });
         errors.extend(clip.shift_errors(8.0, 6.0).into_iter().map(|error| error * clip.source_fps));
     }
     let n_within = errors.iter().filter(|frames| **frames <= 1.0 + 1e-9).count();
@@ -38,6 +43,7 @@ fn measure(clips: &[TalkingClip]) -> [f64; 2] {
         other.len(),
         errors.len()
     );
+    rejected("rendered persons", &of_frames[0], &of_frames[1]);
     [area, share]
 }
 

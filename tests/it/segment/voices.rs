@@ -1,7 +1,7 @@
 //! Own voices are distinguished from other voices on real clips, and audio shifts are estimated. `ORATOR_LONG=1` (`make
 //! prove`) uses all clips, otherwise two of them. Clips with generated lips are measured separately.
 
-use crate::fixtures::media::voices::{TalkingClip, WINDOW_SECS, area, openness};
+use crate::fixtures::media::voices::{TalkingClip, WINDOW_SECS, area, openness, rejected};
 use orator_base::audio::openness::Openness;
 use orator_test_support::project::{Project, files_under};
 use orator_test_support::skip::{fetched_model, fetched_models, real_data};
@@ -97,17 +97,20 @@ fn own_voices_are_distinguished_from_others_and_shifts_estimated() {
 
     let mut rng = ChaCha8Rng::seed_from_u64(1);
     let (mut scored, mut n_found, mut n_shifts) = (Vec::new(), [0, 0], [0, 0]);
+    // Probabilities of talking and of generated clips, with their own and with other voices.
+    let mut of_frames = [0; 2].map(|_| [Vec::new(), Vec::new()]);
     for clip in &clips {
         let offset = clip.offset();
         let own = clip.windows(&clip.voice, 0.0);
         let of_clips = clips.iter().filter(|other| speaker(&other.name) != speaker(&clip.name));
         let others = of_clips.map(|other| (&other.voice, other.secs)).chain(recorded.iter().map(|(v, s)| (v, *s)));
-        let mut other = Vec::new();
+        let (mut other, mut others_of_clip) = (Vec::new(), Vec::new());
         for (voice, secs) in others {
             for _ in 0..4 {
                 let slack = secs - clip.secs;
-                let shift = if slack > 0.0 { rng.random_range(0.0..slack) } else { rng.random_range(slack..0.0) };
+                let shift = rng.random_range(slack.min(0.0)..=slack.max(0.0));
                 other.extend(clip.windows(voice, shift));
+                others_of_clip.extend(clip.own_voice(voice, shift));
             }
         }
         let is_generated = clip.name.starts_with("mdd");
@@ -129,6 +132,9 @@ fn own_voices_are_distinguished_from_others_and_shifts_estimated() {
             1000.0 * worst
         );
         scored.push((clip.name.clone(), (own, other)));
+        let frames = &mut of_frames[usize::from(is_generated)];
+        frames[0].extend(clip.own_voice(&clip.voice, 0.0));
+        frames[1].extend(others_of_clip);
     }
     let group = |is_in: &dyn Fn(&str) -> bool| -> Vec<(Vec<f64>, Vec<f64>)> {
         scored.iter().filter(|(name, _)| is_in(name)).map(|(_, scores)| scores.clone()).collect()
@@ -145,6 +151,10 @@ fn own_voices_are_distinguished_from_others_and_shifts_estimated() {
         // With two clips alone there are few other voices.
         let min_area = if *name == "generated clips" { 0.85 } else { 0.95 };
         assert!(area >= if is_long { min_area } else { 0.9 }, "{name}: {area}");
+    }
+    for (name, [own, others]) in ["talking clips", "generated clips"].into_iter().zip(&of_frames) {
+        let [own, _] = rejected(name, own, others);
+        assert!(own <= 0.01, "{name}: {own}");
     }
     check_shifts(n_found, n_shifts);
 }
