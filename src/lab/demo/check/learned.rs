@@ -68,8 +68,8 @@ pub struct Learned {
 }
 
 /// Targets of the generator: correlation of each wrist's speed (for videos, as a share of the correlation of the lifted
-/// motion, which contains errors of lifting), PCK as a multiple of the mean pose's and of the
-/// mismatched prediction's, motion energy as a share of the data's.
+/// motion, which contains errors of lifting), PCK as a multiple of the mean pose's and of the mismatched prediction's,
+/// motion energy as a share of the data's.
 pub const MIN_CORRELATION: f64 = 0.7;
 pub const MIN_SHARE_OF_LIFTED: f64 = 0.8;
 pub const MIN_PCK: f64 = 1.5;
@@ -194,7 +194,7 @@ pub fn measure(
 }
 
 /// Whether the first row (the generator) reaches the targets relative to the second (mismatched) and the third (mean
-/// pose), and `of_videos` to the lifted motion.
+/// pose). For data of videos, the correlation is compared with that of the lifted motion.
 fn targets_met(rows: &[LearnedRow], of_videos: bool) -> bool {
     let [predicted, others @ ..] = rows else { return false };
     let Some(poses) = predicted.poses else { return false };
