@@ -1,10 +1,12 @@
 //! Speech activity: the speech model's probabilities per window are converted to speech segments by hysteresis, and
-//! these to the share of speech around each frame. Memory: one value per 32 ms window.
+//! these to the share of speech around each frame, or to the time ranges that are transcribed. Memory: one value per
+//! 32 ms window.
 
 use crate::sound;
 use anyhow::{Context, Result, ensure};
 use orator_base::types::time::FrameRate;
 use orator_onnx::speech::{SpeechModel, WINDOW};
+use std::ops::Range;
 use std::path::Path;
 
 /// Window around a frame in seconds: about a sentence with its pauses.
@@ -16,6 +18,9 @@ const END_PROBABILITY: f32 = 0.35;
 /// Longest silence within speech, and shortest speech, in seconds.
 const HANGOVER_SECS: f64 = 0.1;
 const MIN_SPEECH_SECS: f64 = 0.25;
+/// Margin around speech that is transcribed, so that no word is cut, and longest pause within it, in seconds.
+const MARGIN_SECS: f64 = 0.4;
+const MAX_PAUSE_SECS: f64 = 2.0;
 /// Sample rate, Hz.
 const RATE: u32 = orator_base::types::sound::SAMPLE_RATE;
 
@@ -26,6 +31,28 @@ const RATE: u32 = orator_base::types::sound::SAMPLE_RATE;
 pub fn shares(path: &Path, model: &mut SpeechModel, fps: FrameRate, n_frames: usize) -> Result<Vec<f32>> {
     let probabilities = if path.exists() { probabilities(path, model)? } else { Vec::new() };
     Ok(shares_of(&is_speech(&probabilities), fps, n_frames))
+}
+
+/// Ranges with speech in seconds of the audio file `path`, each with a margin of 0.4 s within the audio; ranges less than
+/// 2 s apart are one.
+///
+/// # Errors
+/// Those of `shares`.
+pub fn ranges(path: &Path, model: &mut SpeechModel) -> Result<Vec<Range<f64>>> {
+    Ok(ranges_of(&is_speech(&probabilities(path, model)?)))
+}
+
+fn ranges_of(speech: &[bool]) -> Vec<Range<f64>> {
+    let secs = |window: usize| (window * WINDOW) as f64 / f64::from(RATE);
+    let mut ranges: Vec<Range<f64>> = Vec::new();
+    for at in (0..speech.len()).filter(|at| speech[*at]) {
+        let end = (secs(at + 1) + MARGIN_SECS).min(secs(speech.len()));
+        match ranges.last_mut() {
+            Some(range) if secs(at) - MARGIN_SECS - range.end < MAX_PAUSE_SECS => range.end = end,
+            _ => ranges.push((secs(at) - MARGIN_SECS).max(0.0)..end),
+        }
+    }
+    ranges
 }
 
 /// Speech probability of every window of 512 samples of a wav file, read as a stream.
@@ -121,6 +148,19 @@ mod tests {
         // Claps are too short to be speech.
         assert_eq!(n_speech(&[(0.9, 4), (0.0, 10), (0.9, 6), (0.0, 10), (0.9, 3)]), 0);
         assert_eq!(is_speech(&[]), [false; 0]);
+    }
+
+    #[test]
+    fn ranges_have_margins_and_bridge_short_pauses() {
+        let speech = |of: &[(f32, usize)]| is_speech(&segments(of));
+        // Windows of 32 ms: speech from 3.2 to 6.4 s, from 8 to 9.6 s and from 16 s to the end.
+        let found = ranges_of(&speech(&[(0.0, 100), (0.9, 100), (0.0, 50), (0.9, 50), (0.0, 200), (0.9, 20)]));
+        let expected = [[2.8, 10.0], [15.6, 16.64]];
+        assert_eq!(found.len(), expected.len(), "{found:?}");
+        for (range, [start, end]) in found.iter().zip(expected) {
+            assert!((range.start - start).abs() < 1e-9 && (range.end - end).abs() < 1e-9, "{found:?}");
+        }
+        assert_eq!((ranges_of(&speech(&[(0.0, 100)])), ranges_of(&speech(&[(0.9, 10)]))), (vec![], vec![0.0..0.32]));
     }
 
     #[test]
