@@ -32,8 +32,6 @@ pub fn read(content: &str, speaker: &str) -> Result<JsonTranscript> {
         _ => reader.add(&value)?,
     }
     let text = ["text", "transcript", "sentence"].iter().find_map(|key| value.get(key)?.as_str());
-    // WhisperX writes no sentences for audio without speech.
-    let text = text.or_else(|| value.get("segments")?.as_array().filter(|segments| segments.is_empty()).map(|_| ""));
     match reader.collector.finish() {
         Ok(words) if !words.is_empty() => Ok(JsonTranscript::Words(words)),
         found => match text {

@@ -18,9 +18,6 @@ const END_PROBABILITY: f32 = 0.35;
 /// Longest silence within speech, and shortest speech, in seconds.
 const HANGOVER_SECS: f64 = 0.1;
 const MIN_SPEECH_SECS: f64 = 0.25;
-/// Margin around speech that is transcribed, so that no word is cut, and longest pause within it, in seconds.
-const MARGIN_SECS: f64 = 0.4;
-const MAX_PAUSE_SECS: f64 = 2.0;
 /// Sample rate, Hz.
 const RATE: u32 = orator_base::types::sound::SAMPLE_RATE;
 
@@ -33,8 +30,7 @@ pub fn shares(path: &Path, model: &mut SpeechModel, fps: FrameRate, n_frames: us
     Ok(shares_of(&is_speech(&probabilities), fps, n_frames))
 }
 
-/// Ranges with speech in seconds of the audio file `path`, each with a margin of 0.4 s within the audio; ranges less than
-/// 2 s apart are one.
+/// Ranges with speech in the audio file `path`, seconds; the last window may be longer than the audio.
 ///
 /// # Errors
 /// Those of `shares`.
@@ -44,15 +40,13 @@ pub fn ranges(path: &Path, model: &mut SpeechModel) -> Result<Vec<Range<f64>>> {
 
 fn ranges_of(speech: &[bool]) -> Vec<Range<f64>> {
     let secs = |window: usize| (window * WINDOW) as f64 / f64::from(RATE);
-    let mut ranges: Vec<Range<f64>> = Vec::new();
-    for at in (0..speech.len()).filter(|at| speech[*at]) {
-        let end = (secs(at + 1) + MARGIN_SECS).min(secs(speech.len()));
-        match ranges.last_mut() {
-            Some(range) if secs(at) - MARGIN_SECS - range.end < MAX_PAUSE_SECS => range.end = end,
-            _ => ranges.push((secs(at) - MARGIN_SECS).max(0.0)..end),
-        }
-    }
-    ranges
+    let mut start = 0;
+    let ranges = speech.chunk_by(|a, b| a == b).map(|run| {
+        let range = secs(start)..secs(start + run.len());
+        start += run.len();
+        (run[0], range)
+    });
+    ranges.filter_map(|(is_speech, range)| is_speech.then_some(range)).collect()
 }
 
 /// Speech probability of every window of 512 samples of a wav file, read as a stream.
@@ -151,16 +145,11 @@ mod tests {
     }
 
     #[test]
-    fn ranges_have_margins_and_bridge_short_pauses() {
-        let speech = |of: &[(f32, usize)]| is_speech(&segments(of));
-        // Windows of 32 ms: speech from 3.2 to 6.4 s, from 8 to 9.6 s and from 16 s to the end.
-        let found = ranges_of(&speech(&[(0.0, 100), (0.9, 100), (0.0, 50), (0.9, 50), (0.0, 200), (0.9, 20)]));
-        let expected = [[2.8, 10.0], [15.6, 16.64]];
-        assert_eq!(found.len(), expected.len(), "{found:?}");
-        for (range, [start, end]) in found.iter().zip(expected) {
-            assert!((range.start - start).abs() < 1e-9 && (range.end - end).abs() < 1e-9, "{found:?}");
-        }
-        assert_eq!((ranges_of(&speech(&[(0.0, 100)])), ranges_of(&speech(&[(0.9, 10)]))), (vec![], vec![0.0..0.32]));
+    fn ranges_are_in_seconds() {
+        // Windows of 32 ms; the claps are too short to be speech.
+        let speech = is_speech(&segments(&[(0.0, 100), (0.9, 100), (0.0, 50), (0.9, 4), (0.0, 50), (0.9, 25)]));
+        assert_eq!(ranges_of(&speech), [3.2..6.4, 9.728..10.528]);
+        assert!(ranges_of(&[false; 9]).is_empty() && ranges_of(&[]).is_empty());
     }
 
     #[test]

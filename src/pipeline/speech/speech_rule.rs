@@ -72,7 +72,7 @@ impl SpeechDetector {
         })
     }
 
-    /// Ranges with speech in seconds of the audio file `path`, with margins.
+    /// Ranges with speech in the audio file `path`, seconds.
     ///
     /// # Errors
     /// Those of `shares`.

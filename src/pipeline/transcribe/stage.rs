@@ -12,10 +12,9 @@ use orator_base::types::sound::SAMPLE_RATE;
 use orator_dataset::config::{Settings, TranscribeConfig};
 use orator_dataset::info::ModelUsed;
 use orator_formats::media_json::MediaInfo;
-use orator_formats::transcript::write::{SpokenSegment, TranscriptFormat};
-use orator_formats::transcript::{Word, WordSource};
+use orator_formats::transcript::{SpokenSegment, TranscriptFormat, Word, WordSource};
 use orator_onnx::{ModelEntry, ModelRequest, ModelStore, sha256_of};
-use orator_speech::recognise::{Recognised, RecognisedSegment, RecognisedWord, Recogniser, RecogniserOptions};
+use orator_speech::{Recognised, RecognisedSegment, RecognisedWord, Recogniser, RecogniserOptions};
 use serde_json::{Value, json};
 use std::cell::Cell;
 use std::ops::Range;
@@ -92,7 +91,6 @@ impl TranscribeStage {
             Some(detector) => detector.ranges(path)?,
             None => std::iter::once(0.0..secs).collect(),
         };
-        let speech: Vec<Range<f64>> = speech.into_iter().map(|range| range.start..range.end.min(secs)).collect();
         let speech_secs = speech.iter().map(|range| range.end - range.start).sum::<f64>() + 0.0;
         if speech_secs <= 0.0 {
             return Ok(TranscribedAudio { found: None, speech_secs });
