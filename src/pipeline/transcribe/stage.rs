@@ -1,9 +1,9 @@
 //! Stage `transcribe`: reads the audio that `extract` wrote, recognises its words where there is speech, and writes them
 //! as a transcript, `words.json`, with times on the clock of the video file, like every other transcript.
 
+use crate::sound;
 use crate::speech::speech_rule::SpeechDetector;
-use anyhow::{Context, Result, ensure};
-use hound::WavReader;
+use anyhow::{Context, Result};
 use orator_base::stage::artifacts::{Artifact, StageName};
 use orator_base::stage::progress::Progress;
 use orator_base::stage::{Input, Report, Stage, Unit};
@@ -13,10 +13,10 @@ use orator_dataset::config::{Settings, TranscribeConfig};
 use orator_dataset::info::ModelUsed;
 use orator_formats::media_json::MediaInfo;
 use orator_formats::transcript::{SpokenSegment, TranscriptFormat, Word, WordSource};
+use orator_formats::wav::WavRanges;
 use orator_onnx::{ModelEntry, ModelRequest, ModelStore, sha256_of};
 use orator_speech::{Recognised, RecognisedSegment, RecognisedWord, Recogniser, RecogniserOptions};
 use serde_json::{Value, json};
-use std::cell::Cell;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
@@ -31,7 +31,7 @@ pub struct TranscribeStage {
     /// Folder of the recogniser.
     model: PathBuf,
     work: PathBuf,
-    /// Speech detector; `None`: all audio is transcribed.
+    /// Speech detector; `None`: speech is detected by loudness only.
     speech: Option<SpeechDetector>,
 }
 
@@ -77,40 +77,28 @@ impl TranscribeStage {
 
     /// Recognises the words of a 16 kHz wav file, read in pieces.
     fn recognise(&self, path: &Path, progress: &dyn Progress) -> Result<TranscribedAudio> {
-        let reading = || format!("cannot read {}", path.display());
-        let mut wav = WavReader::open(path).with_context(reading)?;
-        let spec = wav.spec();
-        ensure!(
-            (spec.sample_rate, spec.channels, spec.bits_per_sample) == (SAMPLE_RATE, 1, 16),
-            "{} is not 16-bit mono at {SAMPLE_RATE} Hz: run the stage extract again",
-            path.display()
-        );
-        let n_samples = wav.duration() as usize;
-        let secs = n_samples as f64 / f64::from(SAMPLE_RATE);
-        let speech: Vec<Range<f64>> = match &self.speech {
+        let mut wav = WavRanges::open(path, SAMPLE_RATE)?;
+        let n_samples = wav.n_samples();
+        let speech = match &self.speech {
             Some(detector) => detector.ranges(path)?,
-            None => std::iter::once(0.0..secs).collect(),
+            None => sound::loud_ranges(path)?,
         };
         let speech_secs = speech.iter().map(|range| range.end - range.start).sum::<f64>() + 0.0;
         if speech_secs <= 0.0 {
             return Ok(TranscribedAudio { found: None, speech_secs });
         }
-        let task = progress.begin("", secs.ceil() as u64);
-        let reported = Cell::new(0);
-        let advance = |secs: f64| {
-            let steps = (secs.max(0.0) as u64).saturating_sub(reported.get());
-            task.advance(steps);
-            reported.set(reported.get() + steps);
+        let task = progress.begin("", n_samples.div_ceil(SAMPLE_RATE as usize) as u64);
+        let mut n_reported = 0;
+        let mut advance = |secs: f64| {
+            let n_steps = (secs.max(0.0) as u64).saturating_sub(n_reported);
+            task.advance(n_steps);
+            n_reported += n_steps;
         };
-        let mut source = |samples: Range<usize>| -> Result<Vec<f32>> {
-            wav.seek(u32::try_from(samples.start)?).with_context(reading)?;
-            let sample = |sample: hound::Result<i16>| Ok(f32::from(sample.with_context(reading)?) / 32_768.0);
-            wav.samples::<i16>().take(samples.len()).map(sample).collect()
-        };
+        let mut source = |samples: Range<usize>| wav.read(samples);
         let language = Some(self.settings.language.clone()).filter(|code| !code.is_empty());
         let options = RecogniserOptions { language, beam: BEAM };
         let recogniser = Recogniser::open(&self.model)?;
-        let found = recogniser.recognise(&mut source, n_samples, &speech, &options, &advance)?;
+        let found = recogniser.recognise(&mut source, n_samples, &speech, &options, &mut advance)?;
         Ok(TranscribedAudio { found: Some(found), speech_secs })
     }
 }
