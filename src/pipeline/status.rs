@@ -139,8 +139,9 @@ impl Pipeline {
                     (Some(UnitStatus { stage, reason, .. }), _) => {
                         VideoProgress::Failed { stage: *stage, error: reason }
                     }
+                    // The words do not change which seconds are accepted.
+                    (None, None | Some(StageName::Transcribe)) => VideoProgress::Judged,
                     (None, Some(_)) => VideoProgress::Waiting,
-                    (None, None) => VideoProgress::Judged,
                 };
                 let is_extracted = stage_statuses.first().is_some_and(|status| status.state == UnitState::UpToDate);
                 let budget = TimeBudget::of_video(work, unit, video_progress, is_extracted);
