@@ -120,6 +120,8 @@ fn time_excerpts(
     task.advance(1);
     let peak_mib = peak_mib();
     let excerpt_secs: f64 = secs.values().sum();
+    let transcribes = pipeline.config().settings.transcribes_any();
+    let is_timed = |stage: &StageName| transcribes || *stage != StageName::Transcribe;
     let cost = |stage: StageName| {
         let own = times.iter().filter(|time| time.stage == stage);
         let length = |time: &StageTime| match stage {
@@ -133,7 +135,7 @@ fn time_excerpts(
     Ok(StageTimes {
         n_excerpts: files.len(),
         excerpt_secs,
-        stages: StageName::ALL.map(cost).into(),
+        stages: StageName::ALL.into_iter().filter(is_timed).map(cost).collect(),
         peak_mib,
         ..StageTimes::default()
     })

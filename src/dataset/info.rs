@@ -103,6 +103,11 @@ pub struct ModelUsed {
     pub licence: String,
 }
 
+impl ModelUsed {
+    /// Role of the speech recogniser.
+    pub const WORDS: &str = "words";
+}
+
 /// Size of a split.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct SplitInfo {

@@ -88,7 +88,9 @@ impl Pipeline {
         let (config, videos) = (self.config(), self.all_videos());
         let stage = stages::build(name, config, videos, ready)?;
         Ok(match self.program() {
-            Some(program) if name < StageName::Lift => Box::new(SubprocessStage { stage, program, config, videos }),
+            Some(program) if !matches!(name, StageName::Lift | StageName::Dataset) => {
+                Box::new(SubprocessStage { stage, program, config, videos })
+            }
             _ => stage,
         })
     }

@@ -2,7 +2,7 @@
 
 use super::pipeline::Pipeline;
 use super::pose2d::models;
-use super::segment::speech_rule::SpeechDetector;
+use super::speech::speech_rule::SpeechDetector;
 use super::stages::{self, HookedStage, UnitWork};
 use super::timing::{StageClock, StageTime};
 use anyhow::{Context, Result, ensure};
@@ -154,8 +154,14 @@ impl Pipeline {
         if selection.has(StageName::Pose2d) && remaining.iter().any(Videos::has_video_files) {
             stages::check_models(settings)?;
         }
+        let transcribes = remaining.iter().any(|videos| settings.transcribes(&videos.speaker));
+        ensure!(
+            transcribes || (from, to) != (StageName::Transcribe, StageName::Transcribe),
+            "no words are to be recognised: set `transcripts = \"auto\"` under [[speaker]]"
+        );
+        let is_selected = |name: &StageName| selection.has(*name) && (transcribes || *name != StageName::Transcribe);
         // Missing weights or manifest entries are reported before hours of work, not after.
-        for name in StageName::ALL.into_iter().filter(|name| selection.has(*name)) {
+        for name in StageName::ALL.into_iter().filter(is_selected) {
             stages::build(name, self.config(), self.all_videos(), &[])?;
         }
         let _lock = workdir::lock(&settings.work.dir).context(
@@ -192,8 +198,11 @@ impl Pipeline {
                 });
             }
         }
-        let names: Vec<StageName> = StageName::OF_VIDEOS.into_iter().filter(|name| selection.has(*name)).collect();
+        // Not every speaker's words are recognised, so this stage has its own units.
+        let (transcribe, names): (Vec<_>, Vec<_>) =
+            StageName::OF_VIDEOS.into_iter().filter(is_selected).partition(|name| *name == StageName::Transcribe);
         run.stages(&names, &[], &mut remaining)?;
+        run.stages(&transcribe, &[], &mut remaining)?;
         if selection.has(StageName::Dataset) {
             let ready = run.ready(&remaining)?;
             let failed = run.stages(&[StageName::Dataset], &ready, &mut remaining)?;

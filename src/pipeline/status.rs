@@ -123,7 +123,8 @@ impl Pipeline {
             }));
             let ready = stages::ready(self.config(), &videos, &hashes).unwrap_or_default();
             let check = StatusCheck { pipeline: self, hashes: &hashes, videos: &videos, ready: &ready };
-            let of_videos = StageName::OF_VIDEOS.map(|name| (name, check.stage(name)));
+            let names = self.config().settings.stages_of(&videos.speaker).into_iter();
+            let of_videos: Vec<_> = names.map(|name| (name, check.stage(name))).collect();
             let (mut speaker_waits_for, mut usable) = (None, Vec::new());
             let mut total = TimeBudget::of_speaker(&videos.speaker);
             for unit in &videos.units {
@@ -138,8 +139,9 @@ impl Pipeline {
                     (Some(UnitStatus { stage, reason, .. }), _) => {
                         VideoProgress::Failed { stage: *stage, error: reason }
                     }
+                    // The words do not change which seconds are accepted.
+                    (None, None | Some(StageName::Transcribe)) => VideoProgress::Judged,
                     (None, Some(_)) => VideoProgress::Waiting,
-                    (None, None) => VideoProgress::Judged,
                 };
                 let is_extracted = stage_statuses.first().is_some_and(|status| status.state == UnitState::UpToDate);
                 let budget = TimeBudget::of_video(work, unit, video_progress, is_extracted);

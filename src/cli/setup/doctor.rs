@@ -14,7 +14,7 @@ use orator_media::aligner::Aligner;
 use orator_onnx::{ModelStore, Runtime};
 use orator_pipeline::pose2d::models;
 use orator_pipeline::process::probe;
-use orator_pipeline::segment::speech_rule::SpeechDetector;
+use orator_pipeline::speech::speech_rule::SpeechDetector;
 use serde_json::json;
 use std::path::{Path, PathBuf};
 

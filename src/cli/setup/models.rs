@@ -9,7 +9,8 @@ use orator_dataset::config::{self, Settings};
 use orator_onnx::{Fetched, MANIFEST_FILE, ModelEntry, ModelError, ModelOrigin, ModelRequest, ModelState, ModelStore};
 use orator_onnx::{Runtime, find_library};
 use orator_pipeline::pose2d::models;
-use orator_pipeline::segment::speech_rule::SpeechDetector;
+use orator_pipeline::speech::speech_rule::SpeechDetector;
+use orator_pipeline::transcribe::TranscribeStage;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 
@@ -130,7 +131,9 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
 
 /// Models that the settings require.
 fn required(settings: &Settings) -> Vec<ModelRequest> {
-    models::required_models(&settings.pose2d).into_iter().chain(SpeechDetector::required_models(settings)).collect()
+    let speech =
+        SpeechDetector::required_models(settings).into_iter().chain(TranscribeStage::required_models(settings));
+    models::required_models(&settings.pose2d).into_iter().chain(speech).collect()
 }
 
 /// Calls `work`; if a model is missing and the user accepts the licences, fetches the models and calls it again.

@@ -3,7 +3,7 @@
 
 use super::judge::judge;
 use super::measure::{self, Measures};
-use super::speech_rule::SpeechDetector;
+use crate::speech::speech_rule::SpeechDetector;
 use crate::{lip_sync, sound};
 use anyhow::{Result, ensure};
 use orator_base::stage::artifacts::{Artifact, StageName};
