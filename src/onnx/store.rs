@@ -140,8 +140,8 @@ impl ModelStore {
         Ok(())
     }
 
-    /// Folder of the speech recogniser `id`: a model (`auto`: the first that is present, in manifest order), or else a
-    /// folder with a Whisper network, in the models folder or by its path, which is not checked.
+    /// Folder of the speech recogniser `id`: a model of the manifest, or else a folder with a Whisper network, in the
+    /// models folder or by its path, which is not checked.
     ///
     /// # Errors
     ///
@@ -149,12 +149,7 @@ impl ModelStore {
     /// it.
     pub fn recogniser(&self, id: &str) -> Result<PathBuf> {
         let known = || self.with_role(ModelRole::Recogniser);
-        let is_present = |entry: &&ModelEntry| self.state(entry) == ModelState::Present;
-        let entry = match id {
-            AUTO => known().find(is_present).or_else(|| known().next()),
-            _ => known().find(|entry| entry.id == id),
-        };
-        let Some(entry) = entry else {
+        let Some(entry) = known().find(|entry| entry.id == id) else {
             let own = [self.dir.join(id), PathBuf::from(id)].into_iter().find(|folder| folder.is_dir());
             let ids: Vec<&str> = known().map(|entry| entry.id.as_str()).collect();
             return own.with_context(|| {

@@ -11,7 +11,7 @@ use orator_base::stage::workdir;
 use orator_dataset::config::{Config, Settings};
 use orator_formats::word_vectors::WordVectors;
 use orator_media::aligner::Aligner;
-use orator_onnx::{AUTO, ModelStore, Runtime};
+use orator_onnx::{ModelStore, Runtime};
 use orator_pipeline::pose2d::models;
 use orator_pipeline::process::probe;
 use orator_pipeline::segment::speech_rule::SpeechDetector;
@@ -51,7 +51,7 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
             checks.push(ok("configuration", config.file.display().to_string()));
             checks.extend(model_checks(&config.settings));
             checks.extend(word_checks(&config.settings.models.dir));
-            checks.extend(recogniser(&config.settings.models.dir));
+            checks.extend(recogniser(&config.settings));
             checks.push(work(&config.settings.work.dir));
             checks.push(sandbox(config.settings.work.sandbox));
             checks.push(aligner());
@@ -153,9 +153,9 @@ fn model_checks(settings: &Settings) -> Vec<Check> {
 }
 
 /// The speech recogniser. Only `orator transcribe` needs it, so nothing counts as missing without it.
-fn recogniser(models: &Path) -> Option<Check> {
-    let found = ModelStore::open(models).ok()?.recogniser(AUTO);
-    Some(match found {
+fn recogniser(settings: &Settings) -> Option<Check> {
+    let store = ModelStore::open(&settings.models.dir).ok()?;
+    Some(match store.recogniser(settings.transcribe.model_id()) {
         Ok(folder) => ok("speech recogniser", folder.display().to_string()),
         Err(error) => Check { is_full: false, ..ok("speech recogniser", format!("none: {error:#}")) },
     })
