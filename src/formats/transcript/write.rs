@@ -1,5 +1,5 @@
-//! Writers of recognised or aligned speech: JSON as WhisperX writes it, SubRip, WebVTT with word times, and TextGrid. The
-//! readers of this folder give back the words and, except for SubRip, whose words share the time of their cue, the times.
+//! Writers of recognised or aligned speech: JSON as WhisperX writes it, SubRip, WebVTT with word times, and TextGrid.
+//! The readers of this folder give back the words and their times, except that words of SubRip share that of their cue.
 
 use super::word::{Word, WordSource};
 use anyhow::{Result, bail};
@@ -157,7 +157,7 @@ fn srt(cues: &[WordCue]) -> String {
     text
 }
 
-/// WebVTT in which each word is followed by its end, if that is not the end of the cue, and by the start of the next word.
+/// WebVTT with the end of each word, if that is not the end of the cue, and the start of the next one.
 fn vtt(cues: &[WordCue]) -> String {
     let escaped = |word: &str| word.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;");
     let mut text = "WEBVTT\n\n".to_owned();
