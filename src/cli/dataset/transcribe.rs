@@ -280,7 +280,7 @@ impl Transcriber<'_> {
             unaligned: unaligned.into_iter().map(|n| (n + 1, words[n].clone())).collect(),
             language,
             secs,
-            speech_secs: speech.iter().map(|range| range.end - range.start).sum(),
+            speech_secs: speech.iter().map(|range| range.end - range.start).fold(0.0, |sum, secs| sum + secs),
             times_real_time: secs / started.elapsed().as_secs_f64().max(1e-6),
         })
     }
