@@ -17,7 +17,6 @@ const GROUPS: [(&str, &[&str]); 5] = [
             StageName::Lift.as_str(),
             "import",
             "transcribe",
-            "align",
             "dataset",
             "forget",
             "plan",

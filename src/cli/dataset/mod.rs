@@ -1,6 +1,5 @@
-//! Verbs for datasets: `dataset`, `import`, `forget`, `transcribe`, `align`.
+//! Verbs for datasets: `dataset`, `import`, `forget`, `transcribe`.
 
-pub mod align;
 mod aligned_text;
 pub mod forget;
 pub mod import;
