@@ -16,7 +16,7 @@ const GROUPS: [(&str, &[&str]); 5] = [
             "sheet",
             StageName::Lift.as_str(),
             "import",
-            "align",
+            "transcribe",
             "dataset",
             "forget",
             "plan",

@@ -5,7 +5,8 @@ use anyhow::{Context, Result, ensure};
 use hound::{SampleFormat, WavReader, WavSpec};
 use orator_base::types::sound::Sound;
 use std::fs::File;
-use std::io::{BufWriter, Cursor, Seek, Write};
+use std::io::{BufReader, BufWriter, Cursor, Seek, Write};
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 /// Size of the header, bytes.
@@ -69,6 +70,38 @@ impl WavWriter {
     }
 }
 
+/// A mono 16-bit WAV file that is read by ranges, with constant memory. It stays readable after its path is removed.
+pub struct WavRanges {
+    path: PathBuf,
+    file: hound::WavReader<BufReader<File>>,
+}
+
+impl WavRanges {
+    /// Opens a file with `rate` samples per second.
+    ///
+    /// # Errors
+    ///
+    /// The file cannot be read, or has another format.
+    pub fn open(path: &Path, rate: u32) -> Result<Self> {
+        let file = hound::WavReader::open(path).with_context(|| format!("cannot read {}", path.display()))?;
+        ensure!(file.spec() == spec(rate), "{} is not a 16-bit mono WAV file at {rate} Hz", path.display());
+        Ok(Self { path: path.to_owned(), file })
+    }
+
+    pub fn n_samples(&self) -> usize {
+        self.file.duration() as usize
+    }
+
+    /// Samples in -1..1 of a range, cut at the end of the file.
+    pub fn read(&mut self, range: Range<usize>) -> Result<Vec<f32>> {
+        let reading = || format!("cannot read {}", self.path.display());
+        let start = range.start.min(self.file.duration() as usize);
+        self.file.seek(u32::try_from(start)?).with_context(reading)?;
+        let samples = self.file.samples::<i16>().take(range.len());
+        samples.map(|sample| Ok(f32::from(sample.with_context(reading)?) / 32_768.0)).collect()
+    }
+}
+
 /// Number of samples in a file of `file_bytes` bytes that begins with `bytes`.
 ///
 /// # Errors
@@ -103,6 +136,23 @@ mod tests {
         let path = tempfile::tempdir().unwrap().keep().join("a.wav");
         write(&path, &Sound { rate: 16_000, samples: all }).unwrap();
         assert_eq!(std::fs::read(path).unwrap(), bytes);
+    }
+
+    #[test]
+    fn ranges_are_read_after_the_path_is_removed() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.wav");
+        let samples: Vec<f32> = (0..1_000).map(|n| n as f32 / 32_768.0).collect();
+        write(&path, &Sound { rate: 16_000, samples: samples.clone() }).unwrap();
+        assert!(WavRanges::open(&path, 8_000).is_err());
+        let mut ranges = WavRanges::open(&path, 16_000).unwrap();
+        std::fs::remove_file(&path).unwrap();
+        assert_eq!(ranges.n_samples(), 1_000);
+        for (range, expected) in
+            [(900..950, 900..950), (10..20, 10..20), (990..2_000, 990..1_000), (5_000..6_000, 0..0)]
+        {
+            assert_eq!(ranges.read(range).unwrap(), samples[expected]);
+        }
     }
 
     #[test]

@@ -1,7 +1,6 @@
-//! The only crate that calls FFmpeg and OpenCV. It also contains the sandbox of processes that read untrusted files,
-//! file-backed memory, and the external program for forced alignment of words.
+//! The only crate that calls FFmpeg and OpenCV. It also contains the sandbox of processes that read untrusted files, and
+//! file-backed memory.
 
-pub mod aligner;
 pub mod ffmpeg;
 pub mod file_memory;
 pub mod opencv;

@@ -1,9 +1,9 @@
 //! Description of one model: its sources, preprocessing and decoding. A strict data type (unknown keys are errors).
 
-use super::{Conversion, ModelSource};
+use super::{Conversion, ModelSource, SourceFile};
 use serde::{Deserialize, Serialize};
 
-/// One model file: its identity, sources, preprocessing and decoding.
+/// One model, a file or a folder of files: its identity, sources, preprocessing and decoding.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ModelEntry {
@@ -18,10 +18,14 @@ pub struct ModelEntry {
     pub sha256: String,
     #[serde(default)]
     pub bytes: u64,
+    /// Files of a model that is a folder named `file`, the weights last; empty if it is a single file.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub files: Vec<SourceFile>,
     /// URL that serves exactly the pinned bytes.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub url: Option<String>,
-    /// Sources of the files from which the model is built, in the order in which they are tried, after `url`.
+    /// Sources of the files from which the model is built, in the order in which they are tried, after `url`. A folder
+    /// needs all of its sources.
     #[serde(default, rename = "source", skip_serializing_if = "Vec::is_empty")]
     pub sources: Vec<ModelSource>,
     /// Conversion from the files of a source; `None`: the single file of a source is the model.
@@ -63,6 +67,8 @@ pub enum ModelRole {
     Palm,
     Face,
     Speech,
+    /// A folder with a Whisper network, for speech recognition.
+    Recogniser,
     Other,
 }
 

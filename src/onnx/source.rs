@@ -99,6 +99,13 @@ impl PinnedFile {
     }
 }
 
+impl SourceFile {
+    /// File name without folders.
+    pub(super) fn name(&self) -> &str {
+        self.path.rsplit('/').next().unwrap_or_default()
+    }
+}
+
 impl ModelSource {
     /// Checks the description. Errors name the invalid field.
     pub(super) fn check(&self) -> Result<()> {

@@ -3,15 +3,24 @@
 
 use anyhow::{Context, Result};
 use orator_base::audio::openness::{Openness, OpennessMeter};
+use orator_base::types::sound::SAMPLE_RATE;
 use orator_base::types::time::FrameRate;
 use orator_formats::wav::WavWriter;
 use orator_media::ffmpeg::audio::{StreamedSound, stream_mono};
+use std::ops::Range;
 use std::path::Path;
 
 /// Window of the loudness in seconds; it averages over syllables and short pauses.
 const LOUDNESS_SECS: f64 = 1.0;
 /// Loudness of digital silence, dB.
 const SILENCE_DB: f64 = -120.0;
+/// Samples per level of `loud_ranges`; range of the levels of speech below the loudest ones, and lowest level of speech,
+/// dB; margin around speech, and pauses that are part of it, seconds.
+const LEVEL_SAMPLES: usize = 1_600;
+const SPEECH_RANGE_DB: f32 = 40.0;
+const SOFTEST_DB: f32 = -65.0;
+const MARGIN_SECS: f64 = 0.4;
+const MAX_PAUSE_SECS: f64 = 2.0;
 /// Samples per read.
 const CHUNK_SAMPLES: usize = 1 << 14;
 
@@ -85,6 +94,31 @@ pub fn pieces(path: &Path, n: usize, mut work: impl FnMut(&[f32]) -> Result<()>)
     if piece.is_empty() { Ok(()) } else { work(&piece) }
 }
 
+/// Ranges in seconds of a 16 kHz wav file that may contain speech, by loudness alone: parts as loud as soft speech, each
+/// with a margin; ranges less than 2 s apart are one.
+pub fn loud_ranges(path: &Path) -> Result<Vec<Range<f64>>> {
+    let mut levels = Vec::new();
+    pieces(path, LEVEL_SAMPLES, |piece| {
+        let power = piece.iter().map(|level| level * level).sum::<f32>() / piece.len() as f32;
+        levels.push((10.0 * power.max(1e-12).log10()).max(SILENCE_DB as f32));
+        Ok(())
+    })?;
+    let mut sorted = levels.clone();
+    sorted.sort_by(f32::total_cmp);
+    let loudest = sorted.get(sorted.len() * 95 / 100).copied().unwrap_or_default();
+    let softest = (loudest - SPEECH_RANGE_DB).max(SOFTEST_DB);
+    let secs = |n: usize| (n * LEVEL_SAMPLES) as f64 / f64::from(SAMPLE_RATE);
+    let mut ranges: Vec<Range<f64>> = Vec::new();
+    for at in (0..levels.len()).filter(|at| levels[*at] >= softest) {
+        let (start, end) = (secs(at) - MARGIN_SECS, (secs(at + 1) + MARGIN_SECS).min(secs(levels.len())));
+        match ranges.last_mut().filter(|range| start - range.end < MAX_PAUSE_SECS) {
+            Some(range) => range.end = end,
+            None => ranges.push(start.max(0.0)..end),
+        }
+    }
+    Ok(ranges)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -111,5 +145,22 @@ mod tests {
         assert_eq!(db[99], -120.0);
         assert_eq!(levels(Path::new("no.wav"), FrameRate::new(15, 1), 2).unwrap(), (vec![0.0; 2], vec![-120.0; 2]));
         std::fs::remove_dir_all(path.parent().unwrap()).unwrap();
+    }
+
+    #[test]
+    fn loud_ranges_leave_out_silence() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("speech.wav");
+        // Speech from 5 s to 6 s, and from 7 s to 8 s 30 dB softer; noise of -80 dB elsewhere.
+        let amplitude = |secs: usize| [0.0001, 0.1, 0.003][usize::from(secs == 5) + 2 * usize::from(secs == 7)];
+        let samples = (0..20 * 16_000).map(|n| amplitude(n / 16_000) * (n as f32 * 0.3).sin());
+        let sound = orator_base::types::sound::Sound { rate: 16_000, samples: samples.collect() };
+        orator_formats::wav::write(&path, &sound).unwrap();
+        let found = loud_ranges(&path).unwrap();
+        assert!(found.len() == 1 && (found[0].start - 4.6).abs() < 1e-9, "{found:?}");
+        assert!((found[0].end - 8.4).abs() < 1e-9, "{found:?}");
+        orator_formats::wav::write(&path, &orator_base::types::sound::Sound { samples: vec![0.0; 32_000], ..sound })
+            .unwrap();
+        assert!(loud_ranges(&path).unwrap().is_empty());
     }
 }

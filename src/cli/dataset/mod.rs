@@ -1,6 +1,7 @@
-//! Verbs for datasets: `dataset`, `import`, `forget`, `align`.
+//! Verbs for datasets: `dataset`, `import`, `forget`, `transcribe`.
 
-pub mod align;
+mod aligned_text;
 pub mod forget;
 pub mod import;
+pub mod transcribe;
 pub mod verify;

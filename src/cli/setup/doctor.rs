@@ -3,14 +3,12 @@
 use super::words;
 use crate::cli::Outcome;
 use crate::cli::config_args::ConfigArgs;
-use crate::cli::dataset::align::default_python;
 use crate::cli::sandbox::this_program;
 use crate::cli::ui::Ui;
 use anyhow::Result;
 use orator_base::stage::workdir;
 use orator_dataset::config::{Config, Settings};
 use orator_formats::word_vectors::WordVectors;
-use orator_media::aligner::Aligner;
 use orator_onnx::{ModelStore, Runtime};
 use orator_pipeline::pose2d::models;
 use orator_pipeline::process::probe;
@@ -51,9 +49,9 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
             checks.push(ok("configuration", config.file.display().to_string()));
             checks.extend(model_checks(&config.settings));
             checks.extend(word_checks(&config.settings.models.dir));
+            checks.extend(recogniser(&config.settings));
             checks.push(work(&config.settings.work.dir));
             checks.push(sandbox(config.settings.work.sandbox));
-            checks.push(aligner());
         }
         Err(error) => {
             checks.push(missing(
@@ -101,18 +99,6 @@ fn sandbox(is_enabled: bool) -> Check {
     Check { is_full: is_active, ..ok("sandbox", found) }
 }
 
-/// The word aligner. Only `orator align` needs it, so nothing counts as missing without it.
-fn aligner() -> Check {
-    let python = default_python();
-    match Aligner::version(&python) {
-        Ok(version) => ok("word aligner (English)", format!("pocketsphinx {version} ({})", python.display())),
-        Err(error) => {
-            let found = format!("needed by `orator align` only: {error:#}");
-            Check { is_full: false, ..ok("word aligner (English)", found) }
-        }
-    }
-}
-
 /// ONNX Runtime, and the models that the configuration selects.
 fn model_checks(settings: &Settings) -> Vec<Check> {
     let dir = &settings.models.dir;
@@ -149,6 +135,15 @@ fn model_checks(settings: &Settings) -> Vec<Check> {
         Err(error) => checks.push(missing("speech model", format!("{error:#}"), "orator models fetch")),
     }
     checks
+}
+
+/// The speech recogniser. Only `orator transcribe` needs it, so nothing counts as missing without it.
+fn recogniser(settings: &Settings) -> Option<Check> {
+    let store = ModelStore::open(&settings.models.dir).ok()?;
+    Some(match store.recogniser(settings.transcribe.model_id()) {
+        Ok(folder) => ok("speech recogniser", folder.display().to_string()),
+        Err(error) => Check { is_full: false, ..ok("speech recogniser", format!("none: {error:#}")) },
+    })
 }
 
 /// Tables of word vectors. Without a table, word embeddings are initialised randomly, so nothing counts as missing.

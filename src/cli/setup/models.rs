@@ -1,4 +1,4 @@
-//! `orator models`: lists, fetches, registers and checks ONNX models.
+//! `orator models`: lists, fetches, registers and checks models.
 
 use crate::cli::Outcome;
 use crate::cli::ui::Ui;
@@ -14,7 +14,7 @@ use orator_pipeline::transcribe::TranscribeStage;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 
-/// List, fetch, add and check ONNX models.
+/// List, fetch, add and check models: ONNX, and Whisper for `orator transcribe`.
 #[derive(clap::Args)]
 pub struct Args {
     #[command(subcommand)]
@@ -113,10 +113,14 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
             let runtime = runtime()?;
             let lines = store.entries(ids)?.into_iter().map(|entry| {
                 let required = !ids.is_empty() || chosen.contains(&entry.id);
-                match store.check(&runtime, entry) {
-                    Ok(_) => {
-                        ModelLine::new(entry, "valid", true, "valid: content hash, tensor names and shapes".to_owned())
-                    }
+                let (checked, valid) = if entry.files.is_empty() {
+                    let opened = store.check(&runtime, entry).map(drop);
+                    (opened, "valid: content hash, tensor names and shapes")
+                } else {
+                    (store.check_folder(entry), "valid: content hashes")
+                };
+                match checked {
+                    Ok(()) => ModelLine::new(entry, "valid", true, valid.to_owned()),
                     Err(ModelError::Missing { .. }) if !required => ModelLine {
                         is_failure: false,
                         ..ModelLine::new(entry, "valid", false, "missing (not selected)".to_owned())
@@ -243,7 +247,7 @@ fn list(store: &ModelStore, chosen: &[String], ui: &Ui) -> Result<Outcome> {
         let ModelOrigin { repository, commit, path, licence, note } = &entry.origin;
         let role = format!("{:?}", entry.role).to_lowercase();
         text += &format!(
-            "\n{mark} {:<26} {role:<7} {state:<13} {:5.1} MB  {}\n",
+            "\n{mark} {:<26} {role:<10} {state:<13} {:5.1} MB  {}\n",
             entry.id,
             entry.bytes as f64 / 1e6,
             entry.file
