@@ -1,0 +1,166 @@
+//! Tokens that may follow the tokens decoded so far: symbols that are not spoken are suppressed, and timestamps come in
+//! pairs and do not decrease.
+
+use crate::tokenizer::Tokenizer;
+use std::collections::BTreeSet;
+
+/// Symbols that annotate text instead of being spoken.
+const SYMBOLS: &str = "\" # ( ) * + / : ; < = > @ [ \\ ] ^ _ ` { | } ~ \u{300c} \u{300d} \u{300e} \u{300f} << >> <<< >>> \
+    -- --- -( -[ (' (\" (( )) ((( ))) [[ ]] {{ }} \u{266a}\u{266a} \u{266a}\u{266a}\u{266a}";
+/// Musical symbols; of several tokens, the first is suppressed.
+const MUSIC: &str = "\u{2669} \u{266a} \u{266b} \u{266c} \u{266d} \u{266e} \u{266f}";
+/// Largest first timestamp, in steps of 20 ms.
+const MAX_INITIAL_TIMESTAMP: usize = 50;
+/// Logit in place of infinity.
+const MAX_LOGIT: f32 = 1e30;
+
+/// Suppressed tokens and the order of timestamps.
+pub(crate) struct LogitRules {
+    suppressed: Vec<usize>,
+    eot: usize,
+    timestamp_begin: usize,
+}
+
+impl LogitRules {
+    pub(crate) fn new(tokenizer: &Tokenizer) -> Self {
+        let mut suppressed = BTreeSet::new();
+        // Hyphens and apostrophes occur within words, but do not start them.
+        for (symbols, is_first_enough) in [(" -  '", true), (MUSIC, true), (SYMBOLS, false)] {
+            for symbol in symbols.split(' ').filter(|symbol| !symbol.is_empty()) {
+                let is_word_start = ["-", "'"].contains(&symbol);
+                for text in [symbol.to_owned(), format!(" {symbol}")].iter().skip(usize::from(is_word_start)) {
+                    let tokens = tokenizer.encode(text);
+                    suppressed.extend(tokens.first().filter(|_| is_first_enough || tokens.len() == 1).copied());
+                }
+            }
+        }
+        // All special tokens but the end and the timestamps.
+        suppressed.extend(tokenizer.eot() + 1..tokenizer.timestamp_begin());
+        Self {
+            suppressed: suppressed.into_iter().map(|token| token as usize).collect(),
+            eot: tokenizer.eot() as usize,
+            timestamp_begin: tokenizer.timestamp_begin() as usize,
+        }
+    }
+
+    pub(crate) fn eot(&self) -> u32 {
+        self.eot as u32
+    }
+
+    fn is_time(&self, token: u32) -> bool {
+        token as usize >= self.timestamp_begin
+    }
+
+    /// Turns the logits of the token after `sampled`, the tokens of the window so far, into natural logarithms of
+    /// probabilities; they are negative infinity for tokens that must not follow. At least one token is possible.
+    pub(crate) fn log_probs(&self, logits: &mut [f32], sampled: &[u32]) {
+        for logit in &mut *logits {
+            *logit = if logit.is_nan() { f32::NEG_INFINITY } else { logit.min(MAX_LOGIT) };
+        }
+        for &token in &self.suppressed {
+            forbid(logits, token, token + 1);
+        }
+        let begin = self.timestamp_begin.min(logits.len());
+        let is_time = |nth_last: usize| sampled.iter().rev().nth(nth_last).map(|&token| self.is_time(token));
+        match (is_time(0), is_time(1)) {
+            (None, _) => {
+                forbid(logits, 0, begin);
+                forbid(logits, begin + MAX_INITIAL_TIMESTAMP + 1, usize::MAX);
+            }
+            (Some(true), Some(false)) => forbid(logits, 0, self.eot),
+            (Some(true), _) => forbid(logits, begin, usize::MAX),
+            (Some(false), _) => {}
+        }
+        if let Some(&latest) = sampled.iter().rev().find(|&&token| self.is_time(token)) {
+            // The second timestamp of a pair may equal the first; segments have a length.
+            let is_second = is_time(0) == Some(true) && is_time(1) == Some(false);
+            forbid(logits, begin, latest as usize + usize::from(!is_second));
+        }
+        let max = |logits: &[f32]| logits.iter().copied().fold(f32::NEG_INFINITY, f32::max);
+        let [max_text, max_time] = [max(&logits[..begin]), max(&logits[begin..])];
+        let top = max_text.max(max_time);
+        if top == f32::NEG_INFINITY {
+            if let Some(end) = logits.get_mut(self.eot) {
+                *end = 0.0;
+            }
+            return;
+        }
+        let sum = |logits: &[f32]| logits.iter().map(|&logit| f64::from((logit - top).exp())).sum::<f64>();
+        let [text, time] = [sum(&logits[..begin]), sum(&logits[begin..])];
+        // A timestamp follows if the timestamps together are more probable than any other token.
+        let is_time = !sampled.is_empty() && time > f64::from((max_text - top).exp());
+        if is_time {
+            forbid(logits, 0, begin);
+        }
+        let norm = top + (if is_time { time } else { text + time }).ln() as f32;
+        logits.iter_mut().for_each(|logit| *logit -= norm);
+    }
+}
+
+fn forbid(logits: &mut [f32], from: usize, to: usize) {
+    let to = to.min(logits.len());
+    if from < to {
+        logits[from..to].fill(f32::NEG_INFINITY);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::tokenizer::tests::byte_tokenizer;
+
+    /// Tokens that may follow `sampled` if the network prefers none.
+    fn possible(sampled: &[u32]) -> Vec<u32> {
+        let tokenizer = byte_tokenizer();
+        let mut logits = vec![0.0; tokenizer.timestamp_begin() as usize + 1501];
+        // The timestamps together are less probable than a text token.
+        logits[tokenizer.timestamp_begin() as usize..].fill(-9.0);
+        LogitRules::new(&tokenizer).log_probs(&mut logits, sampled);
+        let sum: f32 = logits.iter().map(|logit| logit.exp()).sum();
+        assert!((sum - 1.0).abs() < 1e-4, "{sum}");
+        (0..logits.len() as u32).filter(|&token| logits[token as usize].is_finite()).collect()
+    }
+
+    #[test]
+    fn timestamps_come_in_pairs_and_do_not_decrease() {
+        let tokenizer = byte_tokenizer();
+        let (at, eot, letter) = (|n: u32| tokenizer.timestamp_begin() + n, tokenizer.eot(), u32::from(b'a'));
+        assert_eq!(possible(&[]), (at(0)..=at(50)).collect::<Vec<_>>());
+        let is_text = |tokens: &[u32]| tokens.contains(&letter) && tokens.iter().all(|&token| token <= eot);
+        assert!(is_text(&possible(&[at(3)])) && is_text(&possible(&[at(3), letter, at(9), at(9)])));
+        let ends = possible(&[at(3), letter, at(9)]);
+        assert_eq!(ends, [eot].into_iter().chain(at(9)..=at(1500)).collect::<Vec<_>>());
+        let after_text = possible(&[at(3), letter]);
+        assert!(after_text.contains(&letter) && !after_text.contains(&at(3)) && after_text.contains(&at(4)));
+        // Symbols and special tokens never follow; a hyphen may, unless it starts a word.
+        let forbidden = [u32::from(b'('), u32::from(b'['), tokenizer.sot(), tokenizer.no_timestamps(), tokenizer.no_speech()];
+        assert!(forbidden.iter().all(|token| !after_text.contains(token)), "{after_text:?}");
+        assert!([b'-', b'\'', b'.', b'?'].iter().all(|&byte| after_text.contains(&u32::from(byte))));
+    }
+
+    #[test]
+    fn likely_timestamps_exclude_text() {
+        let tokenizer = byte_tokenizer();
+        let begin = tokenizer.timestamp_begin() as usize;
+        let mut logits = vec![0.0; begin + 1501];
+        LogitRules::new(&tokenizer).log_probs(&mut logits, &[begin as u32, u32::from(b'a')]);
+        assert!(logits[..begin].iter().all(|logit| !logit.is_finite()));
+        assert!((logits[begin + 1] - (1.0f32 / 1500.0).ln()).abs() < 1e-4);
+    }
+
+    #[test]
+    fn a_token_follows_any_logits() {
+        let tokenizer = byte_tokenizer();
+        let (rules, begin) = (LogitRules::new(&tokenizer), tokenizer.timestamp_begin());
+        for value in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, f32::MAX, f32::MIN] {
+            for sampled in [vec![], vec![begin + 1500], vec![begin, 97], vec![begin, 97, begin + 1500], vec![u32::MAX, 97]] {
+                for n in [0, 5, begin as usize, begin as usize + 1501] {
+                    let mut logits = vec![value; n];
+                    rules.log_probs(&mut logits, &sampled);
+                    assert!(logits.iter().all(|logit| !logit.is_nan() && *logit <= 1e-6));
+                    assert!(n < begin as usize || logits.iter().any(|logit| logit.is_finite()), "{value} {sampled:?}");
+                }
+            }
+        }
+    }
+}
