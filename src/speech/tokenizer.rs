@@ -41,7 +41,8 @@ impl Tokenizer {
         let [translate, transcribe] = [special(&["<|translate|>"])?, special(&["<|transcribe|>"])?];
         let no_speech = special(&["<|nospeech|>", "<|nocaptions|>"])?;
         let no_timestamps = special(&["<|notimestamps|>"])?;
-        let is_ordered = eot < sot && sot < translate && [translate, transcribe, no_speech].iter().max() < Some(&no_timestamps);
+        let is_ordered =
+            eot < sot && sot < translate && [translate, transcribe, no_speech].iter().max() < Some(&no_timestamps);
         ensure!(is_ordered, "expected the special tokens in the order of Whisper, <|notimestamps|> last");
         let mut bytes = vec![Vec::new(); eot as usize];
         for (text, id) in encoder.get_vocab(false) {
@@ -168,7 +169,8 @@ pub(crate) mod tests {
             json!({ "id": vocab.len() + nth, "content": format!("<|{name}|>"), "special": true, "single_word": false,
                     "lstrip": false, "rstrip": false, "normalized": false })
         });
-        let byte_level = json!({ "type": "ByteLevel", "add_prefix_space": false, "trim_offsets": true, "use_regex": true });
+        let byte_level =
+            json!({ "type": "ByteLevel", "add_prefix_space": false, "trim_offsets": true, "use_regex": true });
         let added: Vec<_> = added.collect();
         let json = json!({
             "version": "1.0", "added_tokens": added, "pre_tokenizer": byte_level, "decoder": byte_level,
@@ -180,7 +182,13 @@ pub(crate) mod tests {
     #[test]
     fn texts_of_all_scripts_survive_encoding() {
         let tokenizer = byte_tokenizer();
-        for text in ["", " the other", "na\u{ef}ve \u{1f600}\u{1f468}\u{200d}\u{1f469}", "\u{65e5}\u{672c}\u{8a9e}", "<|en|>\0\u{ad}"] {
+        for text in [
+            "",
+            " the other",
+            "na\u{ef}ve \u{1f600}\u{1f468}\u{200d}\u{1f469}",
+            "\u{65e5}\u{672c}\u{8a9e}",
+            "<|en|>\0\u{ad}",
+        ] {
             let tokens = tokenizer.encode(text);
             assert!(tokens.iter().all(|&token| token < tokenizer.eot()), "{text:?}: {tokens:?}");
             assert_eq!(tokenizer.decode(&tokens), text);
@@ -199,7 +207,10 @@ pub(crate) mod tests {
     fn special_tokens_are_found_by_name() {
         let tokenizer = byte_tokenizer();
         assert_eq!([tokenizer.eot(), tokenizer.sot(), tokenizer.timestamp_begin()], [259, 260, 270]);
-        assert_eq!([tokenizer.language("de"), tokenizer.language("xx"), tokenizer.language("transcribe")], [Some(262), None, None]);
+        assert_eq!(
+            [tokenizer.language("de"), tokenizer.language("xx"), tokenizer.language("transcribe")],
+            [Some(262), None, None]
+        );
         assert_eq!((tokenizer.language_code(263).as_str(), tokenizer.language_tokens()), ("ja", 261..264));
         let error = Tokenizer::open(Path::new("/nowhere")).err().unwrap();
         assert!(format!("{error:#}").contains("/nowhere/tokenizer.json"), "{error:#}");

@@ -52,7 +52,8 @@ impl TokenTimes {
         let logits = attention.logits.view();
         let first_row = n_prompt.saturating_sub(1);
         let probabilities = text.iter().enumerate();
-        let probabilities = probabilities.map(|(nth, &token)| probability(logits, first_row + nth, token, eot)).collect();
+        let probabilities =
+            probabilities.map(|(nth, &token)| probability(logits, first_row + nth, token, eot)).collect();
         Self { frames, probabilities }
     }
 
@@ -122,7 +123,11 @@ mod tests {
         let attention = TokenAttention { weights, logits };
         let times = TokenTimes::new(&attention, 2, &[41, 42, 250], 100, 259);
         assert_eq!(times.frames.len(), 4);
-        assert!(times.frames.iter().zip(starts).all(|(&frame, start)| frame.abs_diff(start) <= 1), "{:?}", times.frames);
+        assert!(
+            times.frames.iter().zip(starts).all(|(&frame, start)| frame.abs_diff(start) <= 1),
+            "{:?}",
+            times.frames
+        );
         let likely = 3f32.exp() / (258.0 + 3f32.exp());
         assert!((times.probabilities[0] - likely).abs() < 1e-5 && times.probabilities[2] < 0.01);
         assert!((times.mean_probability(0..2) - likely).abs() < 1e-5);

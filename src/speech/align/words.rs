@@ -1,28 +1,17 @@
 //! Words of tokens and their times.
 
 use super::token_times::{FRAME_SECS, TokenTimes};
+use crate::recognised::{RecognisedSegment, RecognisedWord};
 use crate::tokenizer::Tokenizer;
 
 /// Languages that are written without spaces between words; each character is a word.
-const WITHOUT_SPACES: [&str; 6] = ["zh", "ja", "th", "lo", "my", "yue"];
+pub(crate) const WITHOUT_SPACES: [&str; 6] = ["zh", "ja", "th", "lo", "my", "yue"];
 /// Marks that end a sentence.
 const SENTENCE_ENDS: [char; 6] = ['.', '\u{3002}', '!', '\u{ff01}', '?', '\u{ff1f}'];
 /// Median length of words, at most, seconds.
 const MAX_MEDIAN_SECS: f64 = 0.7;
 /// Difference of a word's time from that of its segment, from which the segment's is preferred, seconds.
 const SEGMENT_SECS: f64 = 0.5;
-
-/// A recognised or aligned word.
-#[derive(Clone, Debug, PartialEq)]
-pub struct RecognisedWord {
-    /// The word with its punctuation, without spaces around it.
-    pub word: String,
-    /// Seconds from the start of the sound.
-    pub start_secs: f64,
-    pub end_secs: f64,
-    /// Mean probability of its tokens, 0..1.
-    pub probability: f32,
-}
 
 /// Words of tokens whose first is number `first` of `times`, in seconds of the window. A word extends over its tokens
 /// with letters or digits, so that pauses at its punctuation are no part of it; without any, it is left out.
@@ -56,35 +45,35 @@ pub(crate) fn words_of(
     timed.collect()
 }
 
-/// Shortens words that contain a pause: the first word after a sentence, and the words at the ends of segments
-/// (start, end, words), whose timestamps are more reliable there. `last_secs` is the end of the speech before.
-pub(crate) fn shorten_long_words(segments: &mut [(f64, f64, Vec<RecognisedWord>)], mut last_secs: f64) {
-    let lengths = segments.iter().flat_map(|(_, _, words)| words).map(|word| word.end_secs - word.start_secs);
+/// Shortens words that contain a pause: the first word after a sentence, and the words at the ends of segments, whose
+/// timestamps are more reliable there; other segments end with their words. `last_secs` is the end of the speech before.
+pub(crate) fn shorten_long_words(segments: &mut [RecognisedSegment], mut last_secs: f64) {
+    let lengths = segments.iter().flat_map(|segment| &segment.words).map(RecognisedWord::secs);
     let mut lengths: Vec<f64> = lengths.filter(|&secs| secs > 0.0).collect();
     lengths.sort_unstable_by(f64::total_cmp);
     let middle = |nth: usize| lengths.get(nth).copied().unwrap_or(0.0);
     let median = ((middle(lengths.len() / 2) + middle(lengths.len().saturating_sub(1) / 2)) / 2.0).min(MAX_MEDIAN_SECS);
     let max = 2.0 * median;
     let mut is_after_end = false;
-    for word in segments.iter_mut().flat_map(|(_, _, words)| words) {
-        if is_after_end && word.end_secs - word.start_secs > max {
+    for word in segments.iter_mut().flat_map(|segment| &mut segment.words) {
+        if is_after_end && word.secs() > max {
             word.start_secs = word.end_secs - max;
         }
         is_after_end = word.word.ends_with(SENTENCE_ENDS);
     }
-    for (start_secs, end_secs, words) in segments {
-        let second = words.get(1).map(|word| (word.start_secs, word.end_secs));
+    for RecognisedSegment { start_secs, end_secs, words, .. } in segments {
+        let second = words.get(1).cloned();
         let Some(first) = words.first_mut() else { continue };
-        let is_long = first.end_secs - first.start_secs > max
-            || second.is_some_and(|(_, end)| end - first.start_secs > 2.0 * max);
-        if first.end_secs - last_secs > 4.0 * median && is_long {
-            if let Some((_, end)) = second.filter(|(start, end)| end - start > max) {
-                first.end_secs = (end / 2.0).max(end - max);
-                let boundary = first.end_secs;
-                first.start_secs = (boundary - max).max(0.0);
+        let is_pair_long = second.as_ref().is_some_and(|second| second.end_secs - first.start_secs > 2.0 * max);
+        if first.end_secs - last_secs > 4.0 * median && (first.secs() > max || is_pair_long) {
+            let long_second = second.filter(|second| second.secs() > max);
+            if let Some(second) = &long_second {
+                first.end_secs = second.end_secs - max;
+            }
+            first.start_secs = (first.end_secs - max).max(0.0);
+            let boundary = first.end_secs;
+            if long_second.is_some() {
                 words[1].start_secs = boundary;
-            } else {
-                first.start_secs = (first.end_secs - max).max(0.0);
             }
         }
         let first = &mut words[0];
@@ -111,15 +100,21 @@ mod tests {
     fn words(text: &str, language: &str) -> Vec<(String, f64, f64)> {
         let tokenizer = byte_tokenizer();
         let tokens = tokenizer.encode(text);
-        let times = TokenTimes { frames: (0..=tokens.len()).map(|n| 50 * n).collect(), probabilities: vec![0.5; tokens.len()] };
+        let times =
+            TokenTimes { frames: (0..=tokens.len()).map(|n| 50 * n).collect(), probabilities: vec![0.5; tokens.len()] };
         let words = words_of(&tokenizer, language, &tokens, &times, 0);
         words.into_iter().map(|word| (word.word, word.start_secs, word.end_secs)).collect()
     }
 
     #[test]
     fn words_are_split_at_spaces_and_exclude_punctuation_from_their_times() {
-        let expect = |words: &[(&str, f64, f64)]| words.iter().map(|&(word, from, to)| (word.to_owned(), from, to)).collect::<Vec<_>>();
-        assert_eq!(words("(a) b-c' \u{2013} d?!", "en"), expect(&[("(a)", 1.0, 2.0), ("b-c'", 4.0, 7.0), ("d?!", 13.0, 14.0)]));
+        let expect = |words: &[(&str, f64, f64)]| {
+            words.iter().map(|&(word, from, to)| (word.to_owned(), from, to)).collect::<Vec<_>>()
+        };
+        assert_eq!(
+            words("(a) b-c' \u{2013} d?!", "en"),
+            expect(&[("(a)", 1.0, 2.0), ("b-c'", 4.0, 7.0), ("d?!", 13.0, 14.0)])
+        );
         // A character of three tokens; each is a word, and the stop belongs to the last.
         let expected = expect(&[("\u{65e5}", 0.0, 3.0), ("\u{672c}\u{3002}", 3.0, 6.0)]);
         assert_eq!(words("\u{65e5}\u{672c}\u{3002}", "ja"), expected);
@@ -129,15 +124,23 @@ mod tests {
 
     #[test]
     fn words_that_contain_a_pause_are_shortened() {
-        let word = |word: &str, start_secs, end_secs| RecognisedWord { word: word.to_owned(), start_secs, end_secs, probability: 1.0 };
+        let word = |word: &str, start_secs, end_secs| RecognisedWord {
+            word: word.to_owned(),
+            start_secs,
+            end_secs,
+            probability: 1.0,
+        };
         let first = vec![word("so", 0.0, 3.0), word("it", 3.0, 3.2), word("ends.", 3.2, 3.5)];
         let second = vec![word("Then", 3.5, 6.0), word("on", 6.0, 6.3), word("it", 6.3, 6.6), word("goes", 6.6, 9.0)];
-        let mut segments = [(2.6, 3.5, first), (3.5, 7.0, second)];
+        let segment =
+            |start_secs, end_secs, words| RecognisedSegment { start_secs, end_secs, text: String::new(), words };
+        let mut segments = [segment(2.6, 3.5, first), segment(3.5, 7.0, second), segment(7.0, 8.0, Vec::new())];
         shorten_long_words(&mut segments, 0.0);
-        let times: Vec<_> = segments.iter().flat_map(|(_, _, words)| words).map(|word| (word.start_secs, word.end_secs)).collect();
+        let words = segments.iter().flat_map(|segment| &segment.words);
+        let times: Vec<_> = words.map(|word| (word.start_secs, word.end_secs)).collect();
         let expected = [(2.4, 3.0), (3.0, 3.2), (3.2, 3.5), (5.4, 6.0), (6.0, 6.3), (6.3, 6.6), (6.6, 7.0)];
-        assert!(times.iter().zip(expected).all(|(a, b)| (a.0 - b.0).abs() < 1e-9 && (a.1 - b.1).abs() < 1e-9), "{times:?}");
-        assert!((segments[1].0 - 5.4).abs() < 1e-9 && segments[1].1 == 7.0);
-        shorten_long_words(&mut [(0.0, 1.0, Vec::new())], 0.0);
+        let is_near = |(a, b): (&(f64, f64), (f64, f64))| (a.0 - b.0).abs() < 1e-9 && (a.1 - b.1).abs() < 1e-9;
+        assert!(times.iter().zip(expected).all(is_near), "{times:?}");
+        assert!((segments[1].start_secs - 5.4).abs() < 1e-9 && segments[1].end_secs == 7.0);
     }
 }

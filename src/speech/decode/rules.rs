@@ -2,13 +2,7 @@
 //! pairs and do not decrease.
 
 use crate::tokenizer::Tokenizer;
-use std::collections::BTreeSet;
 
-/// Symbols that annotate text instead of being spoken.
-const SYMBOLS: &str = "\" # ( ) * + / : ; < = > @ [ \\ ] ^ _ ` { | } ~ \u{300c} \u{300d} \u{300e} \u{300f} << >> <<< >>> \
-    -- --- -( -[ (' (\" (( )) ((( ))) [[ ]] {{ }} \u{266a}\u{266a} \u{266a}\u{266a}\u{266a}";
-/// Musical symbols; of several tokens, the first is suppressed.
-const MUSIC: &str = "\u{2669} \u{266a} \u{266b} \u{266c} \u{266d} \u{266e} \u{266f}";
 /// Largest first timestamp, in steps of 20 ms.
 const MAX_INITIAL_TIMESTAMP: usize = 50;
 /// Logit in place of infinity.
@@ -22,22 +16,12 @@ pub(crate) struct LogitRules {
 }
 
 impl LogitRules {
-    pub(crate) fn new(tokenizer: &Tokenizer) -> Self {
-        let mut suppressed = BTreeSet::new();
-        // Hyphens and apostrophes occur within words, but do not start them.
-        for (symbols, is_first_enough) in [(" -  '", true), (MUSIC, true), (SYMBOLS, false)] {
-            for symbol in symbols.split(' ').filter(|symbol| !symbol.is_empty()) {
-                let is_word_start = ["-", "'"].contains(&symbol);
-                for text in [symbol.to_owned(), format!(" {symbol}")].iter().skip(usize::from(is_word_start)) {
-                    let tokens = tokenizer.encode(text);
-                    suppressed.extend(tokens.first().filter(|_| is_first_enough || tokens.len() == 1).copied());
-                }
-            }
-        }
-        // All special tokens but the end and the timestamps.
-        suppressed.extend(tokenizer.eot() + 1..tokenizer.timestamp_begin());
+    /// `suppressed` are tokens of symbols that are not spoken; special tokens are suppressed, too.
+    pub(crate) fn new(tokenizer: &Tokenizer, suppressed: &[u32]) -> Self {
+        let special = tokenizer.eot() + 1..tokenizer.timestamp_begin();
+        let suppressed = suppressed.iter().copied().filter(|&token| token < tokenizer.eot()).chain(special);
         Self {
-            suppressed: suppressed.into_iter().map(|token| token as usize).collect(),
+            suppressed: suppressed.map(|token| token as usize).collect(),
             eot: tokenizer.eot() as usize,
             timestamp_begin: tokenizer.timestamp_begin() as usize,
         }
@@ -115,7 +99,7 @@ mod tests {
         let mut logits = vec![0.0; tokenizer.timestamp_begin() as usize + 1501];
         // The timestamps together are less probable than a text token.
         logits[tokenizer.timestamp_begin() as usize..].fill(-9.0);
-        LogitRules::new(&tokenizer).log_probs(&mut logits, sampled);
+        LogitRules::new(&tokenizer, &[40, 91]).log_probs(&mut logits, sampled);
         let sum: f32 = logits.iter().map(|logit| logit.exp()).sum();
         assert!((sum - 1.0).abs() < 1e-4, "{sum}");
         (0..logits.len() as u32).filter(|&token| logits[token as usize].is_finite()).collect()
@@ -132,10 +116,8 @@ mod tests {
         assert_eq!(ends, [eot].into_iter().chain(at(9)..=at(1500)).collect::<Vec<_>>());
         let after_text = possible(&[at(3), letter]);
         assert!(after_text.contains(&letter) && !after_text.contains(&at(3)) && after_text.contains(&at(4)));
-        // Symbols and special tokens never follow; a hyphen may, unless it starts a word.
-        let forbidden = [u32::from(b'('), u32::from(b'['), tokenizer.sot(), tokenizer.no_timestamps(), tokenizer.no_speech()];
+        let forbidden = [40, 91, tokenizer.sot(), tokenizer.no_timestamps(), tokenizer.no_speech()];
         assert!(forbidden.iter().all(|token| !after_text.contains(token)), "{after_text:?}");
-        assert!([b'-', b'\'', b'.', b'?'].iter().all(|&byte| after_text.contains(&u32::from(byte))));
     }
 
     #[test]
@@ -143,7 +125,7 @@ mod tests {
         let tokenizer = byte_tokenizer();
         let begin = tokenizer.timestamp_begin() as usize;
         let mut logits = vec![0.0; begin + 1501];
-        LogitRules::new(&tokenizer).log_probs(&mut logits, &[begin as u32, u32::from(b'a')]);
+        LogitRules::new(&tokenizer, &[40, 91]).log_probs(&mut logits, &[begin as u32, u32::from(b'a')]);
         assert!(logits[..begin].iter().all(|logit| !logit.is_finite()));
         assert!((logits[begin + 1] - (1.0f32 / 1500.0).ln()).abs() < 1e-4);
     }
@@ -151,9 +133,11 @@ mod tests {
     #[test]
     fn a_token_follows_any_logits() {
         let tokenizer = byte_tokenizer();
-        let (rules, begin) = (LogitRules::new(&tokenizer), tokenizer.timestamp_begin());
+        let (rules, begin) = (LogitRules::new(&tokenizer, &[40, 91]), tokenizer.timestamp_begin());
         for value in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, f32::MAX, f32::MIN] {
-            for sampled in [vec![], vec![begin + 1500], vec![begin, 97], vec![begin, 97, begin + 1500], vec![u32::MAX, 97]] {
+            for sampled in
+                [vec![], vec![begin + 1500], vec![begin, 97], vec![begin, 97, begin + 1500], vec![u32::MAX, 97]]
+            {
                 for n in [0, 5, begin as usize, begin as usize + 1501] {
                     let mut logits = vec![value; n];
                     rules.log_probs(&mut logits, &sampled);

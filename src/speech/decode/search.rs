@@ -67,7 +67,8 @@ pub(crate) fn beam_search(
             let mut row = row.to_vec();
             rules.log_probs(&mut row, &hypothesis.tokens);
             let top = top(&row, 2 * beam);
-            candidates.extend(top.into_iter().map(|(log_prob, token)| (hypothesis.sum_log_prob + log_prob, from, token)));
+            candidates
+                .extend(top.into_iter().map(|(log_prob, token)| (hypothesis.sum_log_prob + log_prob, from, token)));
         }
         candidates.sort_by(|a, b| b.0.total_cmp(&a.0));
         candidates.truncate(2 * beam);
@@ -193,7 +194,7 @@ pub(crate) mod tests {
     /// Network of a vocabulary of bytes in which `next` gives the probabilities of few tokens after a text.
     fn network(next: impl Fn(&str) -> Vec<(char, f32)>) -> (LogitRules, Scripted<impl Fn(&[u32]) -> Vec<f32>>) {
         let tokenizer = byte_tokenizer();
-        let rules = LogitRules::new(&tokenizer);
+        let rules = LogitRules::new(&tokenizer, &[]);
         let model = Scripted::new(move |tokens: &[u32]| {
             let mut logits = vec![f32::NEG_INFINITY; tokenizer.timestamp_begin() as usize + 1501];
             if tokens.len() == 1 {
@@ -258,7 +259,7 @@ pub(crate) mod tests {
     fn searches_end_on_any_logits() {
         for value in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, 0.0] {
             let model = || Scripted::new(|_: &[u32]| vec![value; byte_tokenizer().timestamp_begin() as usize + 1501]);
-            let rules = LogitRules::new(&byte_tokenizer());
+            let rules = LogitRules::new(&byte_tokenizer(), &[]);
             let mut searched = model();
             let logits = first(&mut searched);
             let found = beam_search(&mut searched, logits, &rules, 5, 30).unwrap();

@@ -104,7 +104,13 @@ impl WindowDecoder<'_> {
         let rank = |window: &DecodedWindow| (window.is_repetitive(), -window.mean_log_prob);
         let last = rejected.last().map_or(0.0, |window| window.temperature);
         let chosen = rejected.into_iter().reduce(|best, other| if rank(&other) < rank(&best) { other } else { best });
-        let empty = || DecodedWindow { tokens: vec![], mean_log_prob: 0.0, no_speech: 1.0, compression: 0.0, temperature: last };
+        let empty = || DecodedWindow {
+            tokens: vec![],
+            mean_log_prob: 0.0,
+            no_speech: 1.0,
+            compression: 0.0,
+            temperature: last,
+        };
         Ok(DecodedWindow { temperature: last, ..chosen.unwrap_or_else(empty) })
     }
 }
@@ -131,9 +137,10 @@ mod tests {
     /// Decodes with networks that write these texts, one for each search, with a logit for no speech.
     fn decode(texts: &[&str], no_speech: f32, previous: &[u32]) -> (DecodedWindow, Vec<Vec<u32>>) {
         let (tokenizer, prompts) = (byte_tokenizer(), RefCell::new(Vec::new()));
-        let rules = LogitRules::new(&tokenizer);
+        let rules = LogitRules::new(&tokenizer, &[]);
         let request = [tokenizer.sot(), tokenizer.transcribe()];
-        let decoder = WindowDecoder { tokenizer: &tokenizer, rules: &rules, request: &request, max_tokens: 448, beam: 2 };
+        let decoder =
+            WindowDecoder { tokenizer: &tokenizer, rules: &rules, request: &request, max_tokens: 448, beam: 2 };
         let begin = tokenizer.timestamp_begin();
         let mut nth = 0;
         let start = || {
