@@ -60,3 +60,66 @@ fn mel_of(hz: f64) -> f64 {
 fn hz_of(mel: f64) -> f64 {
     if mel < 15.0 { mel * 200.0 / 3.0 } else { 1000.0 * ((mel - 15.0) * 6.4f64.ln() / 27.0).exp() }
 }
+
+#[cfg(test)]
+pub(crate) mod tests {
+    use super::*;
+
+    /// Contents of `whisper_golden.json`.
+    #[derive(serde::Deserialize)]
+    pub(crate) struct Golden {
+        bands: Vec<(usize, Vec<f32>)>,
+        mel: Vec<(usize, Vec<f32>)>,
+        pub(crate) small: NetworkGolden,
+    }
+
+    #[derive(serde::Deserialize)]
+    pub(crate) struct NetworkGolden {
+        pub(crate) tokens: Vec<u32>,
+        pub(crate) encoded: Vec<f32>,
+        pub(crate) logits: Vec<f32>,
+        pub(crate) scores: Vec<f32>,
+    }
+
+    pub(crate) fn golden() -> anyhow::Result<Golden> {
+        Ok(serde_json::from_str(include_str!("../../fixtures/reference/whisper_golden.json"))?)
+    }
+
+    /// Sound of `fixtures/reference/whisper_reference.py`: a rising tone, a steady tone, and a hash as noise.
+    pub(crate) fn signal(n: usize) -> Vec<f32> {
+        let tau = std::f64::consts::TAU;
+        let value = |i: usize| {
+            let t = i as f64 / 16_000.0;
+            let noise = ((i * 7919) % 1009) as f64 / 1009.0 - 0.5;
+            0.4 * (tau * (200.0 + 700.0 * t) * t).sin() + 0.2 * (tau * 440.0 * t).sin() + 0.05 * noise
+        };
+        (0..n).map(|i| value(i) as f32).collect()
+    }
+
+    #[test]
+    fn bands_and_spectrogram_equal_those_of_openai() -> anyhow::Result<()> {
+        let golden = golden()?;
+        for (i, ((first, weights), band)) in golden.bands.iter().zip(BANDS.iter()).enumerate() {
+            assert_eq!((band.first, band.weights.len()), (*first, weights.len()), "band {i}");
+            for (found, expected) in band.weights.iter().zip(weights) {
+                assert!((found - expected).abs() < 1e-8, "band {i}: {found}, expected {expected}");
+            }
+        }
+        let mels = log_mel(&signal(67_267));
+        assert_eq!((mels.dim(), golden.bands.len()), ((80, 3000), 80));
+        for (frame, expected) in golden.mel {
+            let worst = mels.column(frame).iter().zip(&expected).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
+            assert!(worst < 1e-4, "frame {frame}: {worst}");
+        }
+        Ok(())
+    }
+
+    #[test]
+    fn sounds_of_any_length_have_3000_frames() {
+        for n in [0, 1, 399, 480_000, 500_000] {
+            let mels = log_mel(&vec![0.5; n]);
+            assert!(mels.dim() == (80, 3000) && mels.iter().all(|v| v.is_finite()), "{n} samples");
+        }
+        assert_eq!(log_mel(&signal(480_160)), log_mel(&signal(480_000)));
+    }
+}

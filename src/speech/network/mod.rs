@@ -4,6 +4,8 @@ mod config;
 mod decoder;
 mod encoder;
 mod layers;
+#[cfg(test)]
+mod tests;
 mod weight_file;
 mod whisper;
 

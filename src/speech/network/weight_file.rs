@@ -170,12 +170,17 @@ impl WeightFile {
         if self.is_ctranslate2 {
             return vec![name.to_owned()];
         }
-        let replace = |name: String, (from, to): &(&str, &str)| name.replace(from, to);
-        let name = TRANSFORMERS_NAMES.iter().fold(name.to_owned(), replace).replace('/', ".");
-        match name.split_once('[').and_then(|(before, rest)| Some((before, rest.split_once(']')?))) {
-            Some((before, (parts, after))) => parts.split('|').map(|part| format!("{before}{part}{after}")).collect(),
-            None => vec![name],
-        }
+        transformers_names(name)
+    }
+}
+
+/// Names of the tensors of transformers that are the parts of a variable, in their order.
+pub(super) fn transformers_names(name: &str) -> Vec<String> {
+    let replace = |name: String, (from, to): &(&str, &str)| name.replace(from, to);
+    let name = TRANSFORMERS_NAMES.iter().fold(name.to_owned(), replace).replace('/', ".");
+    match name.split_once('[').and_then(|(before, rest)| Some((before, rest.split_once(']')?))) {
+        Some((before, (parts, after))) => parts.split('|').map(|part| format!("{before}{part}{after}")).collect(),
+        None => vec![name],
     }
 }
 
