@@ -16,6 +16,7 @@
 //! | `orator-media` | FFmpeg, OpenCV, the sandbox |
 //! | `orator-onnx` | ONNX Runtime, the model store, model conversion |
 //! | `orator-nn` | operators with their kernels, and the networks (candle) |
+//! | `orator-speech` | speech recognition and word times (Whisper) |
 //! | `orator-avatar` | rigs, retargeting, export, the software renderer |
 //! | `orator-dataset` | `pipeline.toml`, and the dataset on disk: write, read, verify, import, forget |
 //! | `orator-pipeline` | the six stages, their order, and their processes |

@@ -41,6 +41,13 @@ impl<T: Scalar> PackedMatrix<T> {
         self.width
     }
 
+    /// Value of the matrix at this row and column.
+    pub fn get(&self, row: usize, column: usize) -> T {
+        let panel = self.panels.partition_point(|(first, _)| *first <= column).saturating_sub(1);
+        let (first, n_vectors) = self.panels[panel];
+        self.data[self.depth * first + row * n_vectors * self.kernel.lanes + column - first]
+    }
+
     /// Adds the products of `n_rows` rows of `left` with the matrix to the rows of `to`, which have at least `width`
     /// values. Successive rows start `left_stride` and `to_stride` values apart.
     pub fn multiply_add(&self, n_rows: usize, left: &[T], left_stride: usize, to: &mut [T], to_stride: usize) {

@@ -58,6 +58,9 @@ pub fn with_spinning_workers<R>(f: impl FnOnce() -> R) -> R {
 /// Calls `f` for 0..n in any order, on all available threads.
 pub fn parallel_for(n: usize, f: impl Fn(usize) + Sync) {
     let pool = POOL.get();
+    if n == 1 || pool.is_null() && rayon::current_num_threads() == 1 {
+        return (0..n).for_each(f);
+    }
     if pool.is_null() {
         return (0..n).into_par_iter().for_each(&f);
     }
