@@ -134,13 +134,7 @@ pub fn train_with_callback(
     }
     if resumed.is_none() {
         let material = TrainingMaterial::measure(datasets, window_frames);
-        if let Some(warning) = recipe::mean_pose_warning(&material).filter(|_| pretrained_model.is_none()) {
-            progress.say(&warning);
-        }
-        let secs_a_step = secs_a_step(&trainer, &loader)?;
-        recipe::lines(&trainer.settings, &material, secs_a_step)?.iter().for_each(|line| progress.say(line));
-        let few = no_window::motion_warning(material.train_secs).filter(|_| pretrained_model.is_none());
-        few.iter().for_each(|warning| progress.say(warning));
+        report_settings(&trainer, &loader, &material, pretrained_model.is_some(), progress)?;
     }
     let settings = trainer.settings.clone();
     let batch = |step: usize| {
@@ -161,6 +155,24 @@ pub fn train_with_callback(
         Ok((outcome, training.waiting.as_secs_f64() / training.stepping.as_secs_f64().max(1e-9)))
     })?;
     Ok(TrainingOutcome { n_examples: loader.len(), n_parameters: trainer.n_parameters(), waiting, ..outcome })
+}
+
+/// Reports the settings of a new training, and warnings about little material.
+fn report_settings(
+    trainer: &GanTrainer,
+    loader: &JoinedWindows,
+    material: &TrainingMaterial,
+    is_pretrained: bool,
+    progress: &dyn Progress,
+) -> Result<()> {
+    if let Some(warning) = recipe::mean_pose_warning(material).filter(|_| !is_pretrained) {
+        progress.say(&warning);
+    }
+    let secs_a_step = secs_a_step(trainer, loader)?;
+    recipe::lines(&trainer.settings, material, secs_a_step)?.iter().for_each(|line| progress.say(line));
+    let few = no_window::motion_warning(material.train_secs).filter(|_| !is_pretrained);
+    few.iter().for_each(|warning| progress.say(warning));
+    Ok(())
 }
 
 /// Seconds per step on this machine, measured on a temporary copy of the networks; `None` for trainings of few steps.

@@ -227,13 +227,11 @@ fn word_targets_met(rows: &[LearnedRow], speaker: &EvaluatedCheckpoint, are_audi
         None if speaker.speaker.reads_words() => positions.all.share() >= MIN_GAN_POSITIONS,
         _ => return is_chance(positions.all),
     };
-    let follows_words = |others: WordPositions| match are_audible {
-        true => others.all.interval()[1] < positions.all.interval()[0],
-        false => is_chance(others.all),
-    };
-    // The left hand of the second rule has no beats.
-    let beats = &row.speed_correlation[usize::from(are_audible)..];
-    uses_words && others.is_some_and(follows_words) && beats.iter().all(|correlation| *correlation >= MIN_BEATS)
+    let Some(others) = others.filter(|_| uses_words) else { return false };
+    if are_audible {
+        return others.all.interval()[1] < positions.all.interval()[0];
+    }
+    is_chance(others.all) && row.speed_correlation.iter().all(|correlation| *correlation >= MIN_BEATS)
 }
 
 impl TestClip {
