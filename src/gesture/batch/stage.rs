@@ -5,7 +5,7 @@ use super::motion_files;
 use super::sounds::BatchSound;
 use super::speech::SpeechSource;
 use crate::generate::model::{checkpoint_file, model_lock};
-use crate::generate::seq2seq::metadata::is_sequence;
+use crate::generate::seq2seq::metadata::uses_transcript;
 use crate::generate::trained::TrainedSpeaker;
 use anyhow::{Context, Result, bail, ensure};
 use orator_avatar::animate::AnimationOptions;
@@ -68,10 +68,10 @@ impl<'a> BatchStage<'a> {
             .with_context(|| format!("{unit} is not an audio file of this batch"))
     }
 
-    /// Transcript of a sound, if its checkpoint is a sequence-to-sequence network; others do not read it.
+    /// Transcript of a sound, if its checkpoint uses it.
     fn transcript_of(&self, unit: &Unit) -> Result<Option<&Path>> {
         let transcript = self.sound(unit)?.transcript.as_deref();
-        Ok(transcript.filter(|_| self.checkpoint_of(unit).and_then(|path| is_sequence(&path)).unwrap_or(false)))
+        Ok(transcript.filter(|_| self.checkpoint_of(unit).and_then(|path| uses_transcript(&path)).unwrap_or(false)))
     }
 
     fn checkpoint_of(&self, unit: &Unit) -> Result<PathBuf> {

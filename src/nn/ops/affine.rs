@@ -29,6 +29,11 @@ impl Affine {
         Ok(Self { weight, bias, relu: false })
     }
 
+    /// Layer of existing tensors, without ReLU.
+    pub fn of(weight: Tensor, bias: Tensor) -> Self {
+        Self { weight, bias, relu: false }
+    }
+
     pub fn with_relu(self) -> Self {
         Self { relu: true, ..self }
     }

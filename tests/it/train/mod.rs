@@ -5,6 +5,7 @@ pub(crate) mod channels;
 pub(crate) mod fine_tuning;
 pub(crate) mod gan;
 pub(crate) mod gan_program;
+mod gan_words;
 pub(crate) mod interrupted;
 pub(crate) mod networks;
 pub(crate) mod operators;

@@ -16,12 +16,18 @@ use orator_formats::transcript::Word;
 use rayon::prelude::*;
 use std::ops::Range;
 
-/// Generates motion of exactly `n_frames` frames for a sound, with posture if the network was trained on it.
-pub fn motion(speaker: &GestureGenerator, sound: &Sound, n_frames: usize) -> Result<(Motion, Option<Posture>)> {
+/// Generates motion of exactly `n_frames` frames for a sound and its words, with posture if the network was trained on
+/// it.
+pub fn motion(
+    speaker: &GestureGenerator,
+    sound: &Sound,
+    words: &[Word],
+    n_frames: usize,
+) -> Result<(Motion, Option<Posture>)> {
     let n_needed = sample_at(speaker.fps(), SAMPLE_RATE, n_frames) + 1;
     let mut sound = sound.clone();
     sound.samples.resize(sound.samples.len().max(n_needed), 0.0);
-    let (predicted, posture) = speaker.motion_and_posture(&sound)?;
+    let (predicted, posture) = speaker.motion_and_posture(&sound, words)?;
     ensure!(
         predicted.n_frames() >= n_frames,
         "{} frames of motion were generated for {n_frames} frames of audio",

@@ -109,10 +109,11 @@ const fn around_segment_secs() -> f64 {
     AROUND_SEGMENT_SECS
 }
 
-/// Whether a file is a checkpoint of a sequence-to-sequence network. Fails if it cannot be read or is not a checkpoint.
-pub fn is_sequence(path: &Path) -> Result<bool> {
-    let facts = orator_formats::checkpoint::facts(path)?;
-    Ok(is_sequence_kind(&facts["speaker"]["kind"]))
+/// Whether a file is a checkpoint of a sequence-to-sequence network or of a GAN with word input. Fails if it cannot be
+/// read or is not a checkpoint.
+pub fn uses_transcript(path: &Path) -> Result<bool> {
+    let speaker = &orator_formats::checkpoint::facts(path)?["speaker"];
+    Ok(is_sequence_kind(&speaker["kind"]) || speaker["words"].is_object())
 }
 
 /// Whether a kind denotes checkpoints of sequence-to-sequence networks of any version.
