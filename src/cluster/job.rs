@@ -7,9 +7,7 @@ use std::path::{Path, PathBuf};
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TaskLimits {
-    /// Processor cores.
     pub cores: usize,
-    /// Memory, GiB.
     pub memory_gib: f64,
     /// Time limit, hours.
     pub hours: f64,

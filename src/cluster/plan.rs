@@ -27,7 +27,6 @@ const LONGEST_SECS: f64 = 1e9;
 /// The units to process and what they depend on.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ClusterPlan {
-    /// Version of the file format.
     pub version: u32,
     /// BLAKE3 of the program.
     pub program: String,

@@ -19,7 +19,6 @@ pub struct Alignment {
     pub words: Vec<Word>,
     /// Indices of the words that could not be aligned; tokens without letters or digits are not counted.
     pub unaligned: Vec<usize>,
-    /// Length of the sound, seconds.
     pub sound_secs: f64,
 }
 

@@ -102,7 +102,6 @@ impl Dataset {
         Ok(Dataset { dir, info, stats, samples, shards, _lock: lock })
     }
 
-    /// Dataset folder.
     pub fn dir(&self) -> &Path {
         &self.dir
     }

@@ -42,7 +42,6 @@ pub const WORDS_EXTENSION: &str = "words.json";
 pub const OPTIONAL_EXTENSIONS: [&str; 3] = [WORDS_EXTENSION, "head.npy", "trunk.npy"];
 
 impl Sample {
-    /// Number of frames T.
     pub fn n_frames(&self) -> usize {
         self.motion.n_frames()
     }

@@ -85,7 +85,6 @@ impl Npz {
         Ok(self.numbers(name, shape)?.mapv(|v| v as f32))
     }
 
-    /// Boolean array.
     pub fn bools(&mut self, name: &str, shape: &[AxisLength]) -> Result<ArrayD<bool>> {
         let found = npy::typed(&self.bytes(name)?);
         let Some(array) = self.readable(name, found)? else {

@@ -6,7 +6,6 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 
-/// Maximum nesting depth of folders.
 const MAX_DEPTH: usize = 64;
 
 /// Files found by name. Accented letters may be composed or decomposed, and endings have any case, since cameras,

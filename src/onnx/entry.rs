@@ -53,7 +53,6 @@ pub struct Port {
     pub shape: Vec<i64>,
 }
 
-/// Task of a model.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum ModelRole {
@@ -66,7 +65,6 @@ pub enum ModelRole {
     Other,
 }
 
-/// Origin and licence of the weights.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ModelOrigin {
@@ -166,7 +164,6 @@ pub enum Decode {
     Regression {
         landmarks: String,
         score: String,
-        /// Whether the score is a logit.
         #[serde(default, skip_serializing_if = "std::ops::Not::not")]
         logit: bool,
         right: Option<String>,

@@ -61,7 +61,6 @@ impl Model {
         Ok(Self { entry: entry.clone(), session, shape, input, inside: Duration::ZERO, n_runs: 0 })
     }
 
-    /// Description of the model.
     pub fn entry(&self) -> &ModelEntry {
         &self.entry
     }
@@ -71,7 +70,6 @@ impl Model {
         &mut self.input
     }
 
-    /// Runs the model on its input tensor.
     pub fn run(&mut self) -> Result<Outputs<'_>> {
         let input = TensorRef::from_array_view((self.shape.as_slice(), self.input.as_slice()))?;
         let start = Instant::now();

@@ -16,7 +16,6 @@ const VARIABLE: &str = "ORT_DYLIB_PATH";
 /// that use this crate must do the same.
 pub const TELEMETRY_OFF: &str = "ORT_DISABLE_TELEMETRY";
 
-/// The loaded ONNX Runtime.
 #[derive(Clone)]
 pub struct Runtime {
     environment: Environment,
@@ -54,7 +53,6 @@ impl Runtime {
         Ok(runtime)
     }
 
-    /// Path of the loaded library.
     pub fn library(&self) -> &Path {
         &self.library
     }

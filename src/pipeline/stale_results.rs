@@ -36,7 +36,6 @@ pub const OLD_MODEL: &str = "-old";
 pub struct ModelStatus {
     /// `gan/FOLDER` or `seq2seq/FOLDER`.
     pub name: String,
-    /// State of the model.
     pub state: UnitState,
     /// Step of the newest checkpoint.
     pub step: Option<usize>,

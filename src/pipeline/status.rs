@@ -17,7 +17,6 @@ use serde::Serialize;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 
-/// Status of a pipeline.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct StatusReport {
     /// Status of every unit at every stage: the videos of a speaker, then the dataset of that speaker.
@@ -43,7 +42,6 @@ pub struct StatusReport {
 pub struct UnitStatus {
     /// `speaker/video`; for a dataset, the speaker.
     pub unit: String,
-    /// The stage.
     pub stage: StageName,
     /// State of the unit.
     pub state: UnitState,
@@ -75,9 +73,7 @@ pub enum UnitState {
 /// What a run would do at one stage.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct StagePlan {
-    /// The stage.
     pub stage: StageName,
-    /// Number of units that are up to date.
     pub up_to_date: usize,
     /// Number of units that would be processed.
     pub would_run: usize,
@@ -98,7 +94,6 @@ impl fmt::Display for UnitState {
 }
 
 impl StatusReport {
-    /// Whether every dataset is up to date.
     pub fn datasets_are_up_to_date(&self) -> bool {
         self.units.iter().all(|unit| unit.stage != StageName::Dataset || unit.state == UnitState::UpToDate)
     }

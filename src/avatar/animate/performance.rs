@@ -27,14 +27,11 @@ use std::ops::Range;
 /// Largest share of clamped finger angles of a clip with usable fingers; clips of real hands have at most 10 %.
 pub const MAX_FINGER_CLAMPS: f64 = 0.25;
 
-/// Settings of the animation.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct AnimationOptions {
-    /// Temporal filter.
     pub smoothing: Smoothing,
     /// Joint limits to apply.
     pub constraints: Constraints,
-    /// Treatment of the shoulders' yaw.
     pub yaw: Yaw,
     /// Treatment of the lower body.
     pub legs: Legs,
@@ -57,7 +54,6 @@ pub enum Yaw {
 /// Statistics of the processing of a motion.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct AnimationReport {
-    /// Number of frames of the motion.
     pub n_frames: usize,
     /// Jerk of the arms at the motion's own rate, over frames in which they were detected.
     pub arms: Jerk,
@@ -162,14 +158,11 @@ pub struct Jerk {
     pub after: Option<f64>,
 }
 
-/// An animated motion with its rig.
 #[derive(Clone, Debug)]
 pub struct Performance {
     /// The skeleton with its bone lengths.
     pub rig: Rig,
-    /// The joint rotations.
     pub clip: BvhClip,
-    /// Statistics of the processing.
     pub report: AnimationReport,
 }
 

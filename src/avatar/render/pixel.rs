@@ -145,7 +145,6 @@ impl Shading {
         }
     }
 
-    /// Radiance at the corners of a triangle.
     #[inline(never)]
     fn corner_radiances(&mut self, surfaces: &Surfaces, shadows: Option<&ShadowMap>, number: u32) -> [Radiance; 3] {
         let triangle = &surfaces.triangles[number as usize];

@@ -18,7 +18,6 @@ pub const BAND_ROWS: usize = 16;
 /// Pixels that may have a sample within a triangle: half-open ranges of columns and rows.
 pub type Extent = [[u16; 2]; 2];
 
-/// A triangle projected to the image.
 #[derive(Clone, Copy, Debug)]
 pub struct FlatTriangle {
     /// Corners, in subpixels from the centre of the top left pixel.
@@ -50,7 +49,6 @@ impl FlatTriangle {
     }
 }
 
-/// Depth and triangle of all samples of a band.
 #[derive(Clone, Debug, Default)]
 pub struct RowBand {
     width: usize,

@@ -192,7 +192,6 @@ impl Surfaces {
         }
     }
 
-    /// Projection of a triangle.
     #[inline(always)]
     pub fn flat(&self, triangle: &SurfaceTriangle) -> FlatTriangle {
         let [a, b, c] = triangle.vertices;

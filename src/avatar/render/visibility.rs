@@ -3,7 +3,6 @@
 use super::samples::{BAND_ROWS, RowBand};
 use super::surfaces::{SurfaceTriangle, Surfaces};
 
-/// Buffers of the visibility search.
 #[derive(Clone, Debug)]
 pub struct VisibleTriangles {
     size: [usize; 2],

@@ -45,7 +45,6 @@ impl Default for Loudest {
 }
 
 impl Loudest {
-    /// Processes the next samples.
     pub fn push(&mut self, samples: &[f32]) {
         let max = &mut self.max;
         self.spectra.push(samples, |bands| *max = bands.iter().fold(*max, |max, db| max.max(*db)));
@@ -78,7 +77,6 @@ impl Onsets {
         Self { spectra: Spectra::new(), flux }
     }
 
-    /// Processes the next samples.
     pub fn push(&mut self, samples: &[f32]) {
         let flux = &mut self.flux;
         self.spectra.push(samples, |bands| flux.push(bands));

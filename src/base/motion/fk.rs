@@ -3,7 +3,6 @@
 use crate::math::rotation::Rotation;
 use crate::math::vec3::{Vec3, add};
 
-/// A joint of a skeleton.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Joint {
     pub name: String,

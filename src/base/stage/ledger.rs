@@ -138,7 +138,6 @@ impl Ledger {
         Ok(ledger)
     }
 
-    /// Accepted seconds.
     pub fn accepted_secs(&self) -> f64 {
         self.accepted.iter().map(|accepted| accepted.end_secs - accepted.start_secs).sum()
     }
@@ -159,7 +158,6 @@ impl Ledger {
         self
     }
 
-    /// Rejected seconds by reason.
     pub fn rejected_secs(&self) -> BTreeMap<String, f64> {
         let mut secs = BTreeMap::new();
         for rejected in &self.rejected {
@@ -168,7 +166,6 @@ impl Ledger {
         secs
     }
 
-    /// Seconds of stages that failed.
     pub fn failed_secs(&self) -> f64 {
         self.failed.iter().map(|failed| failed.end_secs - failed.start_secs).sum()
     }

@@ -3,7 +3,6 @@
 /// Number of steps of a task that reports fractions of its total: 100 steps are 0.01 %.
 pub const PARTS: u64 = 1_000_000;
 
-/// Receiver of progress reports.
 pub trait Progress: Send + Sync {
     /// Begins a task of `total` steps (0: unknown length; `PARTS`: the task reports fractions). Dropping the task ends
     /// it.
@@ -57,7 +56,6 @@ impl Event<'_> {
     }
 }
 
-/// A task in progress.
 pub trait Task: Send + Sync {
     /// Counts `steps` more steps as done.
     fn advance(&self, steps: u64);

@@ -26,7 +26,6 @@ pub struct Sound {
 }
 
 impl Sound {
-    /// Length in seconds.
     pub fn secs(&self) -> f64 {
         self.samples.len() as f64 / f64::from(self.rate.max(1))
     }

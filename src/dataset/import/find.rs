@@ -25,7 +25,6 @@ pub struct TakeFiles {
     pub transcripts: Vec<PathBuf>,
 }
 
-/// Files found in the sources.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct ImportSources {
     /// Takes in the order of their paths.

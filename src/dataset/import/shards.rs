@@ -20,7 +20,6 @@ use std::collections::BTreeMap;
 use std::io::{Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
-/// Location of a member in a tar file.
 #[derive(Clone, Debug, PartialEq, Eq)]
 struct MemberLocation {
     tar: PathBuf,
@@ -45,7 +44,6 @@ pub struct ShardVideo {
     pub samples: Vec<ShardSample>,
 }
 
-/// Contents of the tar files.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct ShardTars {
     pub videos: Vec<ShardVideo>,

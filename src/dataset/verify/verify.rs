@@ -26,7 +26,6 @@ use std::io::Write;
 use std::path::Path;
 use std::rc::Rc;
 
-/// Problem found in a dataset.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct DatasetProblem {
     /// Path in the dataset folder.
@@ -34,7 +33,6 @@ pub struct DatasetProblem {
     pub message: String,
 }
 
-/// Result of a verification.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Verified {
     pub problems: Vec<DatasetProblem>,

@@ -31,7 +31,6 @@ pub const JOINTS: [&str; 15] = [
     "LeftForeArm",
     "LeftHand",
 ];
-/// Frame rate of the features.
 pub const FPS: FrameRate = FrameRate::new(20, 1);
 /// Columns with a smaller standard deviation in the first file are dropped.
 const MIN_STD: f64 = 1e-6;
@@ -92,7 +91,6 @@ pub struct ExponentialMaps {
     pub skeleton: BvhSkeleton,
     /// Channel values outside the features: the first frame of the first file, with the root channels at 0.
     rest: Vec<f64>,
-    /// Indices of the feature joints.
     joints: Vec<usize>,
     /// Columns used as features, out of three for each of `joints`, with the mean and the largest absolute value of
     /// each.

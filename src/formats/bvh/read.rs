@@ -79,7 +79,6 @@ impl Bvh {
         Ok(bvh)
     }
 
-    /// Parses the text of a file.
     pub fn parse(text: &str) -> Result<Self> {
         let mut words = Words::new(text);
         let parsed = Self::from_words(&mut words);

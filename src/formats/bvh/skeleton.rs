@@ -58,7 +58,6 @@ pub struct BvhSkeleton {
 }
 
 impl BvhSkeleton {
-    /// Skeleton of a BVH file.
     pub fn of(bvh: &Bvh) -> Self {
         Self { joints: bvh.joints.clone() }
     }

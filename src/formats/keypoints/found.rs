@@ -14,9 +14,7 @@ pub type NamedArrays = Vec<(String, ArrayD<f32>)>;
 pub struct FoundPerson {
     /// COCO-17.
     pub body: [Keypoint; N_BODY],
-    /// The person's left hand.
     pub left_hand: [Keypoint; N_HAND],
-    /// The person's right hand.
     pub right_hand: [Keypoint; N_HAND],
 }
 
@@ -49,7 +47,6 @@ pub enum CoordinateUnit {
     FromNeck,
 }
 
-/// Keypoints of a video.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FoundKeypoints {
     /// Display name of the format: `OpenPose, 25 points`.
@@ -61,7 +58,6 @@ pub struct FoundKeypoints {
     pub unit: CoordinateUnit,
     /// Point order that was identified by the number of points alone: `BODY_25`; empty if the file states the order.
     pub layout: String,
-    /// All persons in each frame.
     pub frames: Vec<Vec<FoundPerson>>,
     /// One sentence for each missing item, naming its substitute.
     pub notes: Vec<String>,

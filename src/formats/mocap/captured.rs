@@ -22,7 +22,6 @@ pub struct CapturedMotion {
     pub facts: Map<String, Value>,
 }
 
-/// Kind of a captured motion file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum MotionKind {
     /// Text clips of Rebol et al. 2021: 147 numbers per line.

@@ -54,7 +54,6 @@ fn chain(bvh: &Bvh, side: Side, finger: usize) -> Vec<usize> {
     if chain.len() > 1 { chain } else { Vec::new() }
 }
 
-/// Side and finger that a joint name denotes.
 fn parse_name(name: &str) -> Option<(Side, usize)> {
     let words = words(name.rsplit(':').next().unwrap_or(name));
     let all = words.concat();

@@ -29,7 +29,6 @@ pub struct WordVectors {
     /// File offset of the first vector, bytes.
     at: u64,
     dim: usize,
-    /// Row of each word.
     rows: HashMap<String, u32>,
 }
 
@@ -76,12 +75,10 @@ impl WordVectors {
         Ok(Self { path: path.to_owned(), file, at, dim, rows })
     }
 
-    /// File of the table.
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// Dimension of the vectors.
     pub fn dim(&self) -> usize {
         self.dim
     }

@@ -53,7 +53,6 @@ pub fn write_motion(
     Ok(MotionReport { secs, n_frames, motion_secs, note, segments: None })
 }
 
-/// Writes motion to files of all formats.
 pub(super) fn write_outputs(
     (motion, posture): (Motion, Option<Posture>),
     &SpeechSource { audio, figure, .. }: &SpeechSource,

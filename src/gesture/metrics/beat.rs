@@ -49,7 +49,6 @@ fn track(pair: &PairedFrames, poses: &[[Vec3; N_JOINTS]], joint: usize) -> Vec<V
 }
 
 const OF_REAL: &str = "beat_consistency_of_real";
-/// Joints whose beats are measured.
 const JOINTS: [usize; 4] = [R_ELBOW, R_WRIST, L_ELBOW, L_WRIST];
 /// Width of the Gaussian kernel of the time between beat and onset, seconds.
 const SIGMA: f64 = 0.1;

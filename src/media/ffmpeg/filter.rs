@@ -80,7 +80,6 @@ pub(crate) fn deinterlaced(
     graph.pull()
 }
 
-/// Transfer function of an HDR image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum HdrTransfer {
     Pq,

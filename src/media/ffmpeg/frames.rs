@@ -203,7 +203,6 @@ impl FrameReader {
         self.shown.frame.is_interlaced()
     }
 
-    /// Header information.
     pub fn info(&self) -> &ProbedMedia {
         &self.info
     }

@@ -10,7 +10,6 @@ use ffmpeg_next::format::stream::Stream;
 use orator_base::types::time::FrameRate;
 use std::path::Path;
 
-/// Streams of a file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ProbedMedia {
     /// Stated length, seconds: of the video stream, or else of the audio stream; `None` if no header states it.
@@ -19,7 +18,6 @@ pub struct ProbedMedia {
     pub audio: Option<AudioInfo>,
 }
 
-/// Properties of a video stream.
 #[derive(Clone, Debug, PartialEq)]
 pub struct VideoInfo {
     /// Codec name used by ffmpeg: `h264`, `hevc`, `vp9`.
@@ -34,7 +32,6 @@ pub struct VideoInfo {
     pub fps: Option<FrameRate>,
 }
 
-/// Properties of an audio stream.
 #[derive(Clone, Debug, PartialEq)]
 pub struct AudioInfo {
     /// Codec name used by ffmpeg: `aac`, `opus`, `pcm_s16le`.

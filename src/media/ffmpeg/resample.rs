@@ -7,7 +7,6 @@ use ffmpeg_next::format::{Sample, sample};
 use ffmpeg_next::software::resampling;
 use ffmpeg_next::{ChannelLayout, Dictionary, frame};
 
-/// Format of an audio frame.
 #[derive(Clone, Copy, PartialEq)]
 pub(crate) struct SoundFormat {
     pub sample: Sample,

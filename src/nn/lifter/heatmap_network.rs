@@ -17,7 +17,6 @@ use orator_base::types::skeleton::Side;
 /// Prefix of the network's tensors in a weights file.
 pub const NAME: &str = hand::NAME;
 pub const KIND: &str = "hand-heatmap-lifter";
-/// Number of parameters of both networks.
 pub const N_PARAMETERS: usize = 1_637_279 + 2_238_403;
 const MAPS: usize = 21;
 /// Batch size when lifting.

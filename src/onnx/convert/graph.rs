@@ -24,7 +24,6 @@ impl ElementType {
     }
 }
 
-/// Value of an operator attribute.
 #[derive(Clone, Copy)]
 pub enum AttributeValue<'a> {
     Int(i64),
@@ -128,7 +127,6 @@ impl OnnxGraph {
         self.constant(element, &order.map(|axis| shape[axis]), &raw)
     }
 
-    /// Adds a float constant.
     pub fn floats(&mut self, dims: &[usize], values: &[f32]) -> Result<String> {
         self.constant(ElementType::F32, dims, &values.iter().flat_map(|value| value.to_le_bytes()).collect::<Vec<_>>())
     }
@@ -138,7 +136,6 @@ impl OnnxGraph {
         self.ints(&sizes.iter().map(|size| *size as i64).collect::<Vec<_>>())
     }
 
-    /// Concatenates values along an axis.
     pub fn concat(&mut self, values: &[String], axis: i64) -> String {
         self.op("Concat", &as_strs(values), &[("axis", AttributeValue::Int(axis))])
     }

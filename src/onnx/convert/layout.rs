@@ -50,7 +50,6 @@ pub(crate) fn transposed(raw: &[u8], n_bytes: usize, dims: [usize; 4], order: [u
     Ok(out)
 }
 
-/// A sliding window over one axis.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct SlidingWindow {
     pub kernel: usize,

@@ -76,7 +76,6 @@ pub(crate) fn convert(source: &TfGraph, graph: OnnxGraph, options: &ConversionOp
     Ok(source.graph.model(&[(&options.input.name, &shape)], &[(output, &[1, n_cells, 5])]))
 }
 
-/// Slices a value along an axis.
 fn slice(graph: &mut OnnxGraph, value: &str, axis: i64, [start, end]: [usize; 2]) -> Result<String> {
     let (start, end, axis) = (graph.sizes(&[start])?, graph.sizes(&[end])?, graph.ints(&[axis])?);
     Ok(graph.op("Slice", &[value, &start, &end, &axis], &[]))

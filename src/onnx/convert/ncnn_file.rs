@@ -7,7 +7,6 @@ use std::collections::BTreeMap;
 
 /// First line of the text.
 const MAGIC: &str = "7767517";
-/// Maximum number of layers.
 const MAX_LAYERS: usize = 1 << 14;
 /// Tag before float16 weights.
 const FLOAT16: u32 = 0x0130_6b47;

@@ -18,7 +18,6 @@ pub(crate) struct TfValue {
     pub channels_first: bool,
 }
 
-/// State of a conversion.
 pub(crate) struct TfConverter<'a> {
     pub source: &'a TfGraph<'a>,
     pub graph: OnnxGraph,

@@ -27,7 +27,6 @@ struct TfliteOperator<'a> {
     options: Option<FlatTable<'a>>,
 }
 
-/// State of a conversion.
 struct TfliteConverter<'a> {
     /// Shapes of the tensors.
     shapes: Vec<Vec<usize>>,
@@ -37,7 +36,6 @@ struct TfliteConverter<'a> {
     graph: OnnxGraph,
 }
 
-/// Converts the model to ONNX.
 pub(crate) fn convert(file: &[u8], graph: OnnxGraph, options: &ConversionOptions) -> Result<Vec<u8>> {
     let model = FlatTable::root(file)?;
     let code = |code: FlatTable| Ok(code.int(3, 0)?.max(i32::from(code.byte(0)?)));
@@ -168,7 +166,6 @@ impl<'a> TfliteConverter<'a> {
         self.graph.weight((element, &self.shapes[tensor], raw), order, dims)
     }
 
-    /// Values of an integer constant.
     fn integers(&self, tensor: usize) -> Result<Vec<i64>> {
         let Constant { raw, element } = self.constant_of(tensor)?;
         ensure!(

@@ -95,7 +95,6 @@ pub fn choose_record(asked: SplitUnit, before: Option<SplitRecord>, n_videos: us
 }
 
 impl Division {
-    /// Rule of the splits, with its reason.
     pub fn rule(&self, fps: FrameRate) -> SplitRule {
         let by_time = self.record.unit == SplitUnit::Time;
         let guard_secs = if by_time { fps.secs(self.guard_frames) } else { 0.0 };

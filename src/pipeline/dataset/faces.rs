@@ -12,7 +12,6 @@ use std::path::Path;
 const CELL: [usize; 2] = [144, 186];
 const FACE_PX: usize = 128;
 const N_COLUMNS: usize = 8;
-/// Largest number of rows.
 const MAX_ROWS: usize = 40;
 const PAPER: [u8; 3] = [255; 3];
 const RULE: [u8; 3] = [170; 3];

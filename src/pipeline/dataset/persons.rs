@@ -21,11 +21,9 @@ const COLOUR_STEP: f64 = 0.5;
 /// up to 0.02 between videos.
 const BONES_THRESHOLD: f64 = 0.04;
 
-/// Description of the person in a video.
 #[derive(Clone, Debug)]
 pub struct VideoPerson {
     pub unit: Unit,
-    /// File name of the video.
     pub file: String,
     portrait: Option<Portrait>,
     /// Log ratio of shoulder width to arm length; `None`: not measured.

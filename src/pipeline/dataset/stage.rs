@@ -25,7 +25,6 @@ use orator_formats::media_json::MediaInfo;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
-/// Note for users of a dataset with shifted audio.
 const OFFSET_NOTE: &str = "Where the lips showed surely that the sound of a video was late or early, it was shifted.";
 
 /// Inputs of a dataset besides the settings.

@@ -17,7 +17,6 @@ const MAX_GAP_SECS: f64 = 1.0;
 pub struct ConvertedKeypoints {
     pub keypoints: Keypoints,
     pub extras: Extras,
-    /// Duration of the source frames in seconds.
     pub duration_secs: f64,
     /// Notes on missing data and on other persons in view.
     pub notes: Vec<String>,

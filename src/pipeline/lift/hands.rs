@@ -13,7 +13,6 @@ use orator_base::types::skeleton::Side;
 
 /// Least number of visible points of a hand that is lifted.
 const MIN_POINTS: usize = 12;
-/// Batch size of the network.
 const BATCH: usize = 1024;
 
 /// Lifts one hand from `points` [T, 21, 3] (x, y in px, score) into `joints` [T, 21, 3]: wrist at 0, sum of the bone

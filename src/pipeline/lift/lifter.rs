@@ -40,7 +40,6 @@ pub struct Lifter {
     level: bool,
 }
 
-/// A lifted video.
 pub struct Lifted {
     /// The motion; NaN outside the intervals.
     pub motion: Motion,

@@ -24,7 +24,6 @@ pub struct DetectedHand {
 }
 
 impl DetectedHand {
-    /// Creates a hand from points that each have a score.
     pub fn from_points(points: [ScoredPoint; 21]) -> Self {
         Self { score: points.iter().map(|point| point[2]).sum::<f64>() / 21.0, points, right: None, depth: None }
     }
@@ -40,7 +39,6 @@ impl DetectedHand {
     }
 }
 
-/// Hand model with its decoder.
 pub struct HandModel {
     pub input: ModelInput,
     reader: PointReader,

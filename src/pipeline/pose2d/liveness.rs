@@ -21,7 +21,6 @@ const MAX_MISSED: usize = 3;
 /// Change of the picture in a box since its track began.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Movement {
-    /// Number of measurements.
     pub n: usize,
     /// Largest change between two detections, in 8-bit steps.
     pub max_change: f32,

@@ -54,14 +54,12 @@ pub fn is_same_person(before: &TrackedPerson, after: &TrackedPerson) -> bool {
         && before.colours.distance(&after.colours) <= MAX_SAME_COLOUR_DISTANCE
 }
 
-/// Tracks one person.
 #[derive(Default)]
 pub struct SpeakerTracker {
     pub detector: Option<Detector>,
     pub track: PersonTrack,
     tracks: LivenessTracks,
     reference: Option<BodyColours>,
-    /// Colours of the tracked person.
     colours: Option<BodyColours>,
     /// Consecutive frames with deviating colours; negative: remaining frames without re-examination.
     n_deviating: i32,

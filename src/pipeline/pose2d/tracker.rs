@@ -24,7 +24,6 @@ const SPEAKING_WEIGHT: f32 = 1e6;
 /// Persons smaller than this share of the speaker's box are not counted.
 const MIN_RELATIVE_AREA: f32 = 0.2;
 
-/// A detected person.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Candidate {
     pub person: PersonBox,
@@ -90,7 +89,6 @@ pub struct PersonTrack {
 }
 
 impl PersonTrack {
-    /// Updates the track with the detections of a frame.
     pub fn update(&mut self, found: &[Candidate], step: TrackerStep) {
         if let Some(bbox) = self.bbox {
             self.continue_track(found, bbox, step);
@@ -142,7 +140,6 @@ impl PersonTrack {
         *self = Self { n_identities: self.n_identities, ..Self::default() };
     }
 
-    /// Merges the current identity with the previous one.
     pub fn merge_with_previous(&mut self) {
         self.n_identities = (self.n_identities - 1).max(1);
     }

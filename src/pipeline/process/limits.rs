@@ -29,7 +29,6 @@ const FPS: [f64; 2] = [60.0, 240.0];
 /// Seconds without CPU use and without a report after which a process counts as hanging.
 const IDLE_SECS: u64 = 900;
 
-/// Limits of one subprocess.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Limits {
     /// Bytes of private writable memory.

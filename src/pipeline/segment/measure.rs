@@ -46,7 +46,6 @@ pub struct Measures {
     pub right_other: Vec<f32>,
     /// Movement of the wrists in the second around the frame, in shoulder widths, if they are together; 10 otherwise.
     pub rest: Vec<f32>,
-    /// Number of persons in view.
     pub n_persons: Vec<f32>,
     /// Movement of the neck since the previous frame, in shoulder widths (the wider of the two frames); 0 in frame 0.
     pub jump: Vec<f32>,
@@ -97,7 +96,6 @@ impl Measures {
         }
     }
 
-    /// Number of frames.
     pub fn n_frames(&self) -> usize {
         self.person.len()
     }

@@ -14,7 +14,6 @@ pub struct Measure {
     name: &'static str,
     pub title: &'static str,
     pub unit: &'static str,
-    /// Range of the histogram.
     ends: [f64; 2],
     n_bins: usize,
     /// Key of the threshold in `[segment]`, or `max_bone_change` of `[lift]`.

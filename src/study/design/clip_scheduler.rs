@@ -153,7 +153,6 @@ impl ClipNeeds {
         }
     }
 
-    /// Total number of clips that each speaker needs.
     pub fn total(&self) -> usize {
         let of_tasks = |needs: &[usize]| match self.reuse {
             ClipReuse::Never => needs.iter().sum::<usize>(),

@@ -16,7 +16,6 @@ fn of<T: DeserializeOwned>(case: &Value, name: &str) -> T {
     serde_json::from_value(case[name].clone()).unwrap()
 }
 
-/// Asserts that the computed values are near those with these names in the case.
 fn assert_near<const N: usize>(case: &Value, names: [&str; N], found: [f64; N], relative: f64, min_scale: f64) {
     for (found, name) in found.into_iter().zip(names) {
         let expected: f64 = of(case, name);

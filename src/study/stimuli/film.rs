@@ -17,7 +17,6 @@ use std::path::Path;
 
 const CAMERA: FilmCamera = FilmCamera::Front;
 const SIDE_BY_SIDE_FPS: FrameRate = FrameRate::new(30, 1);
-/// Key derivation context of the film names.
 const NAME_CONTEXT: &str = "orator study 2026 names of films";
 /// Incremented when the same content gives different bytes.
 const VERSION: u32 = 1;

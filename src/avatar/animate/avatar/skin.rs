@@ -79,13 +79,11 @@ impl BodyForm<'_> {
         }
     }
 
-    /// Weights of the head and the neck.
     pub fn head_weights(&self, surface: &Surface) -> Vec<Weights> {
         let spine = self.spine();
         smoothed_weights(surface, 2, |at, shares| spine.shares(at, 1.0, shares))
     }
 
-    /// Weights of the shirt.
     pub fn shirt_weights(&self, surface: &Surface) -> Vec<Weights> {
         let cm = self.stance.scale;
         let mut spine = self.spine();
@@ -117,7 +115,6 @@ impl BodyForm<'_> {
         })
     }
 
-    /// Weights of trousers and shoes.
     pub fn leg_weights(&self, surface: &Surface) -> Vec<Weights> {
         let cm = self.stance.scale;
         let chains = self.rig.legs.map(|[upper, lower, foot, end]| {

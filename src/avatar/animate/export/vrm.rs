@@ -75,7 +75,6 @@ pub fn make_humanoid(scene: &mut Value, named: &Skeleton) {
     scene["extensions"] = json!({ "VRMC_vrm": extension });
 }
 
-/// Node of each humanoid bone.
 fn bones(named: &Skeleton) -> Map<String, Value> {
     let moving = named.joints.iter().enumerate().filter(|(_, joint)| !joint.end);
     moving.map(|(node, joint)| (joint.name.clone(), json!({ "node": node }))).collect()

@@ -47,7 +47,6 @@ pub enum CapturedPart {
 impl CapturedPart {
     const ALL: [Self; 3] = [Self::Head, Self::Spine, Self::Legs];
 
-    /// Name in reports.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Head => "head",
@@ -149,7 +148,6 @@ impl CapturedBody {
         self
     }
 
-    /// The parts it contains.
     pub fn parts(&self) -> Vec<CapturedPart> {
         let has = |part: &CapturedPart| self.bones.iter().any(|(bone, _)| bone.part == *part);
         CapturedPart::ALL.into_iter().filter(has).collect()

@@ -179,7 +179,6 @@ fn parsed_chunks(file: &[u8]) -> Option<(Value, Vec<u8>)> {
     scene.is_object().then_some((scene, bytes))
 }
 
-/// Node of a glTF scene.
 #[derive(Debug, Deserialize)]
 #[serde(default)]
 struct SceneNode {

@@ -136,7 +136,6 @@ impl<'a> Transfer<'a> {
         placed.iter().enumerate().map(local).collect()
     }
 
-    /// Whether a joint is moved.
     pub fn moves(&self, joint: usize) -> bool {
         self.moved[joint].is_some()
     }

@@ -4,7 +4,6 @@ use orator_base::math::rotation::Rotation;
 use orator_base::math::vec3::{Vec3, add, scale};
 use std::collections::BTreeMap;
 
-/// A joint of a user's skeleton.
 #[derive(Clone, Debug, PartialEq)]
 pub struct UserJoint {
     pub name: String,

@@ -10,7 +10,6 @@ use crate::animate::solve::track::smoothstep;
 use orator_base::math::rotation::Rotation;
 use serde::Serialize;
 
-/// Constraints to apply.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Constraints {
     /// Whether to apply the limits of every joint.
@@ -74,7 +73,6 @@ const COHERENCE: usize = 13;
 /// Minimum change that counts as a clamp, degrees; smaller ones are rounding errors.
 const MIN_CLAMP_DEGREES: f64 = 1e-6;
 
-/// Clamps of one kind.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Clamps {
     pub kind: &'static str,
@@ -86,7 +84,6 @@ pub struct Clamps {
     pub largest_excess_degrees: f64,
 }
 
-/// Counter of clamps.
 #[derive(Clone, Debug, Default)]
 pub struct ClampCounter {
     n_frames: usize,

@@ -3,7 +3,6 @@
 
 use orator_base::motion::fk::Skeleton;
 
-/// Naming convention.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Names {
     /// `Hips`, `LeftForeArm`, `LeftHandIndex1`: Mixamo's names without prefix, and `Chest`.
@@ -71,7 +70,6 @@ impl Names {
     }
 }
 
-/// Name in Unreal's convention.
 fn unreal(own: &str) -> String {
     let (part, side) = match (own.strip_prefix("Left"), own.strip_prefix("Right")) {
         (Some(part), _) => (part, "_l"),

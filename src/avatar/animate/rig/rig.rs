@@ -227,7 +227,6 @@ fn default_metres(joint: usize) -> f64 {
 pub(crate) mod tests {
     use super::*;
 
-    /// Rig with default bone lengths.
     pub(crate) fn default_rig() -> Rig {
         let missing = ndarray::Array3::from_elem((1, N_JOINTS, 3), f32::NAN);
         Rig::from_motion(&Motion::from_joints(orator_base::types::time::FrameRate::new(15, 1), missing))

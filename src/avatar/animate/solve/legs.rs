@@ -27,7 +27,6 @@ const DOWN: Vec3 = [0.0, -1.0, 0.0];
 const ACROSS: Vec3 = [1.0, 0.0, 0.0];
 const FORWARD: Vec3 = [0.0, 0.0, 1.0];
 
-/// Joints of a leg.
 struct Leg {
     upper: usize,
     lower: usize,

@@ -180,7 +180,6 @@ mod tests {
         File::create_new(path).map(drop)
     }
 
-    /// Returns the id of a process that has ended.
     fn ended_process() -> u32 {
         let mut child = std::process::Command::new("true").spawn().unwrap();
         child.wait().unwrap();

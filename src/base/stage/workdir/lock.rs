@@ -19,7 +19,6 @@ use std::sync::OnceLock;
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{} is in use by {by}; wait for it to end", folder.display())]
 pub struct BusyFolder {
-    /// The locked folder.
     pub folder: PathBuf,
     /// The programs that hold the lock: what they do, and their process ids.
     pub by: String,

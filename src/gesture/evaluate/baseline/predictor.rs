@@ -87,7 +87,6 @@ fn mismatched_parts(lengths: &[usize], which: usize) -> Vec<(usize, Range<usize>
     parts
 }
 
-/// Length of a window, seconds.
 const WINDOW_SECS: f64 = 4.0;
 /// Spectrogram rows between two candidate windows.
 const STRIDE: usize = 2;

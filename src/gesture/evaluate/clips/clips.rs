@@ -108,7 +108,6 @@ impl EvalClip {
     }
 }
 
-/// Clips of one frame rate.
 #[derive(Clone, Debug)]
 pub struct EvalClips {
     pub fps: FrameRate,

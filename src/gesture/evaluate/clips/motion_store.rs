@@ -22,7 +22,6 @@ struct StoreState {
 /// Joints [T, n, 3], metres, in memory or in a file.
 #[derive(Clone, Debug)]
 pub enum StoredMotion {
-    /// In memory.
     Held(Array3<f32>),
     /// In the temporary file, with their shape.
     InFile([usize; 3], FileBytes),

@@ -135,7 +135,6 @@ const MAX_SECS: f64 = 3600.0;
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BlockLength {
-    /// Length in seconds.
     pub secs: f64,
     /// Integrated autocorrelation time of the differences between two predictors' errors, seconds.
     pub decorrelation_secs: f64,

@@ -12,7 +12,6 @@ use serde::Deserialize;
 use serde_json::{Map, Value, json};
 use std::path::Path;
 
-/// Version of the JSON layout.
 pub const VERSION: u64 = 1;
 
 /// Result as JSON. The keys of the first checkpoint are the same as for a single one; those of the others end in their

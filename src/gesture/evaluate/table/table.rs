@@ -12,7 +12,6 @@ use ndarray::{Array2, s};
 use orator_base::math::estimate::Estimate;
 use orator_base::stage::progress::Task;
 
-/// Number of bootstrap draws for an interval.
 pub const N_DRAWS: usize = 1000;
 /// Number of draws for costly metrics (Frechet distances, correlations).
 pub const N_COSTLY_DRAWS: usize = 100;

@@ -4,14 +4,12 @@
 use orator_base::math::vec3;
 use orator_media::opencv::warp::Region;
 
-/// Number of landmarks.
 pub const N_LANDMARKS: usize = 468;
 /// Outer corners of the eyes, right first.
 const EYES: [usize; 2] = [33, 263];
 /// Points in the middle of the inner upper lip, each paired with one of the lower lip.
 const UPPER_LIP: [usize; 3] = [82, 13, 312];
 const LOWER_LIP: [usize; 3] = [87, 14, 317];
-/// Tip of the nose.
 pub const NOSE_TIP: usize = 1;
 /// Side of the face square relative to the face size (MediaPipe's face_landmark_landmarks_to_roi).
 const CROP_SCALE: f64 = 1.5;

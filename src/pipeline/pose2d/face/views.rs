@@ -24,7 +24,6 @@ const CELLS: [usize; 2] = [10, 6];
 const PICTURE_PX: usize = 128;
 const PICTURE_SCALE: f64 = 1.15;
 
-/// A view of the face in one frame.
 #[derive(Serialize, Deserialize)]
 struct FaceView {
     /// `landmarks::turn`, at least `FRONTAL`.

@@ -14,7 +14,6 @@ use orator_base::types::pose2d::coco;
 use orator_dataset::config::Pose2dConfig;
 use orator_media::opencv::warp::Region;
 
-/// Elbow and wrist of the left and right arm.
 const ARMS: [(usize, usize); 2] = [(coco::L_ELBOW, coco::L_WRIST), (coco::R_ELBOW, coco::R_WRIST)];
 /// Bones that bound the body width from below, and the ratios of body width to bone and to trunk length. They are low,
 /// so that the shoulders decide in a frontal view: on rendered persons an arm bone measures up to 1.14 and the trunk
@@ -51,7 +50,6 @@ const MIN_WRIST_MOVEMENT: f64 = 0.15;
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct SearchPause {
     n_failed: u32,
-    /// Frame of the next search.
     next: usize,
 }
 
@@ -90,7 +88,6 @@ impl HandTracker {
         Self { model, palm, tracks: [HandTrack::default(); 2], palm_pause: SearchPause::default(), n_frames: 0 }
     }
 
-    /// Resets tracks and pauses.
     pub fn reset(&mut self) {
         self.tracks = [HandTrack::default(); 2];
         (self.palm_pause, self.n_frames) = (SearchPause::default(), 0);

@@ -57,7 +57,6 @@ impl PoseSpan {
         workdir::write_file(&Artifact::PoseSpan.within(folder), &rmp_serde::to_vec(self)?)
     }
 
-    /// Appends the following span.
     pub fn append(&mut self, next: Self) {
         let pair = self.last.as_ref().zip(next.first.as_ref());
         let is_same = pair.is_some_and(|(last, first)| is_same_person(last, first));

@@ -11,7 +11,6 @@ const MIN_CONFIDENCE: f64 = 0.9;
 /// documents their distribution).
 const MIN_MARGIN: f64 = 0.15;
 
-/// Audio features of a shot.
 pub struct ShotVoice<'a> {
     pub voice: &'a Openness,
     pub fps: FrameRate,

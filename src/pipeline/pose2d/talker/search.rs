@@ -33,7 +33,6 @@ pub struct TalkerSearch {
     several: bool,
 }
 
-/// Result for a shot.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ShotTalker {
     /// More than one person was visible.
