@@ -114,7 +114,7 @@ impl StudentEstimate {
     }
 
     /// Value that the statistic exceeds with probability 1 - `share`.
-    pub(super) fn quantile(&self, share: f64) -> f64 {
+    pub fn quantile(&self, share: f64) -> f64 {
         let student = (self.degrees_of_freedom < 1e4).then(|| StudentsT::new(0.0, 1.0, self.degrees_of_freedom));
         let expanded = || {
             // Expansion around the normal quantile (Fisher and Cornish 1960); its error is below 1e-7 here.

@@ -13,3 +13,4 @@ mod serve_hostile;
 mod serve_load;
 mod server_killed;
 mod side_by_side;
+mod stats_golden;

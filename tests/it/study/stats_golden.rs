@@ -1,8 +1,8 @@
 //! Compares statistics with scipy, statsmodels and krippendorff (`fixtures/reference/study_stats.py`).
 
-use super::estimate::{StudentEstimate, holm};
-use super::proportion::{BinomialCount, Equivalence};
-use super::rank::{MeasurementScale, alpha, friedman, median_interval, signed_rank};
+use orator_study::stats::estimate::{StudentEstimate, holm};
+use orator_study::stats::proportion::{BinomialCount, Equivalence};
+use orator_study::stats::rank::{MeasurementScale, alpha, friedman, median_interval, signed_rank};
 use serde::de::DeserializeOwned;
 use serde_json::Value;
 
