@@ -3,6 +3,7 @@
 mod analyse;
 mod build;
 mod coverage;
+mod design;
 mod end_to_end;
 mod films;
 mod pages;
