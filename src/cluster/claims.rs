@@ -18,8 +18,7 @@ use std::time::Duration;
 const UNITS_PER_FOLDER: usize = 1000;
 /// Number of free units from which the next one is drawn at random, so that workers seldom try the same unit.
 const FREE_CANDIDATES: usize = 16;
-/// Maximum number of claims whose owners are checked at a time; the random choices of all waiting workers together
-/// cover all units.
+/// Maximum number of claims whose owners are checked at a time; the random choices of waiting workers cover all units.
 const MAX_CHECKED: usize = 32;
 /// First waiting time of a worker. It grows by half each time, up to the interval between two checks for dead workers.
 const FIRST_WAIT: Duration = Duration::from_secs(2);
@@ -55,8 +54,7 @@ impl Claim {
         Ok(claim.map_or(ClaimOwner::Unreadable(file), ClaimOwner::Worker))
     }
 
-    /// Reads how the unit ended under this claim; `None` if no end is visible yet. An unreadable file counts as a
-    /// failure.
+    /// Reads how the unit ended under this claim; `None` if no end is visible yet. An unreadable file is a failure.
     pub fn read_end(self, folder: &impl SharedFolder) -> Result<Option<UnitEnd>> {
         let file = self.file("end");
         let damaged = || UnitEnd {

@@ -1,5 +1,4 @@
-//! Parts shared by the jobs of all schedulers: the command lines of the workers and of the final job, quoted for a
-//! POSIX shell.
+//! Parts of the jobs of all schedulers: command lines of the workers and of the final job, quoted for a POSIX shell.
 
 use super::plan::ClusterPlan;
 use orator_base::stage::artifacts::{StageName, speaker_dir};

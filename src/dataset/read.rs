@@ -164,8 +164,7 @@ impl Dataset {
         words.with_context(|| format!("cannot read {}.{WORDS_EXTENSION} in {}", sample.key, sample.shard))
     }
 
-    /// Reads the posture of a range of frames of a sample, without checking the hash. `None`: the sample has no
-    /// posture.
+    /// Reads the posture of frames of a sample, without checking the hash. `None`: the sample has no posture.
     pub fn posture(&self, sample: &SampleRef, frames: Range<usize>) -> Result<Option<Posture>> {
         let (Some(head), Some(trunk)) = (sample.head, sample.trunk) else { return Ok(None) };
         let angles = |range: ByteRange| -> Result<Array2<f32>> {

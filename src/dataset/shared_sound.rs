@@ -9,8 +9,7 @@ use orator_base::audio::fingerprint::PER_SEC;
 use serde::{Deserialize, Serialize};
 use std::cmp::Ordering;
 
-/// Largest share of different bits within shared sound; unrelated sounds differ in about half of the bits, with little
-/// variation.
+/// Largest share of different bits in shared sound; unrelated ones differ in about half of them, with little variation.
 const MAX_BIT_ERROR_RATE: f64 = 0.33;
 /// Window over which the share of different bits is computed, seconds.
 const WINDOW_SECS: f64 = 3.0;

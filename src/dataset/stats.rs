@@ -85,8 +85,7 @@ impl DatasetStats {
         table(&self.mean)
     }
 
-    /// Standard deviation of each joint coordinate, [49, 3], metres; 0 for the neck and for joints that are never
-    /// visible.
+    /// Standard deviation of each joint coordinate, [49, 3], metres; 0 for the neck and joints that are never visible.
     pub fn std(&self) -> Array2<f32> {
         table(&self.std)
     }

@@ -70,8 +70,7 @@ pub fn below(folder: &Path, endings: &[&str]) -> Result<Vec<PathBuf>> {
     Ok(files)
 }
 
-/// All files below `folder`, sorted by name within each folder; hidden names and folders rejected by `enter` are
-/// skipped.
+/// All files below `folder`, by name within each folder; hidden names and folders rejected by `enter` are skipped.
 ///
 /// # Errors
 ///

@@ -55,8 +55,7 @@ pub fn norm(params: &mut Params, name: &str, n: usize, slope: f64) -> Result<Bat
     BatchNorm::new(params, &format!("{name}.norm"), n, 1e-5, MOMENTUM, slope)
 }
 
-/// Creates fully connected layers between successive `widths`, with their norms; `last` is the negative slope of the
-/// last layer.
+/// Fully connected layers between successive `widths`, with their norms; `last`: the negative slope of the last layer.
 pub fn dense(params: &mut Params, prefix: &str, widths: &[usize], last: f64) -> Result<Vec<(Linear, BatchNorm)>> {
     let mut layers = Vec::new();
     for (i, pair) in widths.windows(2).enumerate() {

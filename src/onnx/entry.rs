@@ -116,8 +116,7 @@ pub enum TensorAxes {
 pub enum PictureFit {
     /// The complete image with its aspect ratio preserved, padded with grey level `pad`.
     Letterbox { anchor: Anchor, pad: u8 },
-    /// A person's bounding box extended to the aspect ratio of the input, then by the factor `margin`; black outside
-    /// the image.
+    /// A person's bounding box extended to the aspect ratio of the input, then by `margin`; black outside the image.
     Box { margin: f64 },
     /// A rotated square; black outside the image.
     #[default]

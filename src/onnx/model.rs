@@ -12,8 +12,7 @@ use sha2::{Digest, Sha256};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-/// Reason why a model cannot be used: `id` is the model, `path` its file, `found` the actual value instead of
-/// `expected`.
+/// Reason why a model cannot be used: `id` is the model, `path` its file, `found` the value instead of `expected`.
 #[derive(Clone, Debug, thiserror::Error, Serialize, Deserialize)]
 pub enum ModelError {
     /// The file does not exist.

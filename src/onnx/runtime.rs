@@ -26,8 +26,7 @@ pub struct Runtime {
 static LOADED: Mutex<Option<Runtime>> = Mutex::new(None);
 
 impl Runtime {
-    /// Loads the library `explicit` (if empty, the one found by [`find_library`]). Later calls return the first
-    /// library.
+    /// Loads the library `explicit` (if empty, that of [`find_library`]). Later calls return the first library.
     ///
     /// # Errors
     ///

@@ -67,8 +67,7 @@ pub struct SourceFile {
 #[serde(deny_unknown_fields)]
 pub struct Conversion {
     pub format: SourceFormat,
-    /// Names for the outputs of the source, in its order, "" for outputs to omit; if empty, the output names of the
-    /// model.
+    /// Names for the outputs of the source, in its order, "" for outputs to omit; if empty, the model's output names.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub outputs: Vec<String>,
 }

@@ -157,8 +157,7 @@ impl Pipeline {
                  --set work.dir=FOLDER",
         )?;
         for videos in &remaining {
-            // An interrupted replacement of a dataset is undone now, since its record is read before the dataset stage
-            // runs.
+            // An interrupted replacement of a dataset is undone now, since its record is read before that stage runs.
             workdir::recover_folder(&speaker_dir(&settings.work.dir, StageName::Dataset, &videos.speaker))?;
         }
         // Stage outputs and the work folder's own files are at most two folders deep.

@@ -1,5 +1,4 @@
-//! Status of a pipeline: the state of every unit at every stage, what a run would do, and the time budget of every
-//! video.
+//! Status of a pipeline: the state of every unit at every stage, what a run would do, the time budget of every video.
 
 use super::pipeline::Pipeline;
 use super::stages;
@@ -186,8 +185,7 @@ impl StatusCheck<'_> {
         stages::build(name, self.pipeline.config(), std::slice::from_ref(self.videos), self.ready)
     }
 
-    /// State of `unit` at a stage. `waits_for` is the first earlier stage that is not fresh; set to this stage if it
-    /// is not.
+    /// State of `unit` at a stage. `waits_for` is the first earlier stage not fresh; set to this stage if it is not.
     fn at(
         &self,
         name: StageName,

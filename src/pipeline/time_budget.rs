@@ -79,8 +79,7 @@ impl TimeBudget {
         Self { unit: speaker.to_owned(), ..Self::default() }
     }
 
-    /// Budget of one video from the stage outputs under `work`. `is_extracted`: the output of the extract stage is up
-    /// to date.
+    /// Budget of one video from the stage outputs under `work`. `is_extracted`: the extract stage is up to date.
     pub(super) fn of_video(work: &Path, unit: &Unit, progress: VideoProgress, is_extracted: bool) -> Self {
         let budget = Self { unit: unit.to_string(), kind: BudgetKind::Video, ..Self::default() };
         let media = if is_extracted { MediaInfo::read(&Artifact::MediaInfo.path(work, unit)).ok() } else { None };

@@ -62,8 +62,7 @@ pub struct PowerCurve {
     pub rows: Vec<PowerRow>,
     /// Number of votes from the closed formula for independent votes.
     pub naive_votes: u64,
-    /// Simulated power for that number of votes, rounded up to whole participants and limited to the range of the
-    /// search.
+    /// Simulated power for that number of votes, rounded up to participants and limited to the range of the search.
     pub at_naive: PowerRow,
 }
 

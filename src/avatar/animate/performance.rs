@@ -76,8 +76,7 @@ pub struct AnimationReport {
     pub captured: Vec<CapturedPart>,
 }
 
-/// Number of frames, at the motion's own rate, in which a part of the body was detected; in all others it is
-/// interpolated or held.
+/// Number of frames, at the motion's rate, in which a body part was detected; in all others it is interpolated or held.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct DetectedFrames {
     /// Shoulder, elbow and wrist.
@@ -266,8 +265,7 @@ fn animate(
 }
 
 impl Performance {
-    /// The performance at another rate: rotations between frames are interpolated spherically, existing frames are
-    /// unchanged.
+    /// The performance at another rate: rotations are interpolated spherically, existing frames are unchanged.
     pub fn resampled(&self, fps: FrameRate) -> Self {
         Self { rig: self.rig.clone(), clip: self.clip.resampled(fps), report: self.report.clone() }
     }

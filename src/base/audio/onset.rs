@@ -1,8 +1,7 @@
 //! Audio onsets as detected by librosa 0.11 with `onset_detect(y, sr=16000, hop_length=512, units="time")`, on which
-//! the beat metrics of the field are based: spectral flux of 128 mel bands in decibels (Boeck and Widmer 2013), then
-//! peaks above their surroundings. Decibels are clipped at 80 below the maximum of the complete sound, so a sound
-//! needs two passes: `Loudest`, then `Onsets`. Both process it in chunks and store only the strength per hop, 4 bytes
-//! per 32 ms.
+//! the field's beat metrics are based: spectral flux of 128 mel bands in decibels (Boeck and Widmer 2013), then peaks
+//! above their surroundings. Decibels are clipped at 80 below the maximum of the complete sound, so a sound needs two
+//! passes: `Loudest`, then `Onsets`. Both process it in chunks and store only the strength per hop, 4 bytes per 32 ms.
 
 use super::mel::Band;
 use super::spectrum::{StreamedSpectra, hann};

@@ -53,8 +53,7 @@ impl<F: Sortable> Ordered<F> {
 }
 
 impl Ordered<f64> {
-    /// Value at rank `share * (n - 1)`, interpolated linearly between its neighbours (numpy's `quantile`); `share` is
-    /// 0..=1.
+    /// Value at rank `share * (n - 1)`, interpolated between its neighbours (numpy's `quantile`); `share` is 0..=1.
     pub fn quantile(&self, share: f64) -> Option<f64> {
         let rank = share * self.0.len().checked_sub(1)? as f64;
         let (below, above) = (self.at(rank.floor() as usize)?, self.at(rank.ceil() as usize)?);

@@ -34,8 +34,7 @@ impl Rotation {
 
     /// Rotation that maps the axes x, y, z to the orthonormal right-handed `x`, `y`, `z`.
     pub fn from_axes(x: Vec3, y: Vec3, z: Vec3) -> Self {
-        // Shepperd's method: the largest of the four components is computed first, which avoids division by small
-        // numbers.
+        // Shepperd's method: the largest of the four components is computed first, to avoid division by small numbers.
         let trace = x[0] + y[1] + z[2];
         let q = if trace > x[0].max(y[1]).max(z[2]) {
             let s = (1.0 + trace).sqrt() * 2.0;
@@ -112,9 +111,8 @@ impl Rotation {
         (self * Self::about(scale(turn.v, 1.0 / sin), 2.0 * sin.atan2(turn.w) * t)).normalised()
     }
 
-    /// Cubic interpolation between the second and the third of four rotations that are evenly spaced in time; `t` is
-    /// 0..=1. A Catmull-Rom spline through the quaternions, normalised; its derivative is continuous across successive
-    /// segments.
+    /// Cubic interpolation between the second and third of four rotations evenly spaced in time; `t` is 0..=1. A
+    /// Catmull-Rom spline through the quaternions, normalised; its derivative is continuous across successive segments.
     pub fn cubic(near: [Self; 4], t: f64) -> Self {
         let turned = |to: Self, from: Self| if to.w * from.w + dot(to.v, from.v) < 0.0 { to.opposite() } else { to };
         let [before, from, to, after] = near;

@@ -46,8 +46,7 @@ impl Skeleton {
         world
     }
 
-    /// Computes the positions of all joints from one local rotation per joint (those of ends are ignored), with the
-    /// root at `root`.
+    /// Positions of all joints from one local rotation per joint (those of ends are ignored), with the root at `root`.
     pub fn positions(&self, root: Vec3, local: &[Rotation]) -> Vec<Vec3> {
         let world = self.world(local);
         let mut positions: Vec<Vec3> = Vec::with_capacity(local.len());

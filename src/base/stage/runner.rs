@@ -123,8 +123,7 @@ pub fn run_stages(
     answers.map(completed).collect()
 }
 
-/// Runs share `idx` of `of` of the unit's parts, except finished ones. Does nothing if the unit has no parts or is up
-/// to date.
+/// Runs share `idx` of `of` of the unit's unfinished parts. Does nothing if the unit has no parts or is up to date.
 ///
 /// # Errors
 /// An input cannot be read; the first error of a part.
@@ -221,8 +220,7 @@ fn run_unit<'a>(
 
 fn failed(folder: &Path, fingerprint: Option<Fingerprint>, error: anyhow::Error) -> StageOutcome {
     if !error.is::<ClaimLost>() {
-        // The failure is reported in any case; if even this file cannot be written, the work folder itself is
-        // unusable.
+        // The failure is reported in any case; if even this file cannot be written, the work folder itself is unusable.
         let _ = Failure { fingerprint, error: format!("{error:#}") }.write(folder);
     }
     StageOutcome::Failed(Arc::new(error))

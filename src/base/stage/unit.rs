@@ -66,8 +66,7 @@ pub trait Stage: Sync {
     fn common_folder(&self) -> Option<&Path> {
         None
     }
-    /// Whether other programs read the unit's folder for a long time, so that the stage must lock it before replacing
-    /// it.
+    /// Whether other programs read the unit's folder for a long time, so that it is locked before it is replaced.
     fn needs_folder_lock(&self) -> bool {
         false
     }

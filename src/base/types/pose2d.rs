@@ -4,8 +4,7 @@ use super::time::FrameRate;
 use ndarray::Array3;
 use serde::{Deserialize, Serialize};
 
-/// Number of body keypoints, COCO-17: nose, left/right eye, ear, shoulder, elbow, wrist, hip, knee, ankle (odd =
-/// left).
+/// Number of body keypoints, COCO-17: nose, left/right eye, ear, shoulder, elbow, wrist, hip, knee, ankle (odd = left).
 pub const N_BODY: usize = 17;
 /// Number of hand keypoints: wrist, then thumb, index, middle, ring, little finger, each from base to tip.
 pub const N_HAND: usize = 21;
@@ -64,8 +63,7 @@ pub struct Pose2d {
     /// Depth of the points of the [left, right] hand relative to the wrist, in px, away from the camera; `None` for a
     /// missing hand and for hand models without depth.
     pub hand_depth: [Option<[f32; N_HAND]>; 2],
-    /// Whether the detector found the opposite hand in the search regions of the [left, right] hand, which then counts
-    /// as missing.
+    /// Whether the opposite hand was found in the search regions of the [left, right] hand, which is then missing.
     pub other_hand: [bool; 2],
     /// The speaker's face, if it is large enough in the picture.
     pub face: Option<FaceMeasurement>,

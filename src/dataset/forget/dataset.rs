@@ -83,8 +83,7 @@ pub fn without(dir: &Path, names: &BTreeSet<String>) -> Result<()> {
     result
 }
 
-/// Removes a dataset, the entries of its videos last: after a kill, a second `forget` reads from them what is left to
-/// remove.
+/// Removes a dataset, the entries of its videos last: after a kill, a second `forget` reads there what is left.
 fn remove_dataset(dir: &Path) -> std::io::Result<()> {
     let entries = dir.join(entry::FOLDER);
     for folder in [dir, &entries].into_iter().filter(|folder| folder.is_dir()) {

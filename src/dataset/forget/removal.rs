@@ -107,8 +107,7 @@ impl Removal {
         let left_over = workdir::left_over(&dir);
         if !names.is_empty() || (whole_speaker && dir.exists()) || dir.join(PENDING).exists() {
             removal.dataset = Some((dir.clone(), names));
-            // The record of the dataset stage lists the videos among its inputs; its results, or a failure, may name their
-            // files.
+            // The record of the dataset stage has the videos as inputs; results or a failure may name their files.
             removal
                 .paths
                 .extend([record::record_path(&dir), record::failure_path(&dir)].into_iter().filter(|p| p.exists()));
@@ -169,8 +168,7 @@ impl Removal {
     /// Carries out the removal, including trained models unless `keep_models`.
     ///
     /// # Errors
-    /// A damaged file of a remaining video (detected before anything is removed), or a file that cannot be removed or
-    /// written.
+    /// A damaged file of a remaining video (detected before any removal), or a file that cannot be removed or written.
     pub fn carry_out(&self, keep_models: bool) -> Result<()> {
         if let Some((dir, names)) = &self.dataset {
             dataset::ensure_intact_without(dir, names)?;
@@ -263,8 +261,7 @@ fn remove(path: &Path) -> Result<()> {
     workdir::remove(path).with_context(|| format!("cannot remove {}", path.display()))
 }
 
-/// Search terms for `videos`: work names, dataset names and paths, and file names and hashes that no other video
-/// shares.
+/// Search terms for `videos`: work names, dataset names and paths, file names and hashes that no other video shares.
 fn terms(videos: &[&KnownVideo], others: &[&KnownVideo]) -> Vec<SearchTerm> {
     let mut terms: Vec<SearchTerm> = Vec::new();
     for video in videos {

@@ -27,8 +27,7 @@ struct MemberLocation {
     bytes: u64,
 }
 
-/// Sample that has not been read yet; members are in the order of `EXTENSIONS`, optional ones in that of
-/// `OPTIONAL_EXTENSIONS`.
+/// Sample not yet read; members are in the order of `EXTENSIONS`, optional ones in that of `OPTIONAL_EXTENSIONS`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ShardSample {
     pub key: String,

@@ -92,8 +92,7 @@ pub struct ExponentialMaps {
     /// Channel values outside the features: the first frame of the first file, with the root channels at 0.
     rest: Vec<f64>,
     joints: Vec<usize>,
-    /// Columns used as features, out of three for each of `joints`, with the mean and the largest absolute value of
-    /// each.
+    /// Columns used as features, out of three for each of `joints`, with mean and largest absolute value of each.
     columns: Vec<usize>,
     mean: Vec<f64>,
     largest: Vec<f64>,
@@ -165,8 +164,7 @@ impl ExponentialMaps {
         Ok(())
     }
 
-    /// Features of a file [T, columns] at 20 frames per second: the mean subtracted, divided by the largest absolute
-    /// value.
+    /// Features of a file [T, columns] at 20 frames per second: less the mean, divided by the largest absolute value.
     pub fn features(&self, bvh: &Bvh) -> Result<Array2<f32>> {
         let all = self.exponential_maps(bvh)?;
         Ok(Array2::from_shape_fn((all.nrows(), self.columns.len()), |(t, i)| {

@@ -1,5 +1,4 @@
-//! Keypoint arrays in `.npy` and `.npz` files, identified by their shapes: MediaPipe landmarks, PATS, COCO, and
-//! `keypoints.npz`.
+//! Keypoint arrays in `.npy` and `.npz`, identified by shape: MediaPipe landmarks, PATS, COCO, and `keypoints.npz`.
 
 use super::entry::point;
 use super::found::{FoundKeypoints, FoundPerson, NamedArrays};

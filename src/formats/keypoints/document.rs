@@ -49,8 +49,7 @@ pub enum FramePersons {
     Frames(BTreeMap<u64, Vec<JsonEntry>>),
 }
 
-/// Parses the keypoints of a complete video from the bytes of a JSON file. Errors name line and column, or frame and
-/// person.
+/// Parses the keypoints of a video from the bytes of a JSON file. Errors name line and column, or frame and person.
 pub fn parse(bytes: &[u8]) -> Result<FoundKeypoints> {
     let JsonPersons { program, image_size, persons } = read_persons(bytes)?;
     let frames = match persons {

@@ -1,5 +1,4 @@
-//! Keypoints detected by another program: all persons in every frame, at the program's own frame rate and in its own
-//! unit.
+//! Keypoints detected by another program: all persons in every frame, at its own frame rate and in its own unit.
 
 use super::range::{MAX_EXAMINED_POINTS, UPPER_BODY, are_fractions};
 use ndarray::ArrayD;

@@ -54,8 +54,7 @@ pub fn read(kind: MotionKind, path: &Path) -> Result<CapturedMotion> {
 ///
 /// # Errors
 ///
-/// The file is unreadable, is not of that kind, or holds samples; its frame rate, unit or coordinates are
-/// implausible.
+/// The file is unreadable, is not of that kind, or holds samples; its frame rate, unit or coordinates are implausible.
 pub fn read_in(kind: MotionKind, path: &Path, units: Option<LengthUnit>) -> Result<CapturedMotion> {
     let captured = match kind {
         MotionKind::Authors => {

@@ -123,8 +123,7 @@ pub fn read_at(path: &Path, fps: Option<FrameRate>, units: Option<LengthUnit>) -
     Ok(read)
 }
 
-/// Reads `pose3d` [T, 49, 3], with `mask` [T, 49] and `fps` if present, and returns whether the file states its frame
-/// rate.
+/// Reads `pose3d` [T, 49, 3], with `mask` [T, 49] and `fps` if present; returns whether the file states its frame rate.
 fn read_npz(path: &Path, assumed: FrameRate) -> Result<(Motion, bool)> {
     let mut npz = Npz::open(path)?;
     let shape: [AxisLength; 3] = [None, Some(N_JOINTS), Some(3)];

@@ -1,6 +1,5 @@
-//! Look-up in a table of word vectors, by the rules of FineMotion's entry to GENEA 2020: lower case, a final full
-//! stop removed; index 0 is padding, a vector of zeros, index 1 an unknown word, a vector of ones. Only the words are
-//! held in memory.
+//! Look-up in a table of word vectors, by the rules of FineMotion (GENEA 2020): lower case, a final full stop removed;
+//! index 0 is padding, a vector of zeros, index 1 an unknown word, a vector of ones. Only the words are held in memory.
 
 use super::writer::{VECTORS, WORDS};
 use anyhow::{Context, Result, ensure};

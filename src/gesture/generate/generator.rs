@@ -154,8 +154,7 @@ impl<I: Iterator<Item = Result<Vec<f32>>>> MelStream<I> {
         Self { pieces, n_samples, samples: Vec::new(), first: 0, tail }
     }
 
-    /// Log-mels [1, 64, T] of these spectrogram frames. Successive ranges may overlap, but their starts must not
-    /// decrease.
+    /// Log-mels [1, 64, T] of these spectrogram frames. Successive ranges may overlap, but starts must not decrease.
     pub fn log_mels(&mut self, frames: Range<usize>) -> Result<Tensor> {
         let first = frames.start * mel::HOP;
         let mels = mel::log_mel(&self.mirrored(first..first + mel::n_samples(frames.len()))?);

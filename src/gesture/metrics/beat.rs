@@ -204,8 +204,7 @@ pub(crate) fn aist(fps: f64) -> MetricFamily {
     })
 }
 
-/// Sum of the distances that joints 1-6 moved since the previous frame, 0 in the first frame; NaN where one is not
-/// visible.
+/// Sum of the distances joints 1-6 moved since the previous frame, 0 in the first frame; NaN where one is not visible.
 fn envelope(pair: &PairedFrames, poses: &[[Vec3; N_JOINTS]]) -> Vec<f64> {
     let joints = BodyPart::Body.joints();
     let at = |t: usize| match t {
@@ -218,8 +217,7 @@ fn envelope(pair: &PairedFrames, poses: &[[Vec3; N_JOINTS]]) -> Vec<f64> {
     (0..pair.n_frames()).map(at).collect()
 }
 
-/// Three joints of two neighbouring bones, and the mean change of their angle in the original dataset, half turns per
-/// frame.
+/// Three joints of two neighbouring bones, and their angle's mean change in the original dataset, half turns per frame.
 const TRIMODAL_ANGLES: [([usize; 3], f64); 4] = [
     ([NECK, R_SHOULDER, R_ELBOW], 0.003_454_075_893_387_198_4),
     ([R_SHOULDER, R_ELBOW, R_WRIST], 0.007_043_459_918_349_981),

@@ -15,8 +15,7 @@ pub use super::pair::MotionPair;
 pub use super::settings::Convention;
 pub use super::sums::MetricSums;
 
-/// Number of diagnostics at the start of the cheap sums: predicted joints that are not finite, frames of another frame
-/// rate.
+/// Number of diagnostics at the start of the cheap sums: predicted joints that are not finite, frames at another rate.
 const N_DIAGNOSTICS: usize = 2;
 
 pub struct Catalogue {
@@ -81,9 +80,8 @@ impl Catalogue {
         self.measure_blocks(interval, usize::MAX).total
     }
 
-    /// Sums of one interval, in total and in blocks of about `n_frames` frames. Windows that start in a block are
-    /// counted there, even if they extend beyond it, so that the blocks add up to the total and no value depends on
-    /// their length.
+    /// Sums of one interval, in total and in blocks of about `n_frames` frames. Windows are counted in the block in
+    /// which they start, so that the blocks add up to the total and no value depends on their length.
     pub fn measure_blocks(&self, interval: &MotionPair, n_frames: usize) -> IntervalSums {
         let pair = PairedFrames::new(interval);
         let n = n_blocks(pair.n_frames(), n_frames);

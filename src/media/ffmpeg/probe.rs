@@ -1,5 +1,4 @@
-//! Reads the headers of a media file without decoding. Missing values are `None`; a file with neither video nor audio
-//! is an error.
+//! Reads the headers of a file without decoding. Missing values are `None`; a file without video and audio is an error.
 
 use super::orientation::Orientation;
 use super::source;

@@ -1,5 +1,4 @@
-//! Conversion of decoded audio to mono f32 at one rate with swresample. A `Resampler` handles one continuous run of
-//! one format.
+//! Conversion of decoded audio to mono f32 at one rate with swresample. A `Resampler` handles one run of one format.
 
 use anyhow::{Context, Result, ensure};
 use ffmpeg_next as ffmpeg;

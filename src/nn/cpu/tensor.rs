@@ -78,8 +78,7 @@ pub fn aligned<T>(start: *const T) -> usize {
     start.align_offset(64).min(LANES - 1)
 }
 
-/// Calls `f` with a buffer of `len` values of arbitrary content, aligned to a cache line; the memory is reused by
-/// later calls.
+/// Calls `f` with a buffer of `len` values of arbitrary content, aligned to a cache line; later calls reuse the memory.
 pub fn scratch<T: Scalar, R>(len: usize, f: impl FnOnce(&mut [T]) -> R) -> R {
     let mut buffer = T::pool().with_borrow_mut(Vec::pop).unwrap_or_default();
     if buffer.len() < len + LANES {

@@ -40,8 +40,7 @@ pub struct ResizedPart {
 }
 
 impl ResizedPart {
-    /// Returns the input frame at or before the position of frame `i` of the result, and the fraction of the distance
-    /// to the next.
+    /// The input frame at or before the position of frame `i` of the result, and the fraction of the way to the next.
     fn source(&self, i: usize) -> (usize, f64) {
         let at = i as f64 * self.n_in as f64 / self.n_out as f64;
         let before = (at as usize).min(self.n_in.saturating_sub(1));

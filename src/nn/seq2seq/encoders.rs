@@ -115,8 +115,7 @@ pub struct WordEncoder {
 }
 
 impl WordEncoder {
-    /// Creates an encoder; `n` has the number of words, the size of a word vector and the size of a state in one
-    /// direction.
+    /// Creates an encoder; `n` has the number of words, the sizes of a word vector and a state in one direction.
     pub fn new(params: &mut Params, name: &str, n: [usize; 3]) -> Result<Self> {
         let [vocabulary, word, hidden] = n;
         let table = params.trainable(&table_name(name), &[vocabulary, word], Init::Uniform(3f64.sqrt()))?;

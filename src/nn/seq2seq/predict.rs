@@ -24,8 +24,7 @@ pub trait GesturePredictor: Send + Sync {
         candle_core::bail!("this network has no decoder that reads true poses: train it without scheduled sampling")
     }
 
-    /// Returns the network itself if it is an [`AudioBaseline`], whose pose codes are trained before the speech
-    /// encoder.
+    /// The network itself if it is an [`AudioBaseline`], whose pose codes are trained before the speech encoder.
     fn audio_baseline(&self) -> Option<&AudioBaseline> {
         None
     }
@@ -42,8 +41,7 @@ pub trait GesturePredictor: Send + Sync {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum StateAtSeams {
-    /// Computed from the encoder, as before the first segment, and updated with the previous poses: as in the authors'
-    /// code.
+    /// From the encoder, as before the first segment, and updated with the previous poses: as in the authors' code.
     #[default]
     Renewed,
     /// State after the previous segment, as in the paper.

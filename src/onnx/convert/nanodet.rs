@@ -1,6 +1,5 @@
-//! Converts NanoDet to person bounding boxes. Each cell of three grids predicts the distances to the four sides of a
-//! box, each as a distribution over multiples of the stride of the grid, of which the mean is taken (Li et al. 2020,
-//! section 3).
+//! Converts NanoDet to person bounding boxes. Each cell of three grids predicts the distances to the sides of a box,
+//! each as a distribution over multiples of the grid's stride, of which the mean is taken (Li et al. 2020, section 3).
 
 use super::graph::AttributeValue::{Int, Ints};
 use super::graph::OnnxGraph;

@@ -337,8 +337,7 @@ impl<'a> TfliteConverter<'a> {
     }
 }
 
-/// Zeros at the top, left, bottom and right for SAME or VALID padding of a window over each axis, given with the axis
-/// sizes.
+/// Zeros at top, left, bottom and right for SAME or VALID padding of a window over each axis, given with axis sizes.
 fn padding(options: FlatTable, windows: [(SlidingWindow, usize); 2]) -> Result<[i64; 4]> {
     let is_same_padding = options.byte(0)? == 0;
     let [(top, bottom), (left, right)] =

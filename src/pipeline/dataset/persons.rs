@@ -57,8 +57,7 @@ impl VideoPerson {
     }
 }
 
-/// Groups the videos by person, largest group first. A video that cannot be compared with any other is added to the
-/// first group.
+/// Groups the videos by person, largest group first. A video that cannot be compared is added to the first group.
 pub fn groups(videos: &[VideoPerson]) -> Vec<Vec<&VideoPerson>> {
     let step = videos.len().div_ceil(MAX_VIDEOS).max(1);
     let compared: Vec<&VideoPerson> = videos.iter().step_by(step).collect();
@@ -74,8 +73,7 @@ pub fn groups(videos: &[VideoPerson]) -> Vec<Vec<&VideoPerson>> {
     groups
 }
 
-/// Agglomerative clustering with average linkage: merges the two closest groups while their mean difference is below
-/// 1.
+/// Agglomerative clustering with average linkage: merges the two closest groups while their mean difference is below 1.
 fn cluster<'a, T>(items: &[&'a T], difference: impl Fn(&T, &T) -> Option<f64>) -> Vec<Vec<&'a T>> {
     let mut groups: Vec<Vec<&T>> = items.iter().map(|item| vec![*item]).collect();
     // Sum and number of the known differences between two groups.

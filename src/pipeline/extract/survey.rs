@@ -1,5 +1,4 @@
-//! Survey of full-size pictures, two consecutive ones per second: whether they are interlaced, and whether they have
-//! bars.
+//! Survey of full-size pictures, two consecutive per second: whether they are interlaced, and whether they have bars.
 
 use super::bars::BarFinder;
 use orator_base::types::image::{Image, PixelArea};

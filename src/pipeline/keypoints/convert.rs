@@ -22,8 +22,7 @@ pub struct ConvertedKeypoints {
     pub notes: Vec<String>,
 }
 
-/// Converts keypoints detected at `source_fps` in pictures of `image_size` (width, height in px) to keypoints at
-/// `fps`.
+/// Converts keypoints detected at `source_fps` in pictures of `image_size` (width, height in px) to keypoints at `fps`.
 pub fn convert(
     mut found: FoundKeypoints,
     source_fps: FrameRate,

@@ -12,8 +12,7 @@ use orator_base::types::skeleton::BODY_BONES;
 
 /// Largest valid coordinate, px.
 pub const MAX_PX: f32 = 1e6;
-/// Position of the nose on the line from the eyes to the neck; an estimated nose disturbs the lifted joints less than
-/// a missing one.
+/// Position of the nose on the line from the eyes to the neck; an estimate disturbs lifting less than a missing one.
 const NOSE_POSITION: f32 = 0.15;
 /// A point is an outlier if its distance from the median of the neighbouring frames exceeds this share of the body's
 /// largest bone...

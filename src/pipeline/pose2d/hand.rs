@@ -1,5 +1,4 @@
-//! Hand model: 21 points of the hand in a rotated square, the presence score, and the handedness if the model predicts
-//! it.
+//! Hand model: 21 points of the hand in a rotated square, the presence score, the handedness if the model predicts it.
 
 use super::body::{PointReader, map_points};
 use super::decode::{ScoredPoint, points};

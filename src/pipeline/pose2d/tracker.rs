@@ -68,8 +68,7 @@ impl Candidate {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TrackerStep {
     pub image_width: usize,
-    /// Weight of a new box in the moving average; `None`: the box stays unchanged and a missing person is not counted
-    /// as missed.
+    /// Weight of a new box in the moving average; `None`: the box stays and a missing person is not counted as missed.
     pub follow: Option<f64>,
     /// A body was detected in the tracked box since the last detection.
     pub body_visible: bool,

@@ -1,5 +1,4 @@
-//! Parent side of a subprocess: start it, send the request, wait for the answer, and kill it when it exceeds its
-//! limits.
+//! Parent side of a subprocess: start it, send the request, wait for the answer, kill it beyond its limits.
 
 use super::failure::plain;
 use super::limits::Limits;
@@ -148,8 +147,7 @@ fn watch(pid: Pid, limits: &Limits, n_reads: &AtomicU64, stop: Receiver<()>) -> 
 /// a read from storage. `None`: unknown.
 fn cpu_secs(pid: Pid) -> Option<(f64, bool)> {
     let stat = std::fs::read_to_string(format!("/proc/{}/stat", pid.as_raw_nonzero())).ok()?;
-    // The process name may contain anything, so parsing starts after it: field 3 is the state, fields 14 and 15 are
-    // the times.
+    // The process name may contain anything, so parsing starts after it: field 3 is the state, 14 and 15 are the times.
     let (_, fields) = stat.rsplit_once(')')?;
     let ticks = fields.split_whitespace().skip(11).take(2).map(|ticks| ticks.parse::<u64>().ok());
     let is_blocked = fields.trim_start().starts_with('D');

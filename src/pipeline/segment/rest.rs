@@ -6,8 +6,7 @@ use ndarray::ArrayView2;
 use orator_base::math::order::lower_median;
 use orator_base::types::pose2d::{Keypoints, VISIBLE_SCORE, coco};
 
-/// Largest wrist distance, in shoulder widths, of hands that are together. In videos of three resting people it is 0.3
-/// to 0.55.
+/// Largest wrist distance, in shoulder widths, of hands that are together. Three resting people had 0.3 to 0.55.
 const MAX_WRIST_DISTANCE: f32 = 0.6;
 const HALF_WINDOW_SECS: f64 = 0.5;
 /// Quantile of the distances that counts as movement, so that single outliers are ignored.

@@ -1,5 +1,4 @@
-//! Histograms, with their thresholds, of every measure over all frames of all videos and of the lengths of accepted
-//! intervals.
+//! Histograms, with their thresholds, of every measure over all frames and of the lengths of accepted intervals.
 
 use super::thresholds::THRESHOLDS;
 use crate::html::chart::histogram::{Counts, ThresholdLine, histogram};

@@ -137,8 +137,7 @@ fn farthest(
 ) -> Option<(usize, f64, Bound, bool)> {
     let on_frames = frame_rules(rules).into_iter().filter(|rule| rule.rejection == rejection);
     let on_frames = on_frames.map(|rule| (rule.values, rule.bound, !rule.measures_secs));
-    // If the rule requires a minimum share, frames that do not count are bad; for a maximum share, those that count
-    // are.
+    // If the rule requires a minimum share, frames that do not count are bad; for a maximum, those that count are.
     let on_pieces = segment_rules(rules).into_iter().filter(|rule| rule.rejection == rejection).map(|rule| {
         let bad = match rule.share {
             Bound::AtLeast(_) => rule.counted,
@@ -244,8 +243,7 @@ pub fn thumbnails(
     moments.into_iter().map(|frames| Ok((frames.clone(), picture(frames)?))).collect()
 }
 
-/// Current frame of the reader, or an empty picture, overlaid with its keypoints; `n_wide` thumbnails share the maximum
-/// width.
+/// Current frame of the reader, or an empty picture, overlaid with its keypoints; `n_wide` thumbnails share the width.
 fn draw_thumbnail(
     reader: Option<&mut FrameReader>,
     keypoints: &Keypoints,

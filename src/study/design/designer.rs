@@ -173,8 +173,7 @@ fn film_sound(task: &StudyTask) -> FilmSound {
     if task.sound { FilmSound::Speech } else { FilmSound::Silence }
 }
 
-/// Variants per check clip, each with its own number, so that a number passed on between participants helps few of
-/// them.
+/// Variants per check clip, each with its own number, so that a number passed on helps few participants.
 pub(super) const N_VARIANTS: usize = 4;
 
 /// Indices of the main trials before which attention checks are inserted, ascending: spread evenly over the session,

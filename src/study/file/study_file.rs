@@ -22,8 +22,7 @@ pub struct StudyFile {
     pub seed: u64,
     /// Target number of participants.
     pub participants: usize,
-    /// Number of extra sessions, for replacing participants who withdraw or are excluded, divided by the number of
-    /// participants.
+    /// Extra sessions, for replacing participants who withdraw or are excluded, divided by the number of participants.
     #[serde(default = "half", alias = "spare")]
     pub extra_session_ratio: f64,
     /// Languages of the page; the first is the fallback for participants who prefer none of them.

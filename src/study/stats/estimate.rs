@@ -125,8 +125,7 @@ impl StudentEstimate {
     }
 }
 
-/// Holm-adjusted p values in the given order: a hypothesis is rejected at a level if its adjusted p value is at most
-/// that level.
+/// Holm-adjusted p values in given order: a hypothesis is rejected at a level if its adjusted value is at most that.
 ///
 /// # Errors
 /// A p value is outside 0 to 1.

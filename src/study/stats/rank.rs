@@ -118,8 +118,7 @@ pub fn median_interval(values: &[f64], confidence: f64) -> Result<ConfidenceInte
     let n = values.len();
     let too_few = |min| StatisticsError::TooFew { what: "values", min, found: n };
     let below = Binomial::new(0.5, n as u64).map_err(|_| too_few(1))?;
-    // `outside` values are excluded at each end: it is the largest rank whose cumulative probability does not exceed
-    // the tail.
+    // `outside` values are excluded at each end: the largest rank whose cumulative probability is within the tail.
     let Some(outside) = (0..n.div_ceil(2)).take_while(|rank| below.cdf(*rank as u64) <= tail).last() else {
         return Err(too_few((-tail.log2()).ceil() as usize));
     };

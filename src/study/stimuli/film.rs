@@ -53,8 +53,7 @@ pub struct FilmScene<'a> {
     pub number: Option<u16>,
 }
 
-/// Opaque name of the film with this content: 16 hexadecimal digits of a hash keyed by the seed, which do not reveal
-/// the content.
+/// Opaque name of a film with this content: 16 hex digits of a hash keyed by the seed, which do not reveal the content.
 pub fn film_name(seed: u64, content: &FilmContent) -> String {
     let key = blake3::derive_key(NAME_CONTEXT, &seed.to_le_bytes());
     let FilmContent { clip, speaker, condition, motion_of, number, sound, right } = content;

@@ -219,8 +219,7 @@ fn fade_ends(mut sound: Sound) -> Sound {
     sound
 }
 
-/// Sound of the sound check: `n` evenly spaced tones separated by silence of at least their duration, over `length`
-/// samples.
+/// The sound check: `n` evenly spaced tones separated by silence of at least their duration, over `length` samples.
 fn tones(n: usize, rate: u32, length: usize) -> Sound {
     let rate_hz = f64::from(rate.max(1));
     let apart = length as f64 / rate_hz / (n + 1) as f64;

@@ -179,8 +179,7 @@ pub enum BeginOutcome {
     Begun(Participant),
     /// The identifier is that of a participant who was replaced.
     Replaced,
-    /// A session that has answers or is still held has the same ID. Only its token resumes it, because anybody can send
-    /// an ID.
+    /// A session that has answers or is still held has the same ID. Only its token resumes it: anybody can send an ID.
     Known,
     /// The study has all its participants.
     Full,

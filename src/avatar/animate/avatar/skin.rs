@@ -21,8 +21,7 @@ type Shares = Vec<(usize, f64)>;
 /// A chain of joints and the transitions between them.
 struct WeightChain {
     joints: Vec<usize>,
-    /// For each joint but the first: position and normal of the transition plane, and half the width of the transition
-    /// (cm).
+    /// For each joint but the first: position and normal of the transition plane, half the transition's width (cm).
     transitions: Vec<(Vec3, Vec3, f64)>,
 }
 

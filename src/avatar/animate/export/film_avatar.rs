@@ -77,8 +77,7 @@ pub struct AvatarStage {
 }
 
 impl AvatarStage {
-    /// Avatar of the performances' rig, with a camera of `size` px in which all of them fit; `None` without a
-    /// performance.
+    /// Avatar of the performances' rig, with a camera of `size` px in which they all fit; `None` without a performance.
     pub fn new(shown: &[&Performance], appearance: &Appearance, size: [usize; 2], from: FilmCamera) -> Option<Self> {
         let avatar = Avatar::new(&shown.first()?.rig, appearance);
         Some(Self { avatar, camera: from.framing(shown, size), from, offsets: &ALONE })

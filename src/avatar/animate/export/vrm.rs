@@ -23,8 +23,7 @@ pub fn avatar(rig: &Rig, avatar: &Avatar) -> Vec<u8> {
     buffer.file(scene)
 }
 
-/// Bytes of the `.vrma` file of a clip: joints without a skin, the animation, and the mapping of humanoid bones to
-/// nodes.
+/// Bytes of the `.vrma` file of a clip: joints without skin, the animation, the mapping of humanoid bones to nodes.
 pub fn motion(rig: &Rig, clip: &BvhClip) -> Vec<u8> {
     let skeleton = FileSkeleton::new(&rig.skeleton, Names::Vrm, RestAxes::Convention);
     let mut buffer = GlbBuffer::default();

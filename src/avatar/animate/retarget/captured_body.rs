@@ -153,8 +153,7 @@ impl CapturedBody {
         CapturedPart::ALL.into_iter().filter(has).collect()
     }
 
-    /// Gives a rig the rest pose of the capture, and its legs the captured lengths unless these are implausible for its
-    /// arms.
+    /// Gives a rig the rest pose of the capture, and its legs the captured lengths unless implausible for its arms.
     pub fn fit(&self, rig: &mut Rig) {
         let rest = self.rest.iter().filter_map(|(ours, turn)| Some((rig.skeleton.find(ours)?, *turn))).collect();
         rig.rest = rest;

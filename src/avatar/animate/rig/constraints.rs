@@ -170,9 +170,8 @@ fn limit_curl_spread(pose: &mut ArmPose, counter: &mut ClampCounter) {
     }
 }
 
-/// Mean of four angles that is also the mean after clamping around it; if there are several, the one nearest to the
-/// plain mean. `rise(m)`, the mean of the clamped angles minus m, decreases with m; its root is bisected from the plain
-/// mean.
+/// Mean of four angles that is also the mean after clamping around it; of several, the one nearest to the plain mean.
+/// `rise(m)`, the mean of the clamped angles minus m, decreases with m; its root is bisected from the plain mean.
 fn coherent_mean(given: [f64; 4]) -> f64 {
     let rise = |m: f64| given.iter().map(|f| (f - m).clamp(-CURL_COHERENCE, CURL_COHERENCE)).sum::<f64>() / 4.0;
     let mean = given.iter().sum::<f64>() / 4.0;

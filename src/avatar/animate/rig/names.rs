@@ -14,8 +14,7 @@ pub enum Names {
     UnityHumanoid,
     /// Humanoid bones of VRM 1.0 (`VRMC_vrm`).
     Vrm,
-    /// Body of Unreal's Manny and of MetaHumans; our chest is `spine_05`, and `spine_02` to `spine_04` and `neck_02`
-    /// are absent.
+    /// Unreal's Manny and MetaHumans; our chest is `spine_05`, and `spine_02` to `spine_04` and `neck_02` are absent.
     Unreal,
 }
 

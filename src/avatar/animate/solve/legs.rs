@@ -39,8 +39,7 @@ impl Leg {
         [self.lower, self.foot].map(|joint| norm(rig.skeleton.joints[joint].offset))
     }
 
-    /// Rotates the leg so that it reaches by `way` from the hip joint to the ankle, with the knee forward and the foot
-    /// level.
+    /// Rotates the leg so that it reaches by `way` from the hip joint to the ankle, the knee forward, the foot level.
     fn reach_ankle(&self, rig: &Rig, hips: Rotation, way: Vec3, local: &mut [Rotation]) {
         let [thigh, shin] = self.lengths(rig);
         let far = norm(way).clamp((thigh - shin).abs() + 1e-6, thigh + shin - 1e-6);

@@ -35,8 +35,7 @@ pub struct FolderLock {
 
 static PROGRAM: OnceLock<String> = OnceLock::new();
 
-/// Sets the description of this program that other programs report when they find its locks; only the first call
-/// counts.
+/// Sets the description of this program that others report when they find its locks; only the first call counts.
 pub fn announce(program: String) {
     PROGRAM.get_or_init(|| program);
 }
@@ -103,8 +102,7 @@ impl FolderLock {
 impl Drop for FolderLock {
     fn drop(&mut self) {
         if let (Some(file), Some(path)) = (&self.file, &self.path) {
-            // The last holder deletes the file; a program that has opened it meanwhile notices that and opens a new
-            // one.
+            // The last holder deletes the file; a program that opened it meanwhile notices that and opens a new one.
             if file.unlock().is_ok() && file.try_lock().is_ok() && is_at(file, path) {
                 let _ = fs::remove_file(path);
             }

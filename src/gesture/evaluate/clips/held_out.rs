@@ -25,8 +25,7 @@ pub struct HeldOutInterval {
     pub words: Vec<Word>,
 }
 
-/// Samples of `split` in the order of the dataset. Fails if there are none, with the names of the splits that have
-/// some.
+/// Samples of `split` in the order of the dataset. Fails if there are none, naming the splits that have some.
 pub fn samples(dataset: &Dataset, split: Split) -> Result<Vec<SampleRef>> {
     let samples = dataset.samples(split);
     if samples.is_empty() {

@@ -32,9 +32,8 @@ impl MotionStore {
         Self(Mutex::new(StoreState { left: usize::MAX, file: None }))
     }
 
-    /// Store that holds `memory_bytes` in memory and everything else in a temporary file in `folder`. The file is
-    /// opened immediately, since the process may lose the permission later. If it cannot be created, everything is held
-    /// in memory.
+    /// Store that holds `memory_bytes` in memory and the rest in a temporary file in `folder`. The file is opened now,
+    /// since the process may lose the permission later. If it cannot be created, everything is held in memory.
     pub fn in_folder(folder: &Path, memory_bytes: usize) -> Self {
         match FileMemory::new(folder) {
             Ok(file) => Self(Mutex::new(StoreState { left: memory_bytes, file: Some(file) })),

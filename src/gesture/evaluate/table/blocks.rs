@@ -90,8 +90,7 @@ pub fn frame_errors(clips: &EvalClips, predictor: &Predictor) -> Vec<Vec<f64>> {
     (0..clips.clips.len()).into_par_iter().map(of_clip).collect()
 }
 
-/// Compares one half of the ground truth with the other: every second block is treated as the prediction of the
-/// previous block.
+/// Compares one half of the ground truth with the other: every second block is the prediction of the previous one.
 pub fn halves(catalogue: &Catalogue, clips: &EvalClips) -> IntervalSums {
     let length = ((HALVES_SECS * clips.fps.per_sec()).round() as usize).max(1);
     let stretches = |clip: usize| (0..clips.clips[clip].n_frames() / length).map(move |i| (clip, i * length));
@@ -156,9 +155,8 @@ impl BlockLength {
         ((self.secs * fps).round() as usize).max(1)
     }
 
-    /// Variance of the mean of blocks of `block_secs` relative to that of independent blocks: `1 + 2 r` with the
-    /// correlation r of the means of neighbouring blocks of a first-order autoregressive process with this
-    /// decorrelation time.
+    /// Variance of the mean of blocks of `block_secs` relative to independent blocks: `1 + 2 r` with the correlation r
+    /// of the means of neighbouring blocks of a first-order autoregressive process with this decorrelation time.
     pub fn variance_inflation(&self, block_secs: f64) -> f64 {
         // Length of a block in time constants of the exponential decay.
         let length = 2.0 * block_secs / self.decorrelation_secs;
@@ -176,10 +174,9 @@ const WINDOW: f64 = 5.0;
 const MIN_REMAINING: f64 = 0.1;
 
 /// Integrated autocorrelation time in frames, `1 + 2 * (sum of the autocorrelations)`, of a series in pieces: the mean
-/// of N frames has the variance of that of N / time independent frames. It is at least 1 and at most the number of
-/// frames; 1 for a constant series. Lags do not cross pieces, but the mean is that of all pieces, so that pieces of
-/// different level give a long time. Frames that are not finite are ignored. The result is corrected for the use of the
-/// sample mean.
+/// of N frames has the variance of that of N / time independent frames. It is 1 to the number of frames; 1 for a
+/// constant series. Lags do not cross pieces, but the mean is that of all pieces, so that pieces of different level
+/// give a long time. Frames that are not finite are ignored. The result is corrected for the use of the sample mean.
 pub fn integrated_time(pieces: &[Vec<f64>]) -> f64 {
     let (time, window, n) = windowed(pieces);
     if window == 0 {

@@ -14,8 +14,7 @@ use std::path::Path;
 
 pub const VERSION: u64 = 1;
 
-/// Result as JSON. The keys of the first checkpoint are the same as for a single one; those of the others end in their
-/// number.
+/// Result as JSON. The keys of the first checkpoint are those of a single one; those of the others end in their number.
 pub fn json(table: &Table) -> Value {
     let metrics = (0..table.definitions.len()).map(|index| metric(table, index));
     let predictors = table.rows.iter().map(|row| {

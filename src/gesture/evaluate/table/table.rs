@@ -222,8 +222,7 @@ impl Table {
         self.definitions[index].better != Better::Neither && has_value
     }
 
-    /// Gain of `a` over `b` in a metric, in its unit, positive if `a` is better. NaN if neither direction of the metric
-    /// is better.
+    /// Gain of `a` over `b` in a metric, in its unit, positive if `a` is better. NaN if neither direction is better.
     pub fn gain(&self, a: &PredictorRow, b: &PredictorRow, index: usize) -> f64 {
         let value = |row: &PredictorRow, index: usize| row.values[index].value;
         self.quality(index, |index| value(a, index)) - self.quality(index, |index| value(b, index))

@@ -1,7 +1,6 @@
 //! Readings: values for the keys of `[seq2seq]` that are `"auto"`. FineMotion's paper (GENEA 2020) and its published
-//! code differ in the losses, the words of a segment and the state at seams; [`READING_ROWS`] has both values of each key
-//! with their sources. The reading `auto` uses those of the code and chooses the number of epochs by the minutes of
-//! motion.
+//! code differ in the losses, the words of a segment and the state at seams; [`READING_ROWS`] has both values of each
+//! key with their sources. The reading `auto` uses those of the code and chooses the epochs by the minutes of motion.
 
 use anyhow::{Context, Result, ensure};
 use orator_base::text::counted;
@@ -144,8 +143,7 @@ pub fn settings(requested: &Seq2seqConfig) -> Result<Seq2seqSettings> {
     Ok(settings)
 }
 
-/// Value of a row in the requested reading. The reading `auto` trains every network on batches of 50 segments that do not
-/// overlap.
+/// Value of a row in the requested reading. `auto` trains every network on batches of 50 segments that do not overlap.
 fn reading_value(row: &ReadingRow, requested: &Seq2seqConfig) -> ReadingValue {
     match (requested.reading, row.key) {
         (FineMotionReading::Paper, _) => row.paper.0,

@@ -300,8 +300,7 @@ impl ValidatedTraining for SequenceTraining<'_> {
     }
 }
 
-/// Newest checkpoint and its state, with the settings of the resumed training. Reports where these differ from
-/// `requested`.
+/// Newest checkpoint, its state and the settings of the resumed training. Reports where these differ from `requested`.
 fn resume(
     source: TrainingSource,
     requested: &Seq2seqConfig,

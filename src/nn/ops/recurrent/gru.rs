@@ -13,8 +13,7 @@ use candle_core::{Result, Shape, Tensor};
 use rand::Rng;
 
 /// A layer with its weights, named as in PyTorch: `<name>.weight_ih_l0` [3 H, I], `.weight_hh_l0` [3 H, H],
-/// `.bias_ih_l0` and `.bias_hh_l0` [3 H], with the suffix `_reverse` for the reverse direction; rows are reset,
-/// update, candidate.
+/// `.bias_ih_l0` and `.bias_hh_l0` [3 H], with `_reverse` for the reverse direction; rows are reset, update, candidate.
 pub struct Gru {
     /// Four tensors per direction.
     weights: Vec<Tensor>,

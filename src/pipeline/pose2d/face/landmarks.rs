@@ -61,8 +61,7 @@ pub fn region(points: &[FacePoint]) -> Region {
 mod tests {
     use super::*;
 
-    /// A face 100 px wide and 140 px high around (200, 100), eyes 60 px apart, lips `open` px apart, rotated by
-    /// `angle`.
+    /// A face 100 px wide and 140 px high around (200, 100), eyes 60 px and lips `open` px apart, rotated by `angle`.
     fn face(open: f64, angle: f64) -> Vec<FacePoint> {
         let mut points: Vec<FacePoint> = (0..N_LANDMARKS)
             .map(|k| {

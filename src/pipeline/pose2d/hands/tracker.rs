@@ -42,8 +42,7 @@ const MIN_SIDE_PROBABILITY: f64 = 0.3;
 const N_PROMPT_SEARCHES: u32 = 3;
 /// Largest number of doublings of the pause.
 const MAX_DOUBLINGS: u32 = 2;
-/// An arm whose wrist moved by more than this since the last unsuccessful search, in body widths, is searched at
-/// once.
+/// An arm whose wrist moved by more than this since the last unsuccessful search, in body widths, is searched at once.
 const MIN_WRIST_MOVEMENT: f64 = 0.15;
 
 /// Backoff after unsuccessful searches.
@@ -54,8 +53,7 @@ struct SearchPause {
 }
 
 impl SearchPause {
-    /// Records an unsuccessful search in frame `now`: a pause of `shortest` frames, doubled by each failure beyond
-    /// `prompt`.
+    /// Records a failed search in frame `now`: a pause of `shortest` frames, doubled by each failure beyond `prompt`.
     fn fail(&mut self, now: usize, shortest: usize, prompt: u32) {
         self.n_failed = self.n_failed.saturating_add(1);
         let doublings = self.n_failed.saturating_sub(prompt).min(MAX_DOUBLINGS);

@@ -21,8 +21,7 @@ use std::path::Path;
 #[derive(Default, Serialize, Deserialize)]
 pub struct PoseSpan {
     pub frames: KeypointFrames,
-    /// Number of shots with several people, and of those in which the active speaker is followed; `None`: the largest
-    /// person is.
+    /// Number of shots with several people, and of those that follow the active speaker; `None`: the largest person is.
     pub followed: Option<[usize; 2]>,
     pub portrait: PortraitViews,
     /// Width and height of the picture, px.

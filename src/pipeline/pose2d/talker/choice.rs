@@ -1,5 +1,4 @@
-//! Choice of the active speaker of a shot: the mouth whose opening correlates best with the voice, if that is
-//! significant.
+//! Choice of the active speaker of a shot: the mouth that correlates best with the voice, if significantly.
 
 use crate::lip_sync::LipVoiceMatch;
 use orator_base::audio::openness::Openness;

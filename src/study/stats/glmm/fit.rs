@@ -97,9 +97,8 @@ pub fn logistic(log_odds: f64) -> f64 {
     1.0 / (1.0 + (-log_odds).exp())
 }
 
-/// Mean of the logistic function of a normal variable, and its derivatives with respect to the mean and the variance
-/// (the latter is half the second derivative with respect to the mean). Sums over ±8 standard deviations in steps of
-/// 1/16.
+/// Mean of the logistic function of a normal variable, its derivatives with respect to the mean and the variance (the
+/// latter is half the second derivative with respect to the mean). Sums over ±8 standard deviations in steps of 1/16.
 pub fn integrated(mean: f64, sd: f64) -> (f64, f64, f64) {
     let points = (-128..=128).map(|k| f64::from(k) / 16.0);
     let sums = points.fold((0.0, 0.0, 0.0, 0.0), |(total, a, b, c), z| {
