@@ -1,8 +1,7 @@
-//! Assignment of units to workers by files that are created once and never changed. `NUMBER.claim.EPOCH` names the
-//! worker that owns a unit; `NUMBER.end.EPOCH` records how the unit ended. A worker that takes a unit over from a dead
-//! worker, or retries it after a failure, creates the claim of the next epoch: if two workers try, one succeeds, and no
-//! other claim is affected. The claim of the highest epoch is valid; the owner of an older one discards its work
-//! (`Claims::is_mine`).
+//! Assignment of units to workers by files created once and never changed. `NUMBER.claim.EPOCH` names the worker that
+//! owns a unit; `NUMBER.end.EPOCH` records how it ended. A worker that takes a unit over from a dead worker, or retries
+//! it after a failure, creates the claim of the next epoch: if two workers try, one succeeds, and no other claim is
+//! affected. The claim of the highest epoch is valid; the owner of an older one discards its work (`Claims::is_mine`).
 
 use super::heartbeat::BeatWatch;
 use super::shared_folder::SharedFolder;
@@ -326,8 +325,7 @@ impl<'a, F: SharedFolder> Claims<'a, F> {
         Ok(failed)
     }
 
-    /// Collects the claims of dead workers and of workers that exited before the unit ended; `now` is the time on this
-    /// worker's clock.
+    /// Collects claims of dead workers and of workers that exited before the unit ended; `now`: this worker's clock.
     fn check_workers(&mut self, now: Duration) -> Result<()> {
         if !self.orphaned.is_empty() || now < self.next_check {
             return Ok(());

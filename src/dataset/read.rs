@@ -41,8 +41,7 @@ pub struct Dataset {
 
 impl Dataset {
     /// Opens the folder of one speaker (`work/dataset/<speaker>`): reads its JSON files and checks that every shard
-    /// exists and has the recorded size. Contents are checked by `read` and `verify`. Other processes cannot write the
-    /// folder while it is open.
+    /// exists and has the recorded size. Contents are checked by `read` and `verify`. Others cannot write it meanwhile.
     ///
     /// # Errors
     /// A folder that is not a dataset, is damaged, or is being written (`BusyFolder`).

@@ -88,8 +88,7 @@ pub fn find(names: &[String], codes: impl Fn(usize) -> Result<Vec<u32>>, min_sec
     Ok(found)
 }
 
-/// For every pair of videos with equal codes, the offsets (position in the second minus position in the first) with at
-/// least `MIN_VOTES`.
+/// For pairs of videos with equal codes, the offsets (position in the second less the first) with at least `MIN_VOTES`.
 fn votes(landmarks: &[Landmark]) -> Vec<((u32, u32), Vec<i64>)> {
     let mut votes: Vec<((u32, u32), i64)> = Vec::new();
     for group in landmarks.chunk_by(|x, y| x.0 == y.0).filter(|group| group.len() <= MAX_OCCURRENCES) {

@@ -182,8 +182,7 @@ impl Layout {
     ///
     /// # Errors
     ///
-    /// The elements are not of type `element`, the rows do not have the shape `row`, or the file is not exactly as
-    /// long as the header implies.
+    /// The elements are not `element`, the rows not of shape `row`, or the file is not as long as the header implies.
     pub fn parse(bytes: &[u8], file_bytes: u64, element: Element, row: &[usize]) -> anyhow::Result<Layout> {
         ensure!(bytes.starts_with(MAGIC), "not a .npy file of version 1.0");
         let length = match bytes.get(8..10) {

@@ -23,8 +23,7 @@ const MIN_KNOWN_SECS: f64 = 3.0;
 const MIN_LIP_DEVIATION: f64 = 0.06;
 /// Correlation of lips and own voice that is tested against 0, the correlation with unrelated voices.
 const OWN_CORRELATION: f64 = 0.25;
-/// Independent samples per second, at most one a frame: the correlation of unrelated pairs deviates from 0 by
-/// 1 / sqrt(9 * seconds).
+/// Independent samples per second, at most one a frame: unrelated pairs correlate by 1 / sqrt(9 * seconds).
 const INDEPENDENT_PER_SEC: f64 = 9.0;
 /// Limit of the normalised signals in standard deviations.
 const MAX_DEVIATIONS: f64 = 3.0;

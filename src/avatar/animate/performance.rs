@@ -131,8 +131,7 @@ impl AnimationReport {
         LIMBS.iter().filter(|limb| !limb.is_visible(frame)).map(|limb| limb.name).collect()
     }
 
-    /// Frames [start, end) in which each limb was not detected, in a clip of `n_frames` frames; limbs that were always
-    /// detected are left out.
+    /// Frames [start, end) in which each limb was not detected, in a clip of `n_frames` frames; others are left out.
     pub fn hidden_ranges(&self, n_frames: usize) -> BTreeMap<&'static str, Vec<[usize; 2]>> {
         let mut hidden = BTreeMap::<&'static str, Vec<[usize; 2]>>::new();
         for frame_idx in 0..n_frames {
@@ -165,8 +164,7 @@ pub struct Performance {
     pub report: AnimationReport,
 }
 
-/// Animates a motion on a rig with its own bone lengths; a `posture` turns head and trunk without moving joints
-/// relative to the neck.
+/// Animates a motion on a rig of its lengths; a `posture` turns head and trunk without moving joints from the neck.
 ///
 /// Joint limits are applied before directions are smoothed, so that a misplaced joint does not distort neighbouring
 /// frames, and again after smoothing and at the output rate, so that they hold in every written frame. Noise of hands

@@ -195,8 +195,7 @@ impl Shading {
         light
     }
 
-    /// Draws a row of pixels over the background in `image` and stores the frontmost triangles in `front`; `[left, y]`
-    /// is the first pixel.
+    /// Draws a row of pixels over `image` and stores the frontmost triangles in `front`; `[left, y]`: the first pixel.
     pub fn draw_row(
         &mut self,
         surfaces: &Surfaces,

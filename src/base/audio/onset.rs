@@ -21,8 +21,7 @@ const N_BEFORE: usize = 1 + WINDOW / (2 * HOP);
 const DELTA: f64 = 0.07;
 const AROUND: usize = 3;
 
-/// Returns the onset times in seconds of mono sound at 16 kHz, samples in -1..1 (non-finite ones count as 0). Empty
-/// for a constant sound.
+/// Onset times in seconds of mono sound at 16 kHz, samples in -1..1 (non-finite ones count as 0). Empty if constant.
 pub fn onsets(samples: &[f32]) -> Vec<f64> {
     let mut loudest = Loudest::default();
     loudest.push(samples);

@@ -1,7 +1,6 @@
 //! Smoothing that adapts to the measured noise. A parabola is fitted around every frame under Gaussian windows of
 //! increasing width, and the widest window is chosen whose result differs from those of all narrower ones by no more
-//! than noise and a tolerance explain (Lepski 1990): a static limb is smoothed over a long time, a stroke is left
-//! unchanged. There is no delay.
+//! than noise and a tolerance explain (Lepski 1990): a static limb is smoothed long, a stroke is unchanged. No delay.
 
 use super::order::{Ordered, lower_quantile};
 use super::vec3::{Vec3, add, dot, norm, scale, sub};
@@ -156,8 +155,7 @@ const MEAN_FRAMES: usize = 9;
 const QUIET_QUANTILE: f64 = 0.3;
 const QUIET_SHARE: f64 = 0.8;
 
-/// Standard deviation of the noise of one coordinate per frame, measured over `half` frames before and after it; 0 if
-/// the run is too short.
+/// Standard deviation of the noise of one coordinate per frame, over `half` frames on either side; 0 for a short run.
 fn noise_around(values: &[Vec3], half: usize) -> Vec<f64> {
     let n = values.len();
     if n < MEAN_FRAMES + 4 {

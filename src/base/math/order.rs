@@ -1,6 +1,5 @@
 //! Order statistics: median, quantile and the trimmed ends of a set of numbers. Non-finite numbers are ignored
-//! everywhere. `median` and `quantile` may interpolate between two numbers; the `lower_` and `upper_` variants return
-//! a number of the set.
+//! everywhere. `median` and `quantile` may interpolate; the `lower_` and `upper_` variants return a number of the set.
 
 use std::ops::{Add, Div};
 

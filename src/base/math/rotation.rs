@@ -83,9 +83,8 @@ impl Rotation {
         2.0 * norm(self.v).atan2(self.w.abs())
     }
 
-    /// Decomposes `self = swing * twist`: returns the swing, whose axis is perpendicular to the unit vector `axis`,
-    /// and the angle of the twist about `axis`, -pi..=pi. For a half turn about a perpendicular axis the twist is
-    /// undefined and returned as 0.
+    /// Decomposes `self = swing * twist`: the swing, whose axis is perpendicular to the unit vector `axis`, and the
+    /// angle of the twist about `axis`, -pi..=pi. For a half turn about a perpendicular axis the undefined twist is 0.
     pub fn swing_twist(self, axis: Vec3) -> (Self, f64) {
         let along = dot(self.v, axis);
         if along.hypot(self.w) < 1e-12 {
@@ -134,8 +133,7 @@ impl Rotation {
         Self { w: -self.w, v: scale(self.v, -1.0) }
     }
 
-    /// Angles in degrees about Z, X and Y such that `self = Rz * Rx * Ry` (BVH channels `Zrotation Xrotation
-    /// Yrotation`); x is in -90..=90.
+    /// Degrees about Z, X and Y with `self = Rz * Rx * Ry` (BVH's `Zrotation Xrotation Yrotation`); x is in -90..=90.
     pub fn euler_zxy_degrees(self) -> Vec3 {
         self.euler([2, 0, 1]).map(f64::to_degrees)
     }

@@ -1,5 +1,4 @@
-//! Detection of the unit and the vertical direction of joints from the arms: upper arm and forearm of a person are 0.1
-//! to 0.6 m long.
+//! Unit and vertical direction of joints from the arms: upper arm and forearm of a person are 0.1 to 0.6 m long.
 
 use crate::math::order;
 use crate::types::pose3d::Motion;

@@ -1,6 +1,5 @@
-//! The ledger of a video's seconds: every second is either accepted, rejected (with a reason and a measured value), or
-//! belongs to a stage that failed. `segment` writes it and `lift` moves seconds from accepted to rejected; later stages
-//! only sum them.
+//! The ledger of a video's seconds: every second is accepted, rejected (with a reason and a measured value), or is of a
+//! failed stage. `segment` writes it and `lift` moves seconds from accepted to rejected; later stages only sum them.
 
 use super::rejection::{FrameRejection, Rejection};
 use crate::input;

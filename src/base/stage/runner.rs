@@ -70,9 +70,8 @@ pub fn run(
 }
 
 /// Runs `stages` in sequence for every unit on `jobs` workers (at least one). No stage waits until all units have
-/// finished the stage before it, and the largest units start first, so that the workers finish at about the same time.
-/// Stages after a failure are not run for that unit: its outcomes, one per stage, end with the failure. The units are
-/// in the order of `units`.
+/// finished the stage before it, and the largest units start first, so that all workers finish together. Stages after a
+/// failure are not run for that unit: its outcomes, one per stage, end with it. Units are in the order of `units`.
 pub fn run_stages(
     stages: &[&dyn Stage],
     units: &[Unit],

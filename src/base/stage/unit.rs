@@ -72,8 +72,7 @@ pub trait Stage: Sync {
     }
     /// Processes the unit: writes its files into the empty folder `out` and nowhere else.
     fn run(&self, unit: &Unit, out: &Path, progress: &dyn Progress) -> anyhow::Result<Report>;
-    /// Number of parts of the work on `unit`. Parts can run in any order and in any process; `join` then gives the
-    /// same bytes as `run`.
+    /// Number of parts of `unit`. Parts can run in any order and process; `join` then gives the same bytes as `run`.
     fn n_parts(&self, _unit: &Unit) -> anyhow::Result<usize> {
         Ok(1)
     }

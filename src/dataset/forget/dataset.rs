@@ -1,6 +1,5 @@
 //! Removal of videos from a dataset: the files of the remaining videos are hard-linked into a new folder, references to
-//! the forgotten videos are removed from their entries, the common files are assembled again, and the new folder
-//! replaces the old one.
+//! the forgotten are removed from their entries, the common files are rebuilt, and the new folder replaces the old.
 
 use crate::info::DatasetInfo;
 use crate::leakage::Leakage;

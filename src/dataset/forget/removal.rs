@@ -34,8 +34,7 @@ pub fn models_trained_on(work: &Path, videos: &[&KnownVideo]) -> Result<Vec<Path
         for folder in list_sorted(&work.join(kind))? {
             let mut checkpoints = list_sorted(&folder)?;
             checkpoints.retain(|path| path.extension().is_some_and(|ending| ending == "safetensors"));
-            // All checkpoints of a folder list the same videos. An unreadable checkpoint is skipped here; the final
-            // search covers it.
+            // All checkpoints of a folder list the same videos. An unreadable one is skipped: the search covers it.
             let facts = checkpoints.iter().find_map(|path| checkpoint::facts(path).ok()).unwrap_or_default();
             let listed = facts["speaker"]["videos"].as_array().into_iter().flatten();
             let mut hashes = listed.filter_map(|video| video["content"].as_str());

@@ -87,8 +87,7 @@ pub fn open(tars: &[PathBuf]) -> ShardTars {
     found
 }
 
-/// Adds the members of a tar file to `samples`, and counts files of other extensions in `unknown`. Returns the number
-/// of files in the tar.
+/// Adds a tar's members to `samples`, and counts files of other extensions in `unknown`. Returns the number of files.
 fn list(
     tar: &Path,
     samples: &mut BTreeMap<String, ShardSample>,

@@ -189,8 +189,7 @@ impl<'a> Assigner<'a> {
         groups
     }
 
-    /// Divides each video that is long enough into time blocks; a shorter one is assigned as a whole, unless that would
-    /// leave a split empty.
+    /// Divides each long enough video into time blocks; a shorter one is assigned whole, unless a split would be empty.
     fn by_time(&mut self, new: &[usize]) {
         let SplitPlan { guard_secs, min_block_secs, .. } = *self.plan;
         for (n, &at) in new.iter().enumerate() {

@@ -246,8 +246,7 @@ impl VideoEntry {
         shards.chain(sound).collect()
     }
 
-    /// Links this video's files from the dataset in `from` into the one in `to`, or copies them where hard links fail;
-    /// existing files are kept.
+    /// Links this video's files from the dataset `from` into `to`, or copies them where links fail; existing ones stay.
     pub fn link_into(&self, from: &Path, to: &Path) -> Result<()> {
         fs::create_dir_all(to.join(FOLDER)).with_context(|| format!("cannot create {}", to.join(FOLDER).display()))?;
         let json = format!("{FOLDER}/{}.json", self.name);

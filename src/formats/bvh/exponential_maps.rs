@@ -104,8 +104,7 @@ impl ExponentialMaps {
     ///
     /// # Errors
     ///
-    /// No file; or, with the file name, a skeleton that differs from the first file's, no frame, non-finite numbers,
-    /// or missing joints.
+    /// No file; or, with the file name, another skeleton than the first, no frame, non-finite numbers, missing joints.
     pub fn of(files: impl IntoIterator<Item = Result<(String, Bvh)>>, mapping: &JointMapping) -> Result<Self> {
         let mut files = files.into_iter();
         let (name, first) = files.next().context("no training motion was given")??;
@@ -172,8 +171,7 @@ impl ExponentialMaps {
         }))
     }
 
-    /// Channel values of each frame for features [T, columns]; all other channels have the values of the first frame
-    /// of the first file.
+    /// Channel values of each frame for features [T, columns]; all others have those of the first file's first frame.
     pub fn channels(&self, features: ArrayView2<f32>) -> Vec<Vec<f64>> {
         let first_channels = self.skeleton.first_channels();
         let at_rest: Vec<Vec3> =

@@ -1,5 +1,4 @@
-//! Hand joints of a BVH skeleton: the joints of each finger are found by name, in any naming convention, and ordered
-//! by the hierarchy.
+//! Hand joints of a BVH skeleton: each finger's joints are found by name, in any convention, and ordered by hierarchy.
 
 use crate::bvh::read::Bvh;
 use crate::skeleton::joint_names::FINGERS;

@@ -1,5 +1,4 @@
-//! Bones of ours and the joints of a skeleton that they correspond to, by name and, where required bones have no known
-//! name, by structure.
+//! Our bones and a skeleton's corresponding joints, by name and, where required bones have no known name, by structure.
 
 use super::joint_names;
 use super::structure::match_structure;

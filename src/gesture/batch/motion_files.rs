@@ -1,6 +1,5 @@
 //! Generates the motion for one sound, with its transcript for some networks, and writes it to files. The sound is
-//! streamed, so that apart from the motion, memory does not grow with its length; only a film, which contains the
-//! sound, reads it completely.
+//! streamed, so that apart from the motion, memory does not grow with its length; only a film reads it completely.
 
 use super::speech::{MotionReport, SegmentFacts, SpeechSource};
 use crate::generate::GestureGenerator;
@@ -123,8 +122,7 @@ fn narrow_band_note(rate: u32) -> Option<String> {
     ))
 }
 
-/// Generates motion for a sound and writes it to `outputs`. Errors name the sound, or the option that this kind of
-/// network does not support.
+/// Generates motion for a sound and writes it to `outputs`. Errors name the sound or the unsupported option.
 pub fn write(
     speaker: &TrainedSpeaker,
     speech: &SpeechSource,

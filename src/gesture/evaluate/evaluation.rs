@@ -23,8 +23,7 @@ pub struct Evaluation {
 
 impl Evaluation {
     /// Reads motion files: `truth` and `prediction` are two files, or two folders whose files have the same names;
-    /// `audio` is a sound or a folder of sounds. `fps` is the frame rate of files that do not state one. The motions
-    /// are saved in `store`.
+    /// `audio` is a sound or a folder of sounds. `fps`: rate of files that state none. Motions are saved in `store`.
     pub fn from_files(
         truth: &Path,
         prediction: &Path,

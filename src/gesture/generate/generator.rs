@@ -64,9 +64,8 @@ impl GestureGenerator {
         self.motion_from_stream(pieces, sound.samples.len(), CHUNK, &mut |_| ())
     }
 
-    /// Motion and posture for a stream of sound pieces (16 kHz, `n_samples` in total), generated in chunks of `chunk`
-    /// frames. Apart from the motion, memory does not grow with the sound. `on_chunk` is called with the number of
-    /// frames of each chunk.
+    /// Motion and posture for sound pieces (16 kHz, `n_samples` in total), generated in chunks of `chunk` frames. Apart
+    /// from the motion, memory does not grow with the sound. `on_chunk` gets the number of frames of each chunk.
     ///
     /// # Errors
     /// Errors of `motion`; fewer samples than `n_samples`; a `chunk` that is not a multiple of 32.

@@ -153,8 +153,7 @@ pub(crate) fn emage(fps: f64) -> MetricFamily {
     })
 }
 
-/// Absolute deviations from the mean by coordinate. The original code computes L1div in place, and searches the
-/// modified array for beats.
+/// Absolute deviations from the mean by coordinate. The original code computes L1div in place, and finds beats in it.
 fn abs_deviations(positions: &[Vec3]) -> Vec<Vec3> {
     let visible: Vec<&Vec3> = positions.iter().filter(|p| p.iter().all(|v| v.is_finite())).collect();
     let mean: Vec3 = std::array::from_fn(|k| visible.iter().map(|p| p[k]).sum::<f64>() / visible.len() as f64);

@@ -40,8 +40,7 @@ pub struct Region {
 }
 
 impl Region {
-    /// Transform for a crop of `size` x `size` pixels; `None` for an implausible square (not finite, smaller than a
-    /// pixel, or far outside).
+    /// Transform for a `size` x `size` crop; `None` for an implausible square (not finite, below a pixel, far outside).
     pub fn src_from_dst(&self, size: usize) -> Option<SrcFromDst> {
         let (sin, cos) = self.rotation.sin_cos();
         let scale = self.side / size as f64;

@@ -1,5 +1,4 @@
-//! Common interface of the sequence-to-sequence networks: prediction of one segment of poses, and of a complete sound
-//! segment by segment.
+//! Common interface of the sequence-to-sequence networks: prediction of a segment of poses, and of a sound by segments.
 
 use super::autoencoder::AudioBaseline;
 use super::config::{Config, Segment};
@@ -29,9 +28,8 @@ pub trait GesturePredictor: Send + Sync {
         None
     }
 
-    /// Predicts the poses of segments without dropout, starting from the decoder's `state` after the previous segments
-    /// if given, and returns the state after these segments. The default is for networks without a state, which ignore
-    /// and return none.
+    /// Predicts the poses of segments without dropout, from the decoder's `state` after the previous segments if given,
+    /// and returns that after these. The default is for networks without a state, which ignore and return none.
     fn continue_from(&self, segment: &Segment, _state: Option<&Tensor>) -> Result<(Tensor, Option<Tensor>)> {
         Ok((self.forward(segment, &mut Mode::Eval)?, None))
     }

@@ -42,8 +42,7 @@ pub struct OnnxGraph {
 }
 
 impl OnnxGraph {
-    /// Creates an empty graph for a source of `n_bytes`, which limits the weights: no valid conversion more than
-    /// doubles their size.
+    /// Empty graph for a source of `n_bytes`, which limits the weights: no conversion more than doubles their size.
     pub fn new(n_bytes: usize) -> Self {
         let n_weight_bytes_left = n_bytes.saturating_mul(2).saturating_add(1 << 20);
         Self { nodes: Vec::new(), n_ops: 0, weights: Vec::new(), constants: BTreeMap::new(), n_weight_bytes_left }

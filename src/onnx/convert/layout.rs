@@ -58,8 +58,7 @@ pub(crate) struct SlidingWindow {
 }
 
 impl SlidingWindow {
-    /// Numbers of zeros before and after an axis of `size` for TensorFlow's SAME padding, which yields `size /
-    /// stride` steps, rounded up.
+    /// Zeros before and after an axis of `size` for TensorFlow's SAME padding, for `size / stride` steps, rounded up.
     pub(crate) fn same_padding(self, size: usize) -> (usize, usize) {
         let extent = (size.div_ceil(self.stride) - 1) * self.stride + (self.kernel - 1) * self.dilation + 1;
         let total = extent.saturating_sub(size);

@@ -19,8 +19,7 @@ pub(crate) fn is_nanodet(source: &TfGraph) -> bool {
     HEADS.iter().all(|(node, _)| source.nodes.contains_key(*node))
 }
 
-/// Converts the model to ONNX: image [1, 3, S, S] to rows [1, cells, 5] of x0, y0, x1, y1 in pixels of the input, and
-/// the person score, 0..1.
+/// Converts to ONNX: image [1, 3, S, S] to rows [1, cells, 5] of x0, y0, x1, y1 in input pixels, and the score, 0..1.
 pub(crate) fn convert(source: &TfGraph, graph: OnnxGraph, options: &ConversionOptions) -> Result<Vec<u8>> {
     let (shape, output) = (options.shape()?, options.only_output()?);
     let [1, 3, side, width] = shape[..] else { bail!("expected an input of shape [1, 3, S, S], not {shape:?}") };

@@ -1,5 +1,4 @@
-//! Converts TFLite models: a flatbuffer of tensors, buffers and operators in execution order. 4-D tensors are
-//! channels first in the result.
+//! Converts TFLite models: a flatbuffer of tensors, buffers and operators in order. 4-D results are channels first.
 
 use super::flatbuffer::FlatTable;
 use super::graph::AttributeValue::{Int, Ints, Text};

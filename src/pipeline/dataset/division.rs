@@ -101,8 +101,7 @@ impl Division {
         SplitRule { unit: self.record.unit, why: self.record.why.clone(), guard_secs }
     }
 
-    /// Assigns the videos in order and records the splits. `named`: splits from the configuration, by name of the
-    /// video in the work folder.
+    /// Assigns the videos in order and records the splits. `named`: configured splits, by the video's work name.
     pub fn assign(
         &mut self,
         videos: &[&LiftedVideo],

@@ -13,8 +13,7 @@ use std::path::Path;
 const MAX_VIDEOS: usize = 200;
 /// Least number of frames for a known face shape.
 const MIN_FRAMES: usize = 3;
-/// Face difference, in thousandths of the face size, of two different persons, and the contribution of one 8-bit step
-/// of colour distance.
+/// Face difference, in thousandths of the face size, of two persons, and that of an 8-bit step of colour distance.
 const FACE_THRESHOLD: f64 = 40.0;
 const COLOUR_STEP: f64 = 0.5;
 /// Bone difference of two different persons, as log ratio of shoulder width to arm length; for one person it varies by

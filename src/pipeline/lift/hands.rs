@@ -1,5 +1,4 @@
-//! 3D lifting of hands: one hand over an interval through the hand lifter, then correction of the depth ambiguity and
-//! of single outliers.
+//! 3D lifting of hands: a hand over an interval through the lifter, then correction of depth ambiguity and outliers.
 
 use super::hand_depth;
 use super::observed::MAX_PX;

@@ -56,8 +56,7 @@ impl Candidate {
         score * width * height * (1.0 - 0.5 * eccentricity) * alive * similarity * speaks
     }
 
-    /// Whether `other` should replace this candidate: it speaks, is alive while this is a picture, or is much closer
-    /// to the reference.
+    /// Whether `other` replaces this one: it speaks, is alive while this is a picture, or much closer to the reference.
     fn gives_way_to(&self, other: &Self) -> bool {
         let is_more_similar = || matches!((self.appearance_distance, other.appearance_distance), (Some(mine), Some(other)) if other < HALF_WEIGHT_DISTANCE && mine > 2.0 * other.max(2.5));
         !self.speaks && (other.speaks || (self.is_picture() && other.is_livelier_than(self)) || is_more_similar())

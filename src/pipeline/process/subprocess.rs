@@ -55,8 +55,7 @@ impl UnitProcess {
         let _ = self.stdin.as_mut().map(|stdin| send(stdin, request));
     }
 
-    /// Reads the answer with `read`, then kills the process, so that it writes nothing afterwards. The error describes
-    /// how the process ended.
+    /// Reads with `read`, then kills the process, so that it writes nothing more. The error says how it ended.
     pub fn follow<T>(
         &mut self,
         limits: &Limits,
@@ -102,8 +101,7 @@ impl Drop for UnitProcess {
     }
 }
 
-/// Standard output of a subprocess, with a counter that is incremented before and after each read: it is odd while the
-/// run waits for data.
+/// Standard output of a subprocess, with a counter incremented before and after each read: odd while waiting.
 pub struct CountedReader<'a> {
     from: ChildStdout,
     n_reads: &'a AtomicU64,

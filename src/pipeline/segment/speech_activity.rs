@@ -9,8 +9,7 @@ use std::path::Path;
 
 /// Window around a frame in seconds: about a sentence with its pauses.
 const WINDOW_SECS: f64 = 4.0;
-/// Hysteresis thresholds: speech starts at the first probability and ends below the second (Silero's defaults, as are
-/// the next two).
+/// Hysteresis thresholds: speech starts at the first probability and ends below the second (Silero's, as the next two).
 const START_PROBABILITY: f32 = 0.5;
 const END_PROBABILITY: f32 = 0.35;
 /// Longest silence within speech, and shortest speech, in seconds.

@@ -155,8 +155,7 @@ fn farthest(
     known.max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, found)| found)
 }
 
-/// Frame with the smallest (or largest) known value, ties going to the one nearest the middle, and the value; NaN if no
-/// value is known.
+/// Frame with the smallest (or largest) known value, ties going to the one nearest the middle, and the value, or NaN.
 fn extreme(values: &[f32], frames: std::ops::Range<usize>, lowest: bool) -> (usize, f64) {
     let middle = frames.start.midpoint(frames.end.saturating_sub(1));
     let known = frames.filter(|t| !values[*t].is_nan());

@@ -1,5 +1,4 @@
-//! Sections of the study file, and the defaults derived from the rest of the file: compared conditions of a task,
-//! hypotheses of a design.
+//! Sections of the study file, and defaults derived from the rest: conditions of a task, hypotheses of a design.
 
 use super::condition::{ConditionSource, StudyCondition};
 use super::layers::StudyPreset;

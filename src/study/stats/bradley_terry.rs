@@ -28,8 +28,7 @@ pub struct PairedVote {
 /// Validates votes.
 ///
 /// # Errors
-/// Fewer than two conditions, no votes, a condition compared with itself, a condition index out of range, or a share
-/// outside 0 to 1.
+/// Fewer than two conditions, no votes, one compared with itself, an index out of range, a share outside 0 to 1.
 fn check(votes: &[PairedVote], n_conditions: usize) -> Result<(), StatisticsError> {
     at_least("conditions", 2, n_conditions)?;
     at_least("votes", 1, votes.len())?;

@@ -166,8 +166,7 @@ impl FilmedSpeaker {
         self.clips.iter().position(|known| known.name == name)
     }
 
-    /// Name `speaker/clip` of the clip whose motion the left avatar shows in the film with this content, unless the
-    /// design draws it.
+    /// Name `speaker/clip` of the clip whose motion the left avatar shows in this film, unless the design draws it.
     pub fn motion_of(&self, content: &FilmContent) -> Result<String> {
         let (of, _) = self.shown(content)?;
         Ok(format!("{}/{}", content.speaker, self.clips[*of].name))

@@ -134,8 +134,7 @@ pub struct ResponseStore {
 }
 
 impl ResponseStore {
-    /// Opens the database at `path` for the plan with this hash and starts the writer thread, which ends after the last
-    /// handle is dropped.
+    /// Opens the database at `path` for the plan with this hash and starts the writer, which ends with the last handle.
     ///
     /// # Errors
     /// The database cannot be opened (see [`open`]), or the thread cannot be started.

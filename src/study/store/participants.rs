@@ -98,8 +98,7 @@ pub struct Quota {
     pub excluded_from: Option<u32>,
     /// Time without a further answer after which a session may be reassigned, milliseconds.
     pub abandoned_ms: i64,
-    /// Time without the first answer after which a session may be reassigned, milliseconds; `abandoned_ms` applies if
-    /// it is shorter.
+    /// Time without an answer after which a session may be reassigned, milliseconds; or `abandoned_ms` if shorter.
     pub unanswered_ms: i64,
 }
 

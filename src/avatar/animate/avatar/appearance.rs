@@ -1,5 +1,4 @@
-//! Appearance of an avatar: build, skin, face, hair, clothes and their colours. Lengths scale with the rig; colours are
-//! linear RGB reflectances.
+//! Appearance of an avatar: build, skin, face, hair, clothes. Lengths scale with the rig; colours: linear reflectances.
 
 /// Linear RGB reflectance, 0..1.
 pub type Reflectance = [f32; 3];

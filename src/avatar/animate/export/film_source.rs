@@ -41,8 +41,7 @@ pub struct SourceCamera {
 type Correspondence = (Vec3, [f64; 2]);
 
 impl SourceCamera {
-    /// Fits the camera that projects the joints of a motion onto the keypoints of the same frames; the depth of the
-    /// neck is constant.
+    /// Fits the camera that projects a motion's joints onto the keypoints of its frames; the neck's depth is constant.
     ///
     /// # Errors
     /// The numbers of frames differ, or no frame shows enough keypoints.

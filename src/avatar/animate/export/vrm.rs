@@ -42,8 +42,7 @@ pub fn motion(rig: &Rig, clip: &BvhClip) -> Vec<u8> {
     buffer.file(scene)
 }
 
-/// Turns a scene with VRM names into a humanoid: adds the bones, the open-mouth expression, and metadata with author
-/// and permissions.
+/// Turns a scene with VRM names into a humanoid: adds bones, open-mouth expression, author and permissions.
 pub fn make_humanoid(scene: &mut Value, named: &Skeleton) {
     // The last node is the face.
     let face = named.joints.len() + 1;

@@ -14,8 +14,7 @@ use serde::Serialize;
 pub struct Constraints {
     /// Whether to apply the limits of every joint.
     pub limits: bool,
-    /// Whether to keep fingers within 10 degrees of the mean curl of the four. This also bends a pointing finger, so it
-    /// is off by default.
+    /// Whether to keep fingers within 10 degrees of their mean curl. It also bends a pointing finger: off by default.
     pub curl_coherence: bool,
 }
 

@@ -141,8 +141,7 @@ fn smooth_hand(forearm: &RotationTrack, frames: &ObservedTrack, filter: &Filter,
     angles.into_iter().map(|angles| angles.map(rotation)).collect()
 }
 
-/// Local rotations of a finger's three joints. Bones are smoothed in the axes of the observed hand, which removes noise
-/// of the hand as a whole.
+/// Rotations of a finger's joints. Bones are smoothed in the observed hand's axes, which removes the hand's noise.
 fn solve_finger(
     positions: &JointPositions,
     frames: &ObservedTrack,

@@ -20,8 +20,7 @@ pub enum Legs {
 
 /// Maximum extension of a standing leg relative to its length, so that the knee does not snap straight.
 const MAX_STRETCH: f64 = 0.99;
-/// Displacement of the hips relative to that of the top of the trunk: the trunk has half of the body's mass, and its
-/// centre moves half as far.
+/// Displacement of the hips relative to the trunk's top: the trunk has half the mass, and its centre moves half as far.
 const BALANCE: f64 = 0.25;
 const DOWN: Vec3 = [0.0, -1.0, 0.0];
 const ACROSS: Vec3 = [1.0, 0.0, 0.0];

@@ -79,8 +79,7 @@ impl Filter {
         track.iter_mut().for_each(|seen| *seen = seen.and_then(|v| unit(v, 1e-3)));
     }
 
-    /// Smooths vectors of any length in each run of detected frames. `known` is the known standard deviation of the
-    /// noise by frame, or empty.
+    /// Smooths vectors in each run of detected frames. `known`: standard deviation of the noise by frame, or empty.
     pub fn runs(&self, track: &mut [Option<Vec3>], known: &[f64]) {
         let mut start = 0;
         while start < track.len() {

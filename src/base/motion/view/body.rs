@@ -17,8 +17,7 @@ const AROUND: isize = 40;
 const LARGEST_BY_SECOND: f32 = 1.4;
 /// Number of bone types with a maximum input length: shoulders, upper arm, forearm, neck to nose, neck to pelvis.
 const N_KINDS: usize = 5;
-/// Input channels per frame without hands: x, y and visibility of each point, then the bone types, which are constant
-/// over the window.
+/// Input channels per frame without hands: x, y and visibility of each point, then the constant bone types.
 pub const N_BODY_IN: usize = 3 * N_POINTS + N_KINDS;
 /// Channels of one hand: x, y, z of its direction and whether it is known.
 const N_OF_HAND: usize = 4;
@@ -147,8 +146,7 @@ pub fn mirror_mean(output: &[f32], of_mirrored: &[f32]) -> Vec<f32> {
     mean
 }
 
-/// Interpolates the points at `time` between two frames linearly; a point that is visible in only one of them is
-/// taken from the nearer frame.
+/// Interpolates points at `time` between two frames linearly; a point visible in one only is the nearer frame's.
 fn at(seen: &[BodyPoints], time: f64) -> BodyPoints {
     let (before, after) = (&seen[time.floor() as usize], &seen[time.ceil() as usize]);
     let share = time.fract() as f32;

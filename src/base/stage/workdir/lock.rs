@@ -159,8 +159,7 @@ fn take(folder: &Path, path: &Path, is_exclusive: bool) -> Result<Option<File>> 
     }
 }
 
-/// Opens a lock file, created if missing: links are rejected and the file is never truncated. Opened for reading only
-/// if it is not writable.
+/// Opens a lock file, created if missing: links are rejected and it is never truncated. Read-only if not writable.
 fn open(path: &Path) -> std::io::Result<File> {
     let flags = (OFlags::NOFOLLOW | OFlags::NONBLOCK).bits() as i32;
     let mut options = OpenOptions::new();

@@ -41,8 +41,7 @@ pub fn samples(dataset: &Dataset, split: Split) -> Result<Vec<SampleRef>> {
     Ok(samples)
 }
 
-/// Joints [T, 49, 3] of some frames of a sample with the speaker's bone lengths, followed by the angles of head and
-/// trunk if `has_channels`.
+/// Joints [T, 49, 3] of frames with the speaker's bone lengths, then head and trunk angles if `has_channels`.
 ///
 /// # Errors
 /// A sample that cannot be read; its hash is not checked.

@@ -13,15 +13,13 @@ use std::ops::Range;
 
 /// Length of the blocks in the comparison of the ground-truth halves, seconds.
 const HALVES_SECS: f64 = 4.0;
-/// Largest number of pairs of such blocks (one hour) that are kept separately; if there are more, neighbours are
-/// summed, which bounds memory.
+/// Most pairs of such blocks (one hour) kept apart; if there are more, neighbours are summed, which bounds memory.
 const MAX_PAIRS: usize = 450;
 /// Length, seconds, of the pieces in which longer clips are measured, in parallel and with bounded memory; differences
 /// across a boundary are not counted.
 const PIECE_SECS: f64 = 600.0;
 
-/// Metric sums of a predictor over all clips and their blocks of about `length` frames. The result does not depend on
-/// the number of threads.
+/// Metric sums of a predictor over clips and blocks of about `length` frames. Equal for any number of threads.
 pub fn measure(catalogue: &Catalogue, clips: &EvalClips, predictor: &Predictor, length: usize) -> IntervalSums {
     let all: Vec<IntervalSums> = pieces(clips)
         .into_par_iter()

@@ -1,5 +1,4 @@
-//! Result file: the table as JSON. Each value has its definition, parameters and their hash; only values with equal
-//! hashes are comparable.
+//! The table as JSON. Each value has its definition, parameters and their hash; values of equal hash are comparable.
 
 use super::table::{PredictorRow, Table};
 use crate::evaluate::baseline::baselines::PredictorKind;

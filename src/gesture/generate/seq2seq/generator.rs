@@ -80,8 +80,7 @@ impl SequenceGenerator {
         self.metadata.architecture != Architecture::Autoencoder
     }
 
-    /// Initial decoder state of the segments, for all callers: carried from segment to segment if requested, or if the
-    /// model was trained to.
+    /// Initial decoder state of the segments, for all callers: carried across segments if requested, or if trained to.
     pub fn seams(&self, carry_state: bool) -> StateAtSeams {
         if self.has_state() && (carry_state || self.metadata.carries_state) {
             StateAtSeams::Carried

@@ -35,8 +35,7 @@ pub fn variance_loss_of_paper(generated: &Tensor) -> Result<Tensor> {
     generated.broadcast_sub(&generated.mean_keepdim(1)?)?.sqr()?.mean_all()?.neg()
 }
 
-/// Discriminator loss: half the sum of the binary cross-entropies of real logits with target 1 and of generated logits
-/// with target 0.
+/// Discriminator loss: half the sum of binary cross-entropies of real logits (target 1) and generated ones (target 0).
 pub fn discriminator(generated: &Tensor, real: &Tensor) -> Result<Tensor> {
     discriminator_loss(AdversarialLoss::Log, real, generated)? * 0.5
 }

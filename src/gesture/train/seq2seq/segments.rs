@@ -36,8 +36,7 @@ pub struct SegmentBatch {
 }
 
 impl SegmentBatch {
-    /// Predicted poses with the values of `real` wherever the target is not known, so that the loss and its gradient
-    /// are zero there.
+    /// Predicted poses with the values of `real` where the target is unknown, so that loss and gradient are zero there.
     pub fn completed(&self, predicted: &Tensor) -> candle_core::Result<Tensor> {
         (predicted * &self.known)? + &self.filled
     }

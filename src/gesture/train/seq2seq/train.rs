@@ -32,9 +32,8 @@ use std::path::Path;
 /// Dimension of the word embeddings if no word vectors are given.
 const WORD_DIM: usize = 100;
 
-/// Trains to the last step of `requested`, resuming from the newest checkpoint in `folder` if there is one; then the settings
-/// of that checkpoint apply, and differences are reported. `vectors` initialise the word embeddings; without them they
-/// are random.
+/// Trains to the last step of `requested`, resuming from the newest checkpoint in `folder` if there is one; then its
+/// settings apply, and differences are reported. `vectors` initialise the word embeddings; else they are random.
 ///
 /// # Errors
 /// Data that cannot be read, with the name of the file; no segment to train on; a checkpoint of other data; another

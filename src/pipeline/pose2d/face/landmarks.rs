@@ -1,5 +1,4 @@
-//! Measurements on the 468 points of MediaPipe's face mesh. The lip opening uses distances in space, so that head
-//! rotation does not change it.
+//! Measurements on the 468 points of MediaPipe's face mesh. The lip opening is in space, independent of head rotation.
 
 use orator_base::math::vec3;
 use orator_media::opencv::warp::Region;

@@ -6,8 +6,7 @@ use orator_base::types::time::FrameRate;
 
 /// Least confidence of a match; lower than for an audio offset, because there are only a few candidates.
 const MIN_CONFIDENCE: f64 = 0.9;
-/// Least margin of the best match over the second, in correlations times square root of seconds (`SoundOffset`
-/// documents their distribution).
+/// Least margin of the best over the second, in correlations times root of seconds (distribution: `SoundOffset`).
 const MIN_MARGIN: f64 = 0.15;
 
 pub struct ShotVoice<'a> {

@@ -1,7 +1,6 @@
-//! Mean score with a standard error that accounts for sampling both participants and clips: crossed variance components
-//! and a t distribution with Satterthwaite's degrees of freedom. Assumes that participants and clips are independent
-//! samples, and that votes which share neither are independent. At least two of both are required; the t approximation
-//! needs about 20 of each.
+//! Mean score with a standard error that accounts for sampling participants and clips: crossed variance components and
+//! a t distribution with Satterthwaite's degrees of freedom. Assumes independent samples of participants and clips, and
+//! that votes sharing neither are independent. At least two of both are required; the t approximation needs about 20.
 
 use super::super::estimate::{StatisticsError, StudentEstimate, at_least};
 use super::votes::{CLIP, ClipVote, PAIR, PARTICIPANT, VoteGroups, scores};
