@@ -6,6 +6,7 @@ mod coverage;
 mod design;
 mod end_to_end;
 mod films;
+mod glmm;
 mod pages;
 mod serve;
 mod serve_begin;

@@ -8,6 +8,7 @@ pub(crate) mod gan_program;
 pub(crate) mod interrupted;
 pub(crate) mod networks;
 pub(crate) mod operators;
+pub(crate) mod reading;
 pub(crate) mod run_train;
 pub(crate) mod seq2seq;
 pub(crate) mod seq2seq_program;
