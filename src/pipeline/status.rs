@@ -162,14 +162,6 @@ impl Pipeline {
         report.adds_up = report.total.n_mismatched == 0;
         Ok(report)
     }
-
-    /// Time budgets of all videos, each speaker's total following the speaker's videos.
-    ///
-    /// # Errors
-    /// An unknown speaker.
-    pub fn time_budgets(&self, speakers: &[String]) -> Result<Vec<TimeBudget>> {
-        Ok(self.status(speakers)?.time_budget)
-    }
 }
 
 struct StatusCheck<'a> {
