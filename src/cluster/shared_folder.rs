@@ -17,8 +17,7 @@ pub trait SharedFolder {
     /// The bytes of a file, possibly outdated; `None` if the file does not exist or is not visible yet. Anything other
     /// than a readable file (a folder, a pipe, a dangling link) is read as empty.
     fn read(&self, name: &str) -> Result<Option<Vec<u8>>>;
-    /// Names of the files of a folder, possibly without the newest; the names of entries other than regular files end
-    /// in `/`.
+    /// Names of the files of a folder, possibly without the newest; entries other than regular files end in `/`.
     fn list(&self, folder: &str) -> Result<Vec<String>>;
     /// Replaces a file that only this worker writes.
     fn replace(&self, name: &str, bytes: &[u8]) -> Result<()>;

@@ -70,8 +70,7 @@ pub(super) fn read_stop(folder: &DiskFolder) -> Result<Option<String>> {
 /// Processes the plan at `path`.
 ///
 /// # Errors
-/// The shared folder cannot be written, another process locks the work folder, or the disk is full (which stops every
-/// worker of the plan).
+/// The shared folder cannot be written, the work folder is locked, or the disk is full (which stops every worker).
 pub fn work(
     plan: &ClusterPlan,
     path: &Path,

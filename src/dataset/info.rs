@@ -108,7 +108,6 @@ impl ModelUsed {
     pub const WORDS: &str = "words";
 }
 
-/// Size of a split.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct SplitInfo {
     pub shards: Vec<ShardRef>,
@@ -227,7 +226,6 @@ impl DatasetInfo {
         self
     }
 
-    /// Shards of all splits.
     pub fn shards(&self) -> impl Iterator<Item = &ShardRef> {
         self.splits.values().flat_map(|split| &split.shards)
     }

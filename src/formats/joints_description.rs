@@ -11,7 +11,6 @@ use serde_json::json;
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
-/// Contents of a description file.
 #[derive(Debug, Deserialize)]
 struct JointsDescription {
     fps: DescribedRate,
@@ -33,7 +32,6 @@ pub fn path_of(path: &Path) -> PathBuf {
     name.into()
 }
 
-/// Whether a file name is that of a description file.
 pub fn is_description(path: &Path) -> bool {
     let name = path.file_name().unwrap_or_default().to_string_lossy().to_lowercase();
     [".npy.json", ".txt.json"].iter().any(|ending| name.ends_with(ending))

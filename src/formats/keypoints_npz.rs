@@ -1,9 +1,8 @@
-//! `keypoints.npz`: the 2D keypoints of a video at the dataset rate. Arrays: `body` f32 [T,17,3] (COCO-17; x px, y
-//! px, score), `left_hand`, `right_hand` f32 [T,21,3], `image_size` i64 [2] (width, height), `fps` f64 [2]
-//! (numerator, denominator; one number is also accepted), `time_secs` f64 [T], `person` f32 [T,5] (x, y, width,
-//! height, score), `n_persons` i64 [T], `identity` i64 [T], `other_hand` i64 [T,2] (1: this hand was a duplicate of
-//! the other one); with a hand model with depth `hand_depth` f32 [T,2,21] (px); with a face model `mouth_opening`,
-//! `face_score` f32 [T].
+//! `keypoints.npz`: the 2D keypoints of a video at the dataset rate. Arrays: `body` f32 [T,17,3] (COCO-17; x px, y px,
+//! score), `left_hand`, `right_hand` f32 [T,21,3], `image_size` i64 [2] (width, height), `fps` f64 [2] (numerator,
+//! denominator; or one number), `time_secs` f64 [T], `person` f32 [T,5] (x, y, width, height, score), `n_persons` i64
+//! [T], `identity` i64 [T], `other_hand` i64 [T,2] (1: this hand was a duplicate of the other one); with a hand model
+//! with depth `hand_depth` f32 [T,2,21] (px); with a face model `mouth_opening`, `face_score` f32 [T].
 
 use super::keypoints::range;
 use super::npz::{self, Npz};
@@ -22,11 +21,9 @@ pub struct Extras {
     pub person: Array2<f32>,
     /// Number of persons detected in each frame, [T].
     pub n_persons: Array1<i64>,
-    /// Identity of the tracked person in each frame, [T]; incremented when another person is selected or tracking
-    /// restarts.
+    /// Identity of the tracked person, [T]; incremented when another person is selected or tracking restarts.
     pub identity: Array1<i64>,
-    /// Whether the left and the right hand are missing because the detection at their position was the other hand,
-    /// [T, 2].
+    /// Whether the left and right hand are missing because the detection at their position was the other hand, [T, 2].
     pub other_hand: Array2<bool>,
     /// Face measurements; `None` if no face model was run.
     pub face: Option<FaceFrames>,

@@ -59,7 +59,6 @@ impl WavWriter {
         Ok(Self { path: path.to_owned(), file: file.with_context(|| format!("cannot write {}", path.display()))? })
     }
 
-    /// Appends samples.
     pub fn push(&mut self, samples: &[f32]) -> Result<()> {
         push(&mut self.file, samples).with_context(|| format!("cannot write {}", self.path.display()))
     }

@@ -70,8 +70,7 @@ impl Contents {
     /// Reads a checkpoint, whose tensors must all be F32.
     ///
     /// # Errors
-    /// The file cannot be read, is malformed, or has a tensor of another type or with a non-finite value; the message
-    /// names the file.
+    /// The file cannot be read, is malformed, or has a tensor of another type or a non-finite value; the file is named.
     pub fn read(path: &Path) -> anyhow::Result<Self> {
         checkpoint::read_with(path, |bytes| Self::parse(bytes, &[Dtype::F32]))
     }

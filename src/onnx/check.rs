@@ -121,7 +121,6 @@ impl ModelEntry {
 }
 
 impl Decode {
-    /// Names of the outputs used for decoding.
     fn names(&self) -> Vec<&str> {
         match self {
             Self::Detections { boxes, labels, .. } => {

@@ -57,7 +57,6 @@ pub struct Port {
     pub shape: Vec<i64>,
 }
 
-/// Task of a model.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum ModelRole {
@@ -72,7 +71,6 @@ pub enum ModelRole {
     Other,
 }
 
-/// Origin and licence of the weights.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ModelOrigin {
@@ -124,8 +122,7 @@ pub enum TensorAxes {
 pub enum PictureFit {
     /// The complete image with its aspect ratio preserved, padded with grey level `pad`.
     Letterbox { anchor: Anchor, pad: u8 },
-    /// A person's bounding box extended to the aspect ratio of the input, then by the factor `margin`; black outside
-    /// the image.
+    /// A person's bounding box extended to the aspect ratio of the input, then by `margin`; black outside the image.
     Box { margin: f64 },
     /// A rotated square; black outside the image.
     #[default]
@@ -172,7 +169,6 @@ pub enum Decode {
     Regression {
         landmarks: String,
         score: String,
-        /// Whether the score is a logit.
         #[serde(default, skip_serializing_if = "std::ops::Not::not")]
         logit: bool,
         right: Option<String>,

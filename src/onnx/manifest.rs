@@ -30,7 +30,6 @@ pub struct Manifest {
 }
 
 impl Manifest {
-    /// The built-in manifest.
     pub fn builtin() -> Result<Self> {
         Self::parse(BUILTIN).context("built-in model manifest")
     }

@@ -54,7 +54,6 @@ impl Pipeline {
         }
     }
 
-    /// The configuration.
     pub fn config(&self) -> &Config {
         &self.config
     }
@@ -72,7 +71,6 @@ impl Pipeline {
         Ok(chosen.cloned().collect())
     }
 
-    /// Videos of all speakers.
     pub(super) fn all_videos(&self) -> &[Videos] {
         &self.videos
     }

@@ -47,13 +47,11 @@ impl Selection {
         Self { from: stage, to: stage, ..Self::default() }
     }
 
-    /// Whether the stage is selected.
     pub fn has(&self, stage: StageName) -> bool {
         (self.from..=self.to).contains(&stage)
     }
 }
 
-/// Outcome of a run.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct RunReport {
     /// Number of units per stage and outcome.
@@ -79,7 +77,6 @@ pub struct StageCounts {
     pub done: usize,
     /// Already up to date.
     pub up_to_date: usize,
-    /// Failed.
     pub failed: usize,
 }
 
@@ -92,7 +89,6 @@ pub struct UnitFailure {
     /// The unit: `speaker/video`; for a dataset, the speaker.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub unit: Option<String>,
-    /// The stage that failed.
     pub stage: StageName,
     /// Error message with its causes.
     pub error: String,
@@ -106,7 +102,6 @@ pub struct UnitFailure {
 pub struct UnitReport {
     /// `speaker/video`; for a dataset, the speaker.
     pub unit: String,
-    /// The stage.
     pub stage: StageName,
     /// Whether this run processed the unit.
     pub state: RunState,
@@ -135,7 +130,6 @@ fn with_present_keys(mut facts: Map<String, Value>) -> Map<String, Value> {
 pub enum RunState {
     /// Processed in this run.
     Done,
-    /// Already up to date.
     #[serde(rename = "fresh")]
     UpToDate,
 }
@@ -169,8 +163,7 @@ impl Pipeline {
                  --set work.dir=FOLDER",
         )?;
         for videos in &remaining {
-            // An interrupted replacement of a dataset is undone now, since its record is read before the dataset stage
-            // runs.
+            // An interrupted replacement of a dataset is undone now, since its record is read before that stage runs.
             workdir::recover_folder(&speaker_dir(&settings.work.dir, StageName::Dataset, &videos.speaker))?;
         }
         // Stage outputs and the work folder's own files are at most two folders deep.

@@ -17,9 +17,8 @@ const LIFTER: f64 = 22.0;
 /// Full scale of 16-bit samples, on which the log energy depends.
 const FULL_SCALE: f64 = 32_768.0;
 
-/// Computes the coefficients of mono sound at `rate` samples per second (at most 51.2 kHz, where a window fills the
-/// transform), samples in -1..1: [n, 26]. Row k covers the 20 ms from k * 10 ms on; the last window is padded with
-/// zeros.
+/// Coefficients of mono sound at `rate` samples per second (at most 51.2 kHz, where a window fills the transform),
+/// samples in -1..1: [n, 26]. Row k covers the 20 ms from k * 10 ms on; the last window is padded with zeros.
 pub fn mfcc(samples: &[f32], rate: u32) -> Array2<f64> {
     let length = ((WINDOW_SECS * f64::from(rate)).round() as usize).clamp(1, FFT);
     let step = ((STEP_SECS * f64::from(rate)).round() as usize).max(1);
@@ -94,8 +93,7 @@ pub fn with_context(rows: &Array2<f64>, context: usize, silence: &[f64; N_CEPSTR
     })
 }
 
-/// Coefficients of silence: the first row of digital silence. FineMotion pads with the first row of a silent
-/// recording.
+/// Coefficients of silence: the first row of digital silence. FineMotion pads with the first row of a silent recording.
 pub fn silence(rate: u32) -> [f64; N_CEPSTRA] {
     let rows = mfcc(&[0.0; 1], rate);
     std::array::from_fn(|c| rows[[0, c]])

@@ -15,8 +15,7 @@ const HOP: usize = 160;
 const EDGES_HZ: [f64; 8] = [100.0, 300.0, 600.0, 1000.0, 1800.0, 3000.0, 5000.0, 7800.0];
 const WEIGHTS: [f32; N_BANDS] = [-0.5, -0.5, 0.5, 0.5, 0.5, 0.5, -0.5];
 const N_BANDS: usize = 7;
-/// Level below the loud parts of a band at which it counts as silent, dB; the loud level is exceeded by a tenth of the
-/// windows.
+/// Level below the loud parts of a band at which it counts as silent, dB; a tenth of the windows exceed the loud level.
 const SILENCE_DB: f32 = -30.0;
 const LOUD_QUANTILE: f64 = 0.9;
 /// Number of steps on either side over which the contrast is smoothed.

@@ -1,6 +1,5 @@
 //! Order statistics: median, quantile and the trimmed ends of a set of numbers. Non-finite numbers are ignored
-//! everywhere. `median` and `quantile` may interpolate between two numbers; the `lower_` and `upper_` variants return
-//! a number of the set.
+//! everywhere. `median` and `quantile` may interpolate; the `lower_` and `upper_` variants return a number of the set.
 
 use std::ops::{Add, Div};
 
@@ -53,8 +52,7 @@ impl<F: Sortable> Ordered<F> {
 }
 
 impl Ordered<f64> {
-    /// Value at rank `share * (n - 1)`, interpolated linearly between its neighbours (numpy's `quantile`); `share` is
-    /// 0..=1.
+    /// Value at rank `share * (n - 1)`, interpolated between its neighbours (numpy's `quantile`); `share` is 0..=1.
     pub fn quantile(&self, share: f64) -> Option<f64> {
         let rank = share * self.0.len().checked_sub(1)? as f64;
         let (below, above) = (self.at(rank.floor() as usize)?, self.at(rank.ceil() as usize)?);

@@ -34,8 +34,7 @@ impl Rotation {
 
     /// Rotation that maps the axes x, y, z to the orthonormal right-handed `x`, `y`, `z`.
     pub fn from_axes(x: Vec3, y: Vec3, z: Vec3) -> Self {
-        // Shepperd's method: the largest of the four components is computed first, which avoids division by small
-        // numbers.
+        // Shepperd's method: the largest of the four components is computed first, to avoid division by small numbers.
         let trace = x[0] + y[1] + z[2];
         let q = if trace > x[0].max(y[1]).max(z[2]) {
             let s = (1.0 + trace).sqrt() * 2.0;
@@ -84,9 +83,8 @@ impl Rotation {
         2.0 * norm(self.v).atan2(self.w.abs())
     }
 
-    /// Decomposes `self = swing * twist`: returns the swing, whose axis is perpendicular to the unit vector `axis`,
-    /// and the angle of the twist about `axis`, -pi..=pi. For a half turn about a perpendicular axis the twist is
-    /// undefined and returned as 0.
+    /// Decomposes `self = swing * twist`: the swing, whose axis is perpendicular to the unit vector `axis`, and the
+    /// angle of the twist about `axis`, -pi..=pi. For a half turn about a perpendicular axis the undefined twist is 0.
     pub fn swing_twist(self, axis: Vec3) -> (Self, f64) {
         let along = dot(self.v, axis);
         if along.hypot(self.w) < 1e-12 {
@@ -112,9 +110,8 @@ impl Rotation {
         (self * Self::about(scale(turn.v, 1.0 / sin), 2.0 * sin.atan2(turn.w) * t)).normalised()
     }
 
-    /// Cubic interpolation between the second and the third of four rotations that are evenly spaced in time; `t` is
-    /// 0..=1. A Catmull-Rom spline through the quaternions, normalised; its derivative is continuous across successive
-    /// segments.
+    /// Cubic interpolation between the second and third of four rotations evenly spaced in time; `t` is 0..=1. A
+    /// Catmull-Rom spline through the quaternions, normalised; its derivative is continuous across successive segments.
     pub fn cubic(near: [Self; 4], t: f64) -> Self {
         let turned = |to: Self, from: Self| if to.w * from.w + dot(to.v, from.v) < 0.0 { to.opposite() } else { to };
         let [before, from, to, after] = near;
@@ -136,8 +133,7 @@ impl Rotation {
         Self { w: -self.w, v: scale(self.v, -1.0) }
     }
 
-    /// Angles in degrees about Z, X and Y such that `self = Rz * Rx * Ry` (BVH channels `Zrotation Xrotation
-    /// Yrotation`); x is in -90..=90.
+    /// Degrees about Z, X and Y with `self = Rz * Rx * Ry` (BVH's `Zrotation Xrotation Yrotation`); x is in -90..=90.
     pub fn euler_zxy_degrees(self) -> Vec3 {
         self.euler([2, 0, 1]).map(f64::to_degrees)
     }

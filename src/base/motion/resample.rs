@@ -11,9 +11,8 @@ use ndarray::{Array2, Array3};
 const HALF_WIDTH: f64 = 8.0;
 /// Shape parameter of the Kaiser window: side lobes of -60 dB.
 const BETA: f64 = 6.0;
-/// Frequency of half amplitude, as a fraction of half the slower rate: with this kernel width, everything from half
-/// the rate on, which would alias, is below -60 dB, and frequencies below 0.62 of it (4.6 Hz at 15 frames per second)
-/// are unchanged.
+/// Frequency of half amplitude, as a fraction of half the slower rate: everything from half the rate on, which would
+/// alias, is below -60 dB, and frequencies below 0.62 of it (4.6 Hz at 15 frames per second) are unchanged.
 const CUTOFF: f64 = 0.81;
 
 /// Resamples the motion to `fps`. A joint is missing where the source's joint is missing at that time, and masked if
@@ -87,8 +86,7 @@ impl ResamplingKernel {
             sinc * bessel_0(BETA * (1.0 - (d / half).powi(2)).max(0.0).sqrt())
         };
         let mut weights: Vec<f64> = (first..=last).map(weight).collect();
-        // A linear correction of the weights, so that linear motion is reproduced exactly at any time between two
-        // frames.
+        // A linear correction of the weights: linear motion is reproduced exactly at any time between two frames.
         let moment = |weights: &[f64], power: i32| -> f64 {
             weights.iter().zip(first..).map(|(w, frame)| w * (frame as f64 - time).powi(power)).sum()
         };

@@ -1,5 +1,4 @@
-//! Detection of the unit and the vertical direction of joints from the arms: upper arm and forearm of a person are 0.1
-//! to 0.6 m long.
+//! Unit and vertical direction of joints from the arms: upper arm and forearm of a person are 0.1 to 0.6 m long.
 
 use crate::math::order;
 use crate::types::pose3d::Motion;
@@ -23,8 +22,7 @@ const UNITS: [(&str, f32); 8] = [
 const ADULT: f32 = 0.27;
 const PLAUSIBLE: RangeInclusive<f32> = 0.1..=0.6;
 const ACCEPTED: RangeInclusive<f32> = 0.05..=0.8;
-/// Fraction of the frames with the arms above the neck from which y is assumed to point up, and the minimum number of
-/// frames.
+/// Fraction of the frames with the arms above the neck at which y seems to point up, and the minimum number of frames.
 const UPSIDE_DOWN: f64 = 0.98;
 const MIN_FRAMES: usize = 15;
 

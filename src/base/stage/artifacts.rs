@@ -103,7 +103,6 @@ pub enum Artifact {
 }
 
 impl Artifact {
-    /// Stage that writes the file.
     pub const fn stage(self) -> StageName {
         match self {
             Self::Sound | Self::Timeline | Self::MediaInfo | Self::Frames => StageName::Extract,

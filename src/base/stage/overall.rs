@@ -1,5 +1,4 @@
-//! Progress bar of a complete run: it advances while a stage works on a video, weighted by that stage's share of the
-//! work.
+//! Progress bar of a complete run: it advances while a stage works on a video, by that stage's share of the work.
 
 use super::progress::{Event, PARTS, Progress, Task};
 use super::{Stage, Unit};

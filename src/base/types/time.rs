@@ -8,9 +8,7 @@ use std::str::FromStr;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(try_from = "Fraction")]
 pub struct FrameRate {
-    /// Numerator.
     pub num: u32,
-    /// Denominator.
     pub den: u32,
 }
 
@@ -38,8 +36,7 @@ impl TryFrom<Fraction> for FrameRate {
 }
 
 impl FrameRate {
-    /// Creates a rate of `num / den` frames per second in lowest terms; a zero part becomes 1, so that no rate divides
-    /// by zero.
+    /// Rate of `num / den` frames per second in lowest terms; a zero part becomes 1, so that no rate divides by zero.
     pub const fn new(num: u32, den: u32) -> Self {
         let num = if num == 0 { 1 } else { num };
         let den = if den == 0 { 1 } else { den };
@@ -95,8 +92,7 @@ impl FrameRate {
     }
 }
 
-/// Parses `15`, `29.97` (meaning 30000/1001) or `30000/1001`, each with or without ` fps`; 1 to 1000 frames per
-/// second.
+/// Parses `15`, `29.97` (meaning 30000/1001) or `30000/1001`, each with or without ` fps`; 1 to 1000 frames per second.
 impl FromStr for FrameRate {
     type Err = String;
 

@@ -28,12 +28,10 @@ impl BvhClip {
         self.local.len()
     }
 
-    /// Position of the root in a frame.
     pub fn root_at(&self, frame_idx: usize) -> Vec3 {
         self.travel.get(frame_idx).map_or(self.root, |&translation| add(self.root, translation))
     }
 
-    /// Positions of all joints in a frame.
     pub fn positions(&self, frame_idx: usize) -> Vec<Vec3> {
         self.skeleton.positions(self.root_at(frame_idx), &self.local[frame_idx])
     }

@@ -15,7 +15,6 @@ use orator_base::types::skeleton::N_JOINTS;
 use orator_base::types::time::FrameRate;
 use std::path::Path;
 
-/// File extensions of motion files.
 pub const ENDINGS: [&str; 4] = ["npy", "npz", "txt", "bvh"];
 /// Frame rate of Rebol et al. 2021, for files that do not state theirs.
 pub const DEFAULT_FPS: FrameRate = FrameRate::new(15, 1);
@@ -30,7 +29,6 @@ pub struct MotionFile {
     pub notes: Vec<String>,
 }
 
-/// Whether a file has the extension of a motion file.
 pub fn has_ending(path: &Path) -> bool {
     path.extension().is_some_and(|ending| ENDINGS.iter().any(|known| ending.eq_ignore_ascii_case(known)))
 }
@@ -125,8 +123,7 @@ pub fn read_at(path: &Path, fps: Option<FrameRate>, units: Option<LengthUnit>) -
     Ok(read)
 }
 
-/// Reads `pose3d` [T, 49, 3], with `mask` [T, 49] and `fps` if present, and returns whether the file states its frame
-/// rate.
+/// Reads `pose3d` [T, 49, 3], with `mask` [T, 49] and `fps` if present; returns whether the file states its frame rate.
 fn read_npz(path: &Path, assumed: FrameRate) -> Result<(Motion, bool)> {
     let mut npz = Npz::open(path)?;
     let shape: [AxisLength; 3] = [None, Some(N_JOINTS), Some(3)];

@@ -1,6 +1,5 @@
 //! Generates the motion for one sound, with its transcript for some networks, and writes it to files. The sound is
-//! streamed, so that apart from the motion, memory does not grow with its length; only a film, which contains the
-//! sound, reads it completely.
+//! streamed, so that apart from the motion, memory does not grow with its length; only a film reads it completely.
 
 use super::speech::{MotionReport, SegmentFacts, SpeechSource};
 use crate::generate::GestureGenerator;
@@ -68,7 +67,6 @@ fn transcript(speech: &SpeechSource) -> Result<Option<Transcript>> {
     Ok(parsed)
 }
 
-/// Writes motion to files of all formats.
 pub(super) fn write_outputs(
     (motion, posture): (Motion, Option<Posture>),
     &SpeechSource { audio, figure, .. }: &SpeechSource,
@@ -139,8 +137,7 @@ fn narrow_band_note(rate: u32) -> Option<String> {
     ))
 }
 
-/// Generates motion for a sound and writes it to `outputs`. Errors name the sound, or the option that this kind of
-/// network does not support.
+/// Generates motion for a sound and writes it to `outputs`. Errors name the sound or the unsupported option.
 pub fn write(
     speaker: &TrainedSpeaker,
     speech: &SpeechSource,

@@ -214,8 +214,7 @@ pub struct BatchOutcome {
     pub ended: BatchState,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub error: Option<String>,
-    /// `secs` of sound, `n_frames` of motion, `speaker`, `note`, and `segments` of a sequence-to-sequence network;
-    /// empty if the sound failed.
+    /// `secs` of sound, `n_frames` of motion, `speaker`, `note`, and `segments` of a sequence network; empty if failed.
     #[serde(flatten)]
     pub facts: Map<String, Value>,
 }
@@ -235,8 +234,7 @@ impl SpeechBatch {
     /// Generates motions that are missing or out of date.
     ///
     /// # Errors
-    /// Errors that affect all sounds: an unknown format, a common checkpoint that cannot be read, another batch running
-    /// in the same folder.
+    /// Errors that affect all sounds: an unknown format, an unreadable common checkpoint, another batch in the folder.
     pub fn run(&self, progress: &dyn Progress) -> Result<BatchReport> {
         let stage = BatchStage::new(self)?;
         let records = self.folder.join(RECORDS);

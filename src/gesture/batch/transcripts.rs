@@ -41,8 +41,7 @@ pub fn find(sounds: &mut [BatchSound], folder: Option<&Path>) -> Result<()> {
     Ok(())
 }
 
-/// Existing file whose name is `path` followed by a transcript extension: of several the first usable one, or else the
-/// first one.
+/// Existing file `path` with a transcript extension appended: of several the first usable one, or else the first one.
 fn with_transcript_extension(path: &Path, named: &mut NamedFiles) -> Option<PathBuf> {
     let stem = path.file_name()?.to_str()?;
     let existing = named.find(path.parent()?, &[stem], &ENDINGS);

@@ -95,9 +95,8 @@ impl GestureGenerator {
         self.motion_from_stream(pieces, sound.samples.len(), words, CHUNK, &mut |_| ())
     }
 
-    /// Motion and posture for a stream of sound pieces (16 kHz, `n_samples` in total), generated in chunks of `chunk`
-    /// frames. Apart from the motion, memory does not grow with the sound. `on_chunk` is called with the number of
-    /// frames of each chunk.
+    /// Motion and posture for sound pieces (16 kHz, `n_samples` in total), generated in chunks of `chunk` frames. Apart
+    /// from the motion, memory does not grow with the sound. `on_chunk` gets the number of frames of each chunk.
     ///
     /// # Errors
     /// Errors of `motion`; fewer samples than `n_samples`; a `chunk` that is not a multiple of 32.
@@ -197,8 +196,7 @@ impl<I: Iterator<Item = Result<Vec<f32>>>> MelStream<I> {
         Self { pieces, n_samples, samples: Vec::new(), first: 0, tail }
     }
 
-    /// Log-mels [1, 64, T] of these spectrogram frames. Successive ranges may overlap, but their starts must not
-    /// decrease.
+    /// Log-mels [1, 64, T] of these spectrogram frames. Successive ranges may overlap, but starts must not decrease.
     pub fn log_mels(&mut self, frames: Range<usize>) -> Result<Tensor> {
         let first = frames.start * mel::HOP;
         let mels = mel::log_mel(&self.mirrored(first..first + mel::n_samples(frames.len()))?);

@@ -253,8 +253,7 @@ pub fn checkpoint_file(path: &Path) -> Result<PathBuf> {
     })
 }
 
-/// Shared lock on the model of a checkpoint (a file, or the folder of a training), so that `forget` cannot remove it
-/// while it is in use.
+/// Shared lock on the model of a checkpoint (a file, or the folder of a training), so that `forget` does not remove it.
 pub fn model_lock(checkpoint: &Path) -> Result<FolderLock> {
     FolderLock::shared(if checkpoint.is_dir() { checkpoint } else { checkpoint.parent().unwrap_or(checkpoint) })
 }

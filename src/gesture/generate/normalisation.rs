@@ -9,8 +9,7 @@ use orator_base::types::posture::{Posture, PostureChannel};
 use orator_base::types::skeleton::{L_HAND, L_WRIST, N_BONES, N_JOINTS, NECK, R_HAND, R_WRIST, is_duplicate};
 use serde::{Deserialize, Serialize};
 
-/// Features of the joints of a pose, which precede those of the channels. Feature `3 * (joint - 1) + k` is coordinate k
-/// of a joint.
+/// Features of a pose's joints, before those of the channels. Feature `3 * (joint - 1) + k` is coordinate k of a joint.
 pub const N_FEATURES: usize = 3 * N_BONES;
 /// Smallest standard deviation of a coordinate, metres, so that joints that hardly move are not amplified.
 const MIN_STD: f32 = 0.01;

@@ -36,8 +36,7 @@ impl TrainedSpeaker {
         Self::open_as(path, &GenerationChoice::default())
     }
 
-    /// Like `open`, for the chosen speaker and variant. Also fails if the network does not have the speaker, or has no
-    /// variants.
+    /// Like `open`, for the chosen speaker and variant. Also fails if the network lacks the speaker or has no variants.
     pub fn open_as(path: &Path, choice: &GenerationChoice) -> Result<Self> {
         let file = checkpoint_file(path)?;
         let kind = &checkpoint::facts(&file)?["speaker"]["kind"];

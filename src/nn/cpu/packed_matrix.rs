@@ -102,8 +102,7 @@ pub struct WeightPanel {
 }
 
 /// Memory order of the weights of a pass: the weight of column `o`, channel `c` and the pass's kernel offset `i` is at
-/// `o * per_column + c * per_channel + kernel_offsets[i]`; the summation steps iterate over the channels within each
-/// offset.
+/// `o * per_column + c * per_channel + kernel_offsets[i]`; the summation steps go over the channels of each offset.
 pub struct WeightOrder {
     pub n_columns: usize,
     pub per_column: usize,
@@ -175,8 +174,7 @@ impl<T: Scalar> PackedWeights<T> {
             .collect();
         let n_numbers = start;
         let mut first = 0;
-        // SAFETY: the tasks together write every row of every panel; this thread writes the padding before and after
-        // them.
+        // SAFETY: the tasks together write every row of every panel; this thread pads before and after them.
         let data = unsafe {
             written(n_numbers + LANES, |data: SharedOutputPtr<T>| {
                 first = aligned(data.at(0));
@@ -220,8 +218,7 @@ impl WeightPanel {
                 outer: block.outer,
                 inner: block.inner,
             };
-            // SAFETY: guaranteed by the caller; if the panel is wider than its columns, the sums are kept in a local
-            // buffer.
+            // SAFETY: guaranteed by the caller; if the panel is wider than its columns, the sums are in a local buffer.
             unsafe {
                 if self.n == self.columns {
                     (kernel.run)(&job, tile.len(), self.n_vectors);

@@ -226,8 +226,7 @@ fn drop_body<T: Scalar>(values: &mut [T], first: usize, mask: DropMask) {
     }
 }
 
-/// e^x to 2 units in the last place (range reduction and polynomial of Cephes), without branches, so that loops are
-/// vectorised.
+/// e^x to 2 units in the last place (range reduction and polynomial of Cephes), branch-free, so loops are vectorised.
 #[inline(always)]
 pub fn exp_f32(x: f32) -> f32 {
     /// Adding it to a number of moderate size leaves the number's integer part in the lowest bits.

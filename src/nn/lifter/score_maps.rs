@@ -6,7 +6,6 @@ use orator_base::math::vec3::{self, Vec3};
 use orator_base::motion::view::hand::{HandJoints, HandPoints};
 use orator_base::types::pose2d::N_HAND;
 
-/// Width and height of a score map.
 pub const MAP_SIZE: usize = 32;
 /// Width of the crop in px, and px averaged into one score.
 const CROP: f64 = 256.0;

@@ -153,8 +153,7 @@ mod tests {
     use crate::params::Params;
     use candle_core::DType;
 
-    /// Inputs, kernels and strides like those of the networks' layers, but small: over time, over time and frequency,
-    /// even and odd.
+    /// Inputs, kernels and strides like the networks', but small: over time, over time and frequency, even and odd.
     const LAYERS: [(&[usize], &[usize], usize); 8] = [
         (&[2, 9, 2], &[3, 2, 3], 1),
         (&[2, 12, 2], &[3, 2, 4], 2),

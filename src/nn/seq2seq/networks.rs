@@ -38,9 +38,8 @@ impl<N: EncodesAndDecodes> GesturePredictor for N {
     }
 }
 
-/// Network A: the audio of a segment per frame and its words, with attention over both; or the audio only, also with one
-/// encoder layer as the generator of the adversarial network. Tensors: `encoder`, `word_encoder` (with words),
-/// `decoder`.
+/// Network A: a segment's audio per frame and its words, with attention over both; or audio only, also with one encoder
+/// layer as the generator of the adversarial network. Tensors: `encoder`, `word_encoder` (with words), `decoder`.
 pub struct WordsSeq2Seq {
     encoder: FrameEncoder,
     words: Option<WordEncoder>,

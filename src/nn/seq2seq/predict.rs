@@ -1,5 +1,4 @@
-//! Common interface of the sequence-to-sequence networks: prediction of one segment of poses, and of a complete sound
-//! segment by segment.
+//! Common interface of the sequence-to-sequence networks: prediction of a segment of poses, and of a sound by segments.
 
 use super::autoencoder::AudioBaseline;
 use super::config::{Config, Segment};
@@ -24,15 +23,13 @@ pub trait GesturePredictor: Send + Sync {
         candle_core::bail!("this network has no decoder that reads true poses: train it without scheduled sampling")
     }
 
-    /// Returns the network itself if it is an [`AudioBaseline`], whose pose codes are trained before the speech
-    /// encoder.
+    /// The network itself if it is an [`AudioBaseline`], whose pose codes are trained before the speech encoder.
     fn audio_baseline(&self) -> Option<&AudioBaseline> {
         None
     }
 
-    /// Predicts the poses of segments without dropout, starting from the decoder's `state` after the previous segments
-    /// if given, and returns the state after these segments. The default is for networks without a state, which ignore
-    /// and return none.
+    /// Predicts the poses of segments without dropout, from the decoder's `state` after the previous segments if given,
+    /// and returns that after these. The default is for networks without a state, which ignore and return none.
     fn continue_from(&self, segment: &Segment, _state: Option<&Tensor>) -> Result<(Tensor, Option<Tensor>)> {
         Ok((self.forward(segment, &mut Mode::Eval)?, None))
     }
@@ -42,8 +39,7 @@ pub trait GesturePredictor: Send + Sync {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum StateAtSeams {
-    /// Computed from the encoder, as before the first segment, and updated with the previous poses: as in the authors'
-    /// code.
+    /// From the encoder, as before the first segment, and updated with the previous poses: as in the authors' code.
     #[default]
     Renewed,
     /// State after the previous segment, as in the paper.

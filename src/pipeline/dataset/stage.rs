@@ -25,7 +25,6 @@ use orator_formats::media_json::MediaInfo;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
-/// Note for users of a dataset with shifted audio.
 const OFFSET_NOTE: &str = "Where the lips showed surely that the sound of a video was late or early, it was shifted.";
 
 /// Inputs of a dataset besides the settings.
@@ -33,8 +32,7 @@ const OFFSET_NOTE: &str = "Where the lips showed surely that the sound of a vide
 pub struct DatasetInputs {
     /// Videos that passed the earlier stages, of one or several speakers.
     pub ready: Vec<Unit>,
-    /// All videos, with the splits that the configuration names; those not in `ready` are listed as failed in the
-    /// ledger.
+    /// All videos, with the splits that the configuration names; the ledger lists those not in `ready` as failed.
     pub all: Vec<Videos>,
     /// Models that processed the videos, for `info.json`.
     pub models: Vec<ModelUsed>,
@@ -122,8 +120,7 @@ impl DatasetStage {
         failed.into_iter().map(|unit| failure(&self.work, unit)).collect()
     }
 
-    /// Persons that the speaker's videos appear to show, with an overview picture beside the stage folders; `None` if
-    /// there is one.
+    /// Persons in the speaker's videos, with an overview picture beside the stage folders; `None` if there is one.
     fn several_persons(&self, speaker: &Unit) -> Result<Option<SeveralPersons>> {
         let is_known =
             self.speakers.iter().any(|configured| configured.name == speaker.speaker && configured.same_person);

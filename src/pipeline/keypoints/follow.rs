@@ -20,7 +20,6 @@ pub struct FollowedPerson {
     pub chosen: Vec<Option<usize>>,
     /// Identity number; incremented when another person is followed.
     pub identity: Vec<i64>,
-    /// Number of persons in the frame.
     pub n_persons: Vec<usize>,
 }
 

@@ -12,8 +12,7 @@ const MIRROR_COST_PER_SEC: f32 = 15.0 * 0.005;
 const OPPOSITE_COST_PER_SEC: f32 = 15.0 * 0.02;
 
 /// Mirrors the hands of `track` [T, 21, 3] in depth (z to -z, wrist at 0) where that makes the motion smoother or
-/// nearer to `model_depth` [T, 21], if there is one. `frame_secs` is the time between two frames. Missing hands (NaN)
-/// are skipped.
+/// nearer to `model_depth` [T, 21], if there is one. `frame_secs` is a frame's time. Missing hands (NaN) are skipped.
 pub fn resolve(mut track: ArrayViewMut3<f32>, model_depth: Option<ArrayView2<f32>>, frame_secs: f32) {
     let frames: Vec<u32> =
         (0..track.len_of(ndarray::Axis(0)) as u32).filter(|t| is_present(&track.view(), *t)).collect();

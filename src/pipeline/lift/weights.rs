@@ -51,8 +51,7 @@ pub enum HandNetwork {
 }
 
 impl HandNetwork {
-    /// Lifts hands of the given side: wrist at 0, axes of the picture, any unit; `None` where too few points are
-    /// visible.
+    /// Lifts hands of the given side: wrist at 0, picture axes, any unit; `None` where too few points are visible.
     ///
     /// # Errors
     /// Those of the network.

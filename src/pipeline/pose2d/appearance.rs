@@ -1,6 +1,5 @@
-//! Colour appearance of a person: distributions over head, chest and belly, located by the body keypoints. They
-//! distinguish two people in one video, but do not recognise a person across videos; `face::views` describes the face
-//! shape for that.
+//! Colour appearance of a person: distributions over head, chest and belly, by the body keypoints. They distinguish
+//! people in a video, but do not recognise a person across videos; `face::views` has the face shape for that.
 
 use super::decode::ScoredPoint;
 use super::patch;

@@ -53,8 +53,7 @@ pub fn are_similar(a: &Region, b: &Region) -> bool {
     away < 0.1 * b.side && (a.side - b.side).abs() < 0.2 * b.side && turned.min(TAU - turned) < PI / 9.0
 }
 
-/// Square around the hand of a detected palm, from the corners of its box, its wrist and the base of its middle
-/// finger.
+/// Square around the hand of a detected palm, from the corners of its box, its wrist and the base of its middle finger.
 pub fn around_palm(low: [f64; 2], high: [f64; 2], wrist: [f64; 2], middle: [f64; 2]) -> Region {
     let (width, height) = (high[0] - low[0], high[1] - low[1]);
     let rotation = upright([middle[0] - wrist[0], middle[1] - wrist[1]]);

@@ -24,7 +24,6 @@ const SPEAKING_WEIGHT: f32 = 1e6;
 /// Persons smaller than this share of the speaker's box are not counted.
 const MIN_RELATIVE_AREA: f32 = 0.2;
 
-/// A detected person.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Candidate {
     pub person: PersonBox,
@@ -57,8 +56,7 @@ impl Candidate {
         score * width * height * (1.0 - 0.5 * eccentricity) * alive * similarity * speaks
     }
 
-    /// Whether `other` should replace this candidate: it speaks, is alive while this is a picture, or is much closer
-    /// to the reference.
+    /// Whether `other` replaces this one: it speaks, is alive while this is a picture, or much closer to the reference.
     fn gives_way_to(&self, other: &Self) -> bool {
         let is_more_similar = || matches!((self.appearance_distance, other.appearance_distance), (Some(mine), Some(other)) if other < HALF_WEIGHT_DISTANCE && mine > 2.0 * other.max(2.5));
         !self.speaks && (other.speaks || (self.is_picture() && other.is_livelier_than(self)) || is_more_similar())
@@ -69,8 +67,7 @@ impl Candidate {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TrackerStep {
     pub image_width: usize,
-    /// Weight of a new box in the moving average; `None`: the box stays unchanged and a missing person is not counted
-    /// as missed.
+    /// Weight of a new box in the moving average; `None`: the box stays and a missing person is not counted as missed.
     pub follow: Option<f64>,
     /// A body was detected in the tracked box since the last detection.
     pub body_visible: bool,
@@ -90,7 +87,6 @@ pub struct PersonTrack {
 }
 
 impl PersonTrack {
-    /// Updates the track with the detections of a frame.
     pub fn update(&mut self, found: &[Candidate], step: TrackerStep) {
         if let Some(bbox) = self.bbox {
             self.continue_track(found, bbox, step);
@@ -142,7 +138,6 @@ impl PersonTrack {
         *self = Self { n_identities: self.n_identities, ..Self::default() };
     }
 
-    /// Merges the current identity with the previous one.
     pub fn merge_with_previous(&mut self) {
         self.n_identities = (self.n_identities - 1).max(1);
     }

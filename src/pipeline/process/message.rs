@@ -14,7 +14,6 @@ use std::path::PathBuf;
 /// Largest message, bytes.
 const MAX_BYTES: u64 = 16 << 20;
 
-/// Request to a subprocess.
 #[derive(Debug, Serialize, Deserialize)]
 pub enum Request {
     /// Enter the sandbox and report how far it applies.
@@ -37,7 +36,6 @@ pub struct MediaRequest {
     pub excerpt: Option<ExcerptRequest>,
 }
 
-/// An excerpt to copy.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ExcerptRequest {
     pub start_secs: f64,
@@ -60,7 +58,6 @@ pub struct MediaHeader {
 /// A unit to process, with everything that is needed to build the stage.
 #[derive(Debug, Serialize, Deserialize)]
 pub struct UnitRequest {
-    /// Name of the stage.
     pub stage: String,
     pub speaker: String,
     pub video: String,
@@ -115,7 +112,6 @@ pub enum Message {
     Failed(SentFailure),
 }
 
-/// Sends one message.
 pub fn send(to: &mut impl Write, message: &impl Serialize) -> Result<()> {
     to.write_all(&rmp_serde::to_vec_named(message)?)?;
     Ok(to.flush()?)

@@ -34,7 +34,6 @@ impl SegmentStage {
         Self { rules: rules.clone(), work: work.to_owned(), speech: None }
     }
 
-    /// Sets the speech detector.
     pub fn with_speech(self, speech: Option<SpeechDetector>) -> Self {
         Self { speech, ..self }
     }

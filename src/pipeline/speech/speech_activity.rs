@@ -11,8 +11,7 @@ use std::path::Path;
 
 /// Window around a frame in seconds: about a sentence with its pauses.
 const WINDOW_SECS: f64 = 4.0;
-/// Hysteresis thresholds: speech starts at the first probability and ends below the second (Silero's defaults, as are
-/// the next two).
+/// Hysteresis thresholds: speech starts at the first probability and ends below the second (Silero's, as the next two).
 const START_PROBABILITY: f32 = 0.5;
 const END_PROBABILITY: f32 = 0.35;
 /// Longest silence within speech, and shortest speech, in seconds.
@@ -65,8 +64,7 @@ pub fn probabilities(path: &Path, model: &mut SpeechModel) -> Result<Vec<f32>> {
     Ok(probabilities)
 }
 
-/// Windows with speech: from a probability of 0.5 until it stays below 0.35 for 0.1 s; segments shorter than 0.25 s
-/// are dropped.
+/// Windows with speech: from a probability of 0.5 until it stays below 0.35 for 0.1 s; those below 0.25 s are dropped.
 fn is_speech(probabilities: &[f32]) -> Vec<bool> {
     let windows = |secs: f64| (secs * f64::from(RATE) / WINDOW as f64).round() as usize;
     let (hangover, shortest) = (windows(HANGOVER_SECS), windows(MIN_SPEECH_SECS));

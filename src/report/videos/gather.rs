@@ -160,11 +160,9 @@ fn motion(work: &Path, unit: &Unit) -> Result<(orator_base::types::pose3d::Motio
 #[derive(Clone, Debug)]
 pub struct VideoSummary {
     pub unit: Unit,
-    /// File name.
     pub file: String,
     /// Ledger of the video; empty if its length is unknown.
     pub ledger: Ledger,
-    /// Whether the lift stage has finished.
     pub is_lifted: bool,
     pub has_failed: bool,
     /// Numbers of words in the transcript; `None`: it has none.

@@ -137,8 +137,7 @@ fn farthest(
 ) -> Option<(usize, f64, Bound, bool)> {
     let on_frames = frame_rules(rules).into_iter().filter(|rule| rule.rejection == rejection);
     let on_frames = on_frames.map(|rule| (rule.values, rule.bound, !rule.measures_secs));
-    // If the rule requires a minimum share, frames that do not count are bad; for a maximum share, those that count
-    // are.
+    // If the rule requires a minimum share, frames that do not count are bad; for a maximum, those that count are.
     let on_pieces = segment_rules(rules).into_iter().filter(|rule| rule.rejection == rejection).map(|rule| {
         let bad = match rule.share {
             Bound::AtLeast(_) => rule.counted,
@@ -156,8 +155,7 @@ fn farthest(
     known.max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, found)| found)
 }
 
-/// Frame with the smallest (or largest) known value, ties going to the one nearest the middle, and the value; NaN if no
-/// value is known.
+/// Frame with the smallest (or largest) known value, ties going to the one nearest the middle, and the value, or NaN.
 fn extreme(values: &[f32], frames: std::ops::Range<usize>, lowest: bool) -> (usize, f64) {
     let middle = frames.start.midpoint(frames.end.saturating_sub(1));
     let known = frames.filter(|t| !values[*t].is_nan());
@@ -244,8 +242,7 @@ pub fn thumbnails(
     moments.into_iter().map(|frames| Ok((frames.clone(), picture(frames)?))).collect()
 }
 
-/// Current frame of the reader, or an empty picture, overlaid with its keypoints; `n_wide` thumbnails share the maximum
-/// width.
+/// Current frame of the reader, or an empty picture, overlaid with its keypoints; `n_wide` thumbnails share the width.
 fn draw_thumbnail(
     reader: Option<&mut FrameReader>,
     keypoints: &Keypoints,

@@ -27,8 +27,7 @@ pub struct SubmittedAnswer {
 pub struct TrialTerms {
     /// Session of the trial. A participant who began anew may have another one than an earlier token names.
     pub session: u32,
-    /// Minimum time from the first presentation of the trial to its answer, milliseconds: before, its films cannot have
-    /// been watched.
+    /// Minimum time from the trial's first presentation to its answer, milliseconds: before, its films cannot be over.
     pub min_ms: i64,
     pub is_last: bool,
     pub fails_check: bool,

@@ -98,8 +98,7 @@ pub struct Quota {
     pub excluded_from: Option<u32>,
     /// Time without a further answer after which a session may be reassigned, milliseconds.
     pub abandoned_ms: i64,
-    /// Time without the first answer after which a session may be reassigned, milliseconds; `abandoned_ms` applies if
-    /// it is shorter.
+    /// Time without an answer after which a session may be reassigned, milliseconds; or `abandoned_ms` if shorter.
     pub unanswered_ms: i64,
 }
 
@@ -179,8 +178,7 @@ pub enum BeginOutcome {
     Begun(Participant),
     /// The identifier is that of a participant who was replaced.
     Replaced,
-    /// A session that has answers or is still held has the same ID. Only its token resumes it, because anybody can send
-    /// an ID.
+    /// A session that has answers or is still held has the same ID. Only its token resumes it: anybody can send an ID.
     Known,
     /// The study has all its participants.
     Full,

@@ -1,6 +1,7 @@
 //! Metrics and evaluation.
 
 pub(crate) mod calibration;
+pub(crate) mod catalogue;
 pub(crate) mod evaluate_checkpoints;
 pub(crate) mod evaluate_files;
 pub(crate) mod evaluate_speaker;

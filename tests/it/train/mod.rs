@@ -9,6 +9,7 @@ mod gan_words;
 pub(crate) mod interrupted;
 pub(crate) mod networks;
 pub(crate) mod operators;
+pub(crate) mod reading;
 pub(crate) mod run_train;
 pub(crate) mod seq2seq;
 pub(crate) mod seq2seq_program;

@@ -93,13 +93,11 @@ fn mismatched_parts(lengths: &[usize], which: usize) -> Vec<(usize, Range<usize>
     parts
 }
 
-/// Length of a window, seconds.
 const WINDOW_SECS: f64 = 4.0;
 /// Spectrogram rows between two candidate windows.
 const STRIDE: usize = 2;
 
-/// Sound to find poses for: rows of pooled spectrogram (`sound_features::SoundFeatures`), and its number of motion
-/// frames.
+/// Sound to find poses for: rows of pooled spectrogram (`sound_features::SoundFeatures`), its number of motion frames.
 #[derive(Clone, Copy, Debug)]
 pub struct Query<'a> {
     pub rows: &'a [f32],

@@ -22,7 +22,6 @@ struct StoreState {
 /// Joints [T, n, 3], metres, in memory or in a file.
 #[derive(Clone, Debug)]
 pub enum StoredMotion {
-    /// In memory.
     Held(Array3<f32>),
     /// In the temporary file, with their shape.
     InFile([usize; 3], FileBytes),
@@ -33,9 +32,8 @@ impl MotionStore {
         Self(Mutex::new(StoreState { left: usize::MAX, file: None }))
     }
 
-    /// Store that holds `memory_bytes` in memory and everything else in a temporary file in `folder`. The file is
-    /// opened immediately, since the process may lose the permission later. If it cannot be created, everything is held
-    /// in memory.
+    /// Store that holds `memory_bytes` in memory and the rest in a temporary file in `folder`. The file is opened now,
+    /// since the process may lose the permission later. If it cannot be created, everything is held in memory.
     pub fn in_folder(folder: &Path, memory_bytes: usize) -> Self {
         match FileMemory::new(folder) {
             Ok(file) => Self(Mutex::new(StoreState { left: memory_bytes, file: Some(file) })),

@@ -9,7 +9,6 @@ use std::path::{Path, PathBuf};
 
 /// Prefixes of ground-truth files; the rest of the stem is the name of the clip.
 const TRUTH: [&str; 7] = ["gt_interval_", "ground_truth_", "truth_", "real_", "gt_", "true_", "natural_"];
-/// Prefixes of prediction files.
 const PREDICTION: [&str; 8] =
     ["prediction_interval_", "prediction_", "predicted_", "generated_", "pred_", "made_", "output_", "synthetic_"];
 

@@ -163,8 +163,7 @@ impl Vocabulary {
         self.words.is_sorted_by(|a, b| a < b)
     }
 
-    /// Index of a word as written in a transcript. A word that is unknown with its surrounding punctuation is looked up
-    /// without it.
+    /// Index of a word as written in a transcript. A word unknown with its punctuation is looked up without it.
     pub fn number(&self, word: &str) -> u32 {
         let word = canonical(word);
         let bare = word.trim_matches(|character: char| !character.is_alphanumeric());

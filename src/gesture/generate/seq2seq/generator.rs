@@ -1,5 +1,4 @@
-//! Generates poses for a sound of any length segment by segment; each segment starts from the last poses of the
-//! previous one.
+//! Generates poses for a sound of any length by segment; each segment starts from the last poses of the previous one.
 
 use super::architecture::{self, Architecture, NumberedWord};
 use super::metadata::{self, SequenceMetadata};
@@ -42,8 +41,7 @@ pub struct SpeechInput {
 pub struct GeneratedPoses {
     /// Smoothed pose features [T, C].
     pub features: Array2<f32>,
-    /// Mean pose change across segment seams relative to that within segments, before and after smoothing; 1 for a
-    /// single segment.
+    /// Mean pose change across seams relative to that within, before and after smoothing; 1 for a single segment.
     pub seam_jump: [f64; 2],
 }
 
@@ -72,8 +70,7 @@ impl SequenceGenerator {
         self.metadata.architecture != Architecture::Autoencoder
     }
 
-    /// Initial decoder state of the segments, for all callers: carried from segment to segment if requested, or if the
-    /// model was trained to.
+    /// Initial decoder state of the segments, for all callers: carried across segments if requested, or if trained to.
     pub fn seams(&self, carry_state: bool) -> StateAtSeams {
         if self.has_state() && (carry_state || self.metadata.carries_state) {
             StateAtSeams::Carried

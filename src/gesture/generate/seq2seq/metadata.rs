@@ -53,8 +53,7 @@ impl SequenceMetadata {
         KIND.to_owned()
     }
 
-    /// Word indices that the network reads for a segment whose first predicted pose is `first`; `spoken_words` are
-    /// sorted by start time.
+    /// Word indices for a segment whose first predicted pose is `first`; `spoken_words` are sorted by start time.
     pub fn words_of_segment(&self, spoken_words: &[NumberedWord], first: usize) -> Vec<Vec<u32>> {
         architecture::words(
             self.architecture,

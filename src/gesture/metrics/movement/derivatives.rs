@@ -145,8 +145,7 @@ mod tests {
 
     #[test]
     fn steady_motion_has_the_square_of_its_speed() {
-        // The right wrist moves at 0.3 m/s along x and 0.4 m/s along z. The left hand root, which is not counted,
-        // jumps.
+        // The right wrist moves at 0.3 m/s along x and 0.4 m/s along z. The left hand root, not counted, jumps.
         let joints = Array3::from_shape_fn((4, N_JOINTS, 3), |(t, joint, k)| match (joint, k) {
             (R_WRIST, 0) => 0.3 * t as f32 / 15.0,
             (R_WRIST, 2) => 0.4 * t as f32 / 15.0,

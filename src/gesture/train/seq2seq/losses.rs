@@ -1,6 +1,5 @@
 //! Training losses of FineMotion's networks (GENEA 2020 entry, sections 4.1 and 4.3), as pure functions of poses [B, T,
-//! X] and of logits. Where paper and published code differ, both versions are implemented, and the code's is the
-//! default.
+//! X] and of logits. Where paper and published code differ, both are implemented, the code's is the default.
 
 use crate::train::gan::losses::{discriminator_loss, generator_loss};
 use candle_core::{Result, Tensor};
@@ -15,8 +14,7 @@ pub fn l1(generated: &Tensor, real: &Tensor) -> Result<Tensor> {
     (generated - real)?.abs()?.mean_all()
 }
 
-/// Sum of the absolute differences of consecutive poses, divided by the number of elements of `generated` (published
-/// code).
+/// Sum of the absolute differences of consecutive poses, divided by the size of `generated` (published code).
 pub fn continuity_of_numbers(generated: &Tensor) -> Result<Tensor> {
     steps(generated)?.abs()?.sum_all()? / generated.elem_count() as f64
 }
@@ -26,9 +24,8 @@ pub fn continuity_of_poses(generated: &Tensor) -> Result<Tensor> {
     (steps(generated)?.sqr()?.sum(2)? + TINY)?.sqrt()?.mean_all()
 }
 
-/// Variance reward as in the published code, always negative: minus the sum over samples and features of the Euclidean
-/// norm over time, divided by the number of elements. No mean is subtracted, so it rewards distance from the all-zero
-/// pose.
+/// Variance reward as in the published code, negative: minus the sum over samples and features of the Euclidean norm
+/// over time, divided by the number of elements. No mean is subtracted, so it rewards distance from the all-zero pose.
 pub fn variance_loss_of_code(generated: &Tensor) -> Result<Tensor> {
     (generated.sqr()?.sum(1)? + TINY)?.sqrt()?.sum_all()? / -(generated.elem_count() as f64)
 }
@@ -38,8 +35,7 @@ pub fn variance_loss_of_paper(generated: &Tensor) -> Result<Tensor> {
     generated.broadcast_sub(&generated.mean_keepdim(1)?)?.sqr()?.mean_all()?.neg()
 }
 
-/// Discriminator loss: half the sum of the binary cross-entropies of real logits with target 1 and of generated logits
-/// with target 0.
+/// Discriminator loss: half the sum of binary cross-entropies of real logits (target 1) and generated ones (target 0).
 pub fn discriminator(generated: &Tensor, real: &Tensor) -> Result<Tensor> {
     discriminator_loss(AdversarialLoss::Log, real, generated)? * 0.5
 }

@@ -29,9 +29,8 @@ use orator_nn::seq2seq::config::Config;
 use orator_nn::weights::Contents;
 use std::path::Path;
 
-/// Trains to the last step of `requested`, resuming from the newest checkpoint in `folder` if there is one; then the settings
-/// of that checkpoint apply, and differences are reported. `vectors` initialise the word embeddings; without them they
-/// are random.
+/// Trains to the last step of `requested`, resuming from the newest checkpoint in `folder` if there is one; then its
+/// settings apply, and differences are reported. `vectors` initialise the word embeddings; else they are random.
 ///
 /// # Errors
 /// Data that cannot be read, with the name of the file; no segment to train on; a checkpoint of other data; another
@@ -280,8 +279,7 @@ impl ValidatedTraining for SequenceTraining<'_> {
     }
 }
 
-/// Newest checkpoint and its state, with the settings of the resumed training. Reports where these differ from
-/// `requested`.
+/// Newest checkpoint, its state and the settings of the resumed training. Reports where these differ from `requested`.
 fn resume(
     source: TrainingSource,
     requested: &Seq2seqConfig,

@@ -1,5 +1,4 @@
-//! Copies an excerpt of a video to a file of its own without re-encoding, so that stages treat it as they treat the
-//! video.
+//! Copies an excerpt of a video to a file without re-encoding, so that stages treat it as they treat the video.
 
 use crate::ffmpeg::source;
 use anyhow::{Context, Result, ensure};
@@ -63,8 +62,7 @@ fn add_stream(output: &mut Output, input: &Input, index: usize) -> Result<()> {
     let from = input.stream(index).context("a stream is missing")?;
     let mut to = output.add_stream(encoder::find(codec::Id::None))?;
     to.set_parameters(from.parameters());
-    // SAFETY: the parameters belong to the new stream; the codec tag is cleared because it is specific to the source
-    // container.
+    // SAFETY: the parameters belong to the new stream; the codec tag is cleared as it belongs to the source container.
     unsafe { (*to.parameters().as_mut_ptr()).codec_tag = 0 };
     Ok(())
 }

@@ -16,9 +16,8 @@ use candle_core::{Result, Shape, Tensor};
 pub struct TruePoses<'a> {
     /// True poses [B, N, X] of the steps; they get no gradient.
     pub poses: &'a Tensor,
-    /// B * N entries, row-major: whether step t of sample b reads the true pose of step t - 1 instead of the computed
-    /// one, which then gets no gradient from step t. Those of t = 0 have no effect, because the first step reads the
-    /// last previous pose.
+    /// B * N entries, row-major: whether step t of sample b reads the true pose of step t - 1, not the computed,
+    /// which then gets no gradient from it. Those of t = 0 have no effect: the first step reads the last previous pose.
     pub taken: &'a [bool],
 }
 

@@ -1,7 +1,6 @@
 //! Outputs with one position per keypoint. SimCC (Li et al. 2022): x and y are two classifications over sub-pixel bins
-//! (RTMPose, RTMW, DWPose). Regression: one row of values per point, x and y first, in px of the input,
-//! then, in rows of three, depth, and one score
-//! for all points (MediaPipe's hand and face).
+//! (RTMPose, RTMW, DWPose). Regression: one row of values per point, x and y first, in px of the input, then, in rows
+//! of three, depth, and one score for all points (MediaPipe's hand and face).
 
 use anyhow::{Result, bail, ensure};
 

@@ -12,8 +12,7 @@ pub struct Detection {
     pub points: Vec<[f64; 2]>,
 }
 
-/// Anchor centres as shares of the input side: layers of equal stride share a grid, with two anchors per cell and
-/// layer, row-major.
+/// Anchor centres as shares of the input side: equal strides share a grid, two anchors per cell and layer, row-major.
 pub fn anchors(size: usize, strides: &[usize]) -> Vec<[f64; 2]> {
     let mut centres = Vec::new();
     for layers in strides.chunk_by(|a, b| a == b) {

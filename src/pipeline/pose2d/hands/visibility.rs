@@ -73,7 +73,6 @@ impl VisibleHands {
     }
 }
 
-/// Hides a wrist that lies on that of the other hand.
 fn hide_misplaced_wrist(side: usize, hands: &[Option<DetectedHand>; 2], body: &mut [ScoredPoint; 17]) {
     let (None, Some(other)) = (&hands[side], &hands[1 - side]) else { return };
     let shoulders = distance(body[coco::L_SHOULDER], body[coco::R_SHOULDER]);
