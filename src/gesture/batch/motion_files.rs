@@ -6,7 +6,7 @@ use crate::generate::GestureGenerator;
 use crate::generate::generator::CHUNK;
 use crate::generate::seq2seq::SequenceGenerator;
 use crate::generate::trained::TrainedSpeaker;
-use crate::generate::word_input::WordLookup;
+use crate::generate::word_input::KnownWords;
 use anyhow::{Context as _, Result, bail, ensure};
 use orator_avatar::animate::export::file::{ExportContent, ExportFormat, FigureOptions};
 use orator_avatar::animate::{AnimationOptions, perform};
@@ -33,11 +33,11 @@ pub fn write_motion(
     progress: &dyn Progress,
 ) -> Result<MotionReport> {
     let audio = speech.audio;
-    let transcript = transcript(speech)?;
     let started = Instant::now();
     let task = progress.begin("speech to motion", 0);
     task.detail("reading the audio");
     let (n_samples, note) = measure(audio)?;
+    let transcript = transcript(speech)?;
     let secs = n_samples as f64 / f64::from(SAMPLE_RATE);
     let no_motion = || format!("cannot generate motion for {}", audio.display());
     let n_frames = speaker.n_frames(n_samples).with_context(no_motion)?;
@@ -52,7 +52,7 @@ pub fn write_motion(
     drop(task);
     let motion_secs = started.elapsed().as_secs_f64();
     write_outputs((motion, posture), speech, outputs, progress)?;
-    let words = speaker.word_lookup().map(|lookup| word_notes(lookup, transcript.as_ref(), secs));
+    let words = speaker.known_words().map(|known_words| word_notes(known_words, transcript.as_ref(), secs));
     let notes: Vec<String> = note.into_iter().chain(words.into_iter().flatten()).collect();
     let note = (!notes.is_empty()).then(|| notes.join("; "));
     Ok(MotionReport { secs, n_frames, motion_secs, note, segments: None })
@@ -151,7 +151,7 @@ pub fn write(
     );
     match speaker {
         TrainedSpeaker::Gan(speaker) => {
-            let (name, reads_words) = (speaker.name(), speaker.word_lookup().is_some());
+            let (name, reads_words) = (speaker.name(), speaker.known_words().is_some());
             ensure!(
                 speech.transcript.is_none() || reads_words,
                 "the model of {name} does not use words: omit --transcript"
@@ -184,9 +184,9 @@ pub fn write_sequence(
         "this network animates the BVH skeleton it was trained on, with its bone names and frame rate: omit \
          --names and --fps"
     );
-    let parsed = transcript(speech)?;
     let task = progress.begin("speech to motion", 0);
     measure(audio)?;
+    let parsed = transcript(speech)?;
     let sound = audio::read_mono_with_note(audio, speaker.metadata.rate)?;
     let (sound, phase_note) = sound.with_context(|| format!("{} has no audio", audio.display()))?;
     let words = parsed.as_ref().map_or(&[][..], |parsed| &parsed.words);
@@ -208,10 +208,10 @@ pub fn write_sequence(
         write_outputs((speaker.motion(&poses)?, None), speech, outputs, progress)?;
     }
     let known = parsed.as_ref().map(|parsed| [parsed.words.len(), speaker.metadata.vocabulary.n_known(&parsed.words)]);
-    let lookup = speaker.word_lookup();
-    let words_from_table = parsed.as_ref().and_then(|parsed| lookup.n_from_table(&parsed.words));
+    let known_words = speaker.known_words();
+    let words_from_table = parsed.as_ref().and_then(|parsed| known_words.n_from_table(&parsed.words));
     let notes = match (speaker.reads_words(), speech.transcript) {
-        (true, Some(_)) => word_notes(lookup, parsed.as_ref(), sound.secs()),
+        (true, Some(_)) => word_notes(known_words, parsed.as_ref(), sound.secs()),
         (false, Some(path)) => vec![format!("the network does not use words: {} was ignored", path.display())],
         (_, None) => Vec::new(),
     };
@@ -232,11 +232,11 @@ pub fn write_sequence(
 }
 
 /// Notes on the words of a speech of `sound_secs` for a network that reads words.
-fn word_notes(lookup: WordLookup, transcript: Option<&Transcript>, sound_secs: f64) -> Vec<String> {
+fn word_notes(known_words: KnownWords, transcript: Option<&Transcript>, sound_secs: f64) -> Vec<String> {
     let Some(Transcript { words, notes, .. }) = transcript else {
         return vec!["no words were given (--transcript): the motion depends on the audio only".to_owned()];
     };
-    let n_read = lookup.vocabulary.n_known(words) + lookup.n_from_table(words).unwrap_or(0);
+    let n_read = known_words.vocabulary.n_known(words) + known_words.n_from_table(words).unwrap_or(0);
     let is_unknown = !words.is_empty() && n_read == 0;
     let unknown = is_unknown.then(|| {
         format!(

@@ -5,7 +5,7 @@ use super::motion_files;
 use super::sounds::BatchSound;
 use super::speech::SpeechSource;
 use crate::generate::model::{checkpoint_file, model_lock};
-use crate::generate::seq2seq::metadata::uses_transcript;
+use crate::generate::seq2seq::metadata::reads_transcript;
 use crate::generate::trained::TrainedSpeaker;
 use anyhow::{Context, Result, bail, ensure};
 use orator_avatar::animate::AnimationOptions;
@@ -71,7 +71,7 @@ impl<'a> BatchStage<'a> {
     /// Transcript of a sound, if its checkpoint uses it.
     fn transcript_of(&self, unit: &Unit) -> Result<Option<&Path>> {
         let transcript = self.sound(unit)?.transcript.as_deref();
-        Ok(transcript.filter(|_| self.checkpoint_of(unit).and_then(|path| uses_transcript(&path)).unwrap_or(false)))
+        Ok(transcript.filter(|_| self.checkpoint_of(unit).and_then(|path| reads_transcript(&path)).unwrap_or(false)))
     }
 
     fn checkpoint_of(&self, unit: &Unit) -> Result<PathBuf> {

@@ -3,7 +3,7 @@
 //! its end the sound is extended by its mirror image, for which the tail is kept.
 
 use super::model::{self, GenerationChoice, SpeakerMetadata, checkpoint_file};
-use super::word_input::{TrainedWords, WordFramesBuilder, WordLookup, check_vectors};
+use super::word_input::{KnownWords, TrainedWords, WordFrameList, check_vectors};
 use anyhow::{Context, Result, ensure};
 use candle_core::{Device, Tensor};
 use ndarray::{Array2, Array3, s};
@@ -64,9 +64,9 @@ impl GestureGenerator {
     }
 
     /// Vocabulary and table of word vectors; `None` if the network does not read words.
-    pub fn word_lookup(&self) -> Option<WordLookup<'_>> {
+    pub fn known_words(&self) -> Option<KnownWords<'_>> {
         let TrainedWords { vocabulary, .. } = self.metadata.words.as_ref()?;
-        Some(WordLookup { vocabulary, vectors: self.vectors.as_deref() })
+        Some(KnownWords { vocabulary, vectors: self.vectors.as_deref() })
     }
 
     pub fn name(&self) -> &str {
@@ -160,9 +160,9 @@ impl GestureGenerator {
 
     /// The words at `n_frames` pose frames; `None` if the network does not read words.
     fn word_frames(&self, words: &[Word], n_frames: usize) -> Result<Option<WordFrames>> {
-        let Some(lookup) = self.word_lookup() else { return Ok(None) };
-        let (spoken, added) = lookup.numbered(words)?;
-        let mut frames = WordFramesBuilder::default();
+        let Some(known_words) = self.known_words() else { return Ok(None) };
+        let (spoken, added) = known_words.numbered(words)?;
+        let mut frames = WordFrameList::default();
         frames.push(&spoken, self.fps(), (0..n_frames).map(|t| self.fps().secs(t)));
         frames.frames(added).map(Some)
     }

@@ -9,7 +9,7 @@ use super::normalisation::Normalisation;
 use super::seq2seq::SequenceGenerator;
 use super::seq2seq::architecture::Architecture;
 use super::seq2seq::metadata::is_sequence_kind;
-use super::word_input::WordLookup;
+use super::word_input::KnownWords;
 use anyhow::{Result, bail, ensure};
 use candle_core::{DType, Tensor};
 use orator_base::types::pose3d::Motion;
@@ -98,16 +98,16 @@ impl TrainedSpeaker {
     /// Size of the vocabulary; 0 if the model does not read words.
     pub fn n_words(&self) -> usize {
         match self {
-            Self::Gan(speaker) => speaker.word_lookup().map_or(0, |lookup| lookup.vocabulary.words().len()),
+            Self::Gan(speaker) => speaker.known_words().map_or(0, |known_words| known_words.vocabulary.words().len()),
             Self::Sequence(speaker) => speaker.metadata.vocabulary.words().len(),
         }
     }
 
     /// Vocabulary and table of word vectors; `None` if the model does not read words.
-    pub fn word_lookup(&self) -> Option<WordLookup<'_>> {
+    pub fn known_words(&self) -> Option<KnownWords<'_>> {
         match self {
-            Self::Gan(speaker) => speaker.word_lookup(),
-            Self::Sequence(speaker) => Some(speaker.word_lookup()).filter(|_| speaker.reads_words()),
+            Self::Gan(speaker) => speaker.known_words(),
+            Self::Sequence(speaker) => Some(speaker.known_words()).filter(|_| speaker.reads_words()),
         }
     }
 
@@ -133,7 +133,7 @@ impl TrainedSpeaker {
     }
 
     pub fn reads_words(&self) -> bool {
-        self.word_lookup().is_some()
+        self.known_words().is_some()
     }
 
     /// Words that are not in the vocabulary take their vectors from this table. Fails if the model does not read words,

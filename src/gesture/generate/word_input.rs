@@ -20,12 +20,12 @@ pub struct TrainedWords {
 
 /// Vocabulary of a network, and a table of vectors for other words.
 #[derive(Clone, Copy)]
-pub struct WordLookup<'a> {
+pub struct KnownWords<'a> {
     pub vocabulary: &'a Vocabulary,
     pub vectors: Option<&'a WordVectors>,
 }
 
-impl WordLookup<'_> {
+impl KnownWords<'_> {
     /// Number of words that take their vectors from the table; `None` without a table.
     pub fn n_from_table<'w>(&self, words: impl IntoIterator<Item = &'w Word>) -> Option<usize> {
         let is_in_table = |word: &&Word| self.table_index(word).is_some();
@@ -73,13 +73,13 @@ pub fn check_vectors(name: &str, has_word_vectors: bool, dim: usize, vectors: &W
 
 /// Collects the words at the frames of a batch of sounds of equal length.
 #[derive(Default)]
-pub struct WordFramesBuilder {
+pub struct WordFrameList {
     numbers: Vec<u32>,
     times: Vec<f32>,
     n_sounds: usize,
 }
 
-impl WordFramesBuilder {
+impl WordFrameList {
     /// Appends a sound with frames at `secs`: at each the last word that has begun by half a frame later, unless it has
     /// ended half a frame before. Every word is thus at one frame at least, unless another word begins there.
     pub fn push(&mut self, spoken: &[NumberedWord], fps: FrameRate, secs: impl IntoIterator<Item = f64>) {
@@ -115,7 +115,7 @@ mod tests {
         // The third word is shorter than a frame; the last two overlap.
         let spoken = [word(2, 0.0, 0.2), word(3, 0.2, 0.31), word(4, 0.52, 0.53), word(5, 0.7, 1.2), word(6, 0.9, 1.0)];
         let fps = FrameRate::new(10, 1);
-        let mut builder = WordFramesBuilder::default();
+        let mut builder = WordFrameList::default();
         builder.push(&spoken, fps, (0..12).map(|t| fps.secs(t)));
         builder.push(&[], fps, (0..12).map(|t| fps.secs(t)));
         let frames = builder.frames(None)?;

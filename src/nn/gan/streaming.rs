@@ -95,7 +95,7 @@ impl<'a, M: FnMut(Range<usize>) -> Result<Tensor>> StreamingGenerator<'a, M> {
         self.encode_until(needed.clone(), n_encoded)?;
         let Some(encoded) = &self.encoded else { candle_core::bail!("no encoded audio frames are buffered") };
         let encoded = encoded.narrow(1, needed.start - self.first_encoded, needed.len())?;
-        let words = self.words.as_ref().map(|words| words.narrow(first..end)).transpose()?;
+        let words = self.words.as_ref().map(|words| words.part(first..end)).transpose()?;
         let encoded = self.generator.with_words(resize::linear_part(&encoded, &part)?, words.as_ref())?;
         let poses = self.generator.decode(&encoded, false)?;
         poses.narrow(2, frames.start - first, frames.len())

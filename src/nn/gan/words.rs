@@ -26,7 +26,7 @@ pub struct WordFrames {
 
 impl WordFrames {
     /// Returns a range of frames.
-    pub fn narrow(&self, frames: Range<usize>) -> Result<Self> {
+    pub fn part(&self, frames: Range<usize>) -> Result<Self> {
         let part = |tensor: &Tensor| tensor.narrow(1, frames.start, frames.len());
         Ok(Self { numbers: part(&self.numbers)?, times: part(&self.times)?, added: self.added.clone() })
     }
@@ -107,7 +107,7 @@ mod tests {
             added: None,
         };
         assert_eq!(run(None)?, run(Some(&none))?);
-        assert!(run(Some(&none.narrow(1..3)?)).is_err(), "other number of frames");
+        assert!(run(Some(&none.part(1..3)?)).is_err(), "other number of frames");
         Ok(())
     }
 }

@@ -27,6 +27,8 @@ const WORDS: [&str; 2] = ["left", "right"];
 /// Frames of a word, and the frame of [`sample`] whose pose each word has.
 const WORD_FRAMES: usize = 12;
 const POSES: [usize; 2] = [5, 30];
+/// Random bits: the order of the words.
+const ORDER: u64 = 0x9c6a_53b1_74d2_2e8b;
 
 /// Words in an irregular order, one every 12 frames.
 fn spoken(n_frames: usize, key: usize) -> Vec<Word> {
@@ -41,7 +43,7 @@ fn spoken(n_frames: usize, key: usize) -> Vec<Word> {
 }
 
 fn which(n: usize, key: usize) -> usize {
-    (n * n * (key + 3) / 3 + n / 2 + key) % 2
+    usize::from((ORDER >> ((n + 13 * key) % 64)) & 1 == 1)
 }
 
 /// An interval with the pose of each word during the word, and constant audio.

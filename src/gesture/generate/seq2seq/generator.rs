@@ -4,7 +4,7 @@ use super::architecture::{self, Architecture, NumberedWord};
 use super::metadata::{self, SequenceMetadata};
 use super::poses::PoseFormat;
 use crate::generate::model::checkpoint_file;
-use crate::generate::word_input::{WordLookup, check_vectors};
+use crate::generate::word_input::{KnownWords, check_vectors};
 use anyhow::{Result, ensure};
 use candle_core::{DType, Device, Tensor};
 use ndarray::{Array2, ArrayView2, s};
@@ -102,8 +102,8 @@ impl SequenceGenerator {
     }
 
     /// Vocabulary and table of word vectors.
-    pub fn word_lookup(&self) -> WordLookup<'_> {
-        WordLookup { vocabulary: &self.metadata.vocabulary, vectors: self.vectors.as_deref() }
+    pub fn known_words(&self) -> KnownWords<'_> {
+        KnownWords { vocabulary: &self.metadata.vocabulary, vectors: self.vectors.as_deref() }
     }
 
     /// Input features for a sound at `metadata.rate` and its words, of which there may be none. The sound is padded
@@ -120,7 +120,7 @@ impl SequenceGenerator {
             architecture::audio_features(sound, self.fps(), n_frames, n_frames.next_multiple_of(predicted), context);
         let shape = (1, cepstra.nrows(), cepstra.ncols());
         let audio = Tensor::from_iter(cepstra.iter().copied(), &Device::Cpu)?.reshape(shape)?;
-        let (words, added) = self.word_lookup().numbered(words)?;
+        let (words, added) = self.known_words().numbered(words)?;
         let network = added.map(|added| self.metadata.with_word_vectors(&self.params, &added)).transpose()?;
         Ok(SpeechInput { n_frames, audio, words, network })
     }

@@ -110,7 +110,7 @@ const fn around_segment_secs() -> f64 {
 
 /// Whether a file is a checkpoint of a sequence-to-sequence network or of a GAN with word input. Fails if it cannot be
 /// read or is not a checkpoint.
-pub fn uses_transcript(path: &Path) -> Result<bool> {
+pub fn reads_transcript(path: &Path) -> Result<bool> {
     let speaker = &orator_formats::checkpoint::facts(path)?["speaker"];
     Ok(is_sequence_kind(&speaker["kind"]) || speaker["words"].is_object())
 }

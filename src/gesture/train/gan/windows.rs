@@ -5,7 +5,7 @@ use super::interval_rows::{IntervalRows, TrainingIntervals};
 use crate::generate::generator::mel_frames;
 use crate::generate::normalisation::{N_FEATURES, Normalisation};
 use crate::generate::seq2seq::architecture::{NumberedWord, Vocabulary};
-use crate::generate::word_input::WordFramesBuilder;
+use crate::generate::word_input::WordFrameList;
 use crate::train::no_window::NeededFrames;
 use anyhow::{Context, Result, ensure};
 use candle_core::{Device, Tensor};
@@ -109,7 +109,7 @@ impl<'d> WindowLoader<'d> {
     /// Words at `n_frames` frames of windows, each with its interval, first frame and frames per window frame.
     fn words_of(&self, windows: &[(usize, f64, f64)], n_frames: usize) -> Result<Option<WordFrames>> {
         let Some(words) = &self.words else { return Ok(None) };
-        let mut frames = WordFramesBuilder::default();
+        let mut frames = WordFrameList::default();
         for (interval, first, speed) in windows {
             let secs = (0..n_frames).map(|t| (first + t as f64 * speed) / self.fps.per_sec());
             frames.push(&words[*interval], self.fps, secs);
