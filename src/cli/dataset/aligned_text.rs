@@ -14,10 +14,12 @@ const MIN_ALIGNED: f64 = 0.25;
 /// Words of a text, in order.
 pub(super) struct AlignedText {
     words: Vec<String>,
+    /// Given start and end of each word on the clock of the file, seconds; empty without times.
+    times: Vec<(f64, f64)>,
 }
 
 impl AlignedText {
-    /// Reads a transcript, whose times are ignored.
+    /// Reads a transcript. Words with times are searched for near them.
     ///
     /// # Errors
     ///
@@ -29,11 +31,20 @@ impl AlignedText {
         }
         let words: Vec<String> = transcript.text.split_whitespace().map(str::to_owned).collect();
         ensure!(words.iter().any(|word| has_letters(word)), "the transcript {} contains no words", path.display());
-        Ok(Self { words })
+        // If the transcript has word times, the tokens of its text are exactly those words.
+        let is_timed = transcript.words.len() == words.len();
+        let timed = transcript.words.iter().filter(|_| is_timed);
+        Ok(Self { words, times: timed.map(|word| (word.start_secs, word.end_secs)).collect() })
     }
 
     pub(super) fn words(&self) -> &[String] {
         &self.words
+    }
+
+    /// Given times on the clock of audio that starts at `zero_secs` of the file.
+    pub(super) fn within(&self, zero_secs: f64) -> Vec<Option<(f64, f64)>> {
+        let on_audio = |secs: f64| (secs - zero_secs).max(0.0);
+        self.times.iter().map(|(start, end)| Some((on_audio(*start), on_audio(*end)))).collect()
     }
 
     /// All words, and the indices of those that could not be aligned; tokens without letters or digits are not counted.
@@ -90,7 +101,7 @@ mod tests {
         let at =
             |start_secs, end_secs| Some(RecognisedWord { word: String::new(), start_secs, end_secs, probability: 0.5 });
         let found = [None, at(1.0, 1.5), None, None, at(2.5, 3.1), None];
-        let text = AlignedText { words: ["a", "b", "c", "-", "e", "f"].map(str::to_owned).into() };
+        let text = AlignedText { times: Vec::new(), words: ["a", "b", "c", "-", "e", "f"].map(str::to_owned).into() };
         let (words, unaligned) = text.with_times(&found, 3.0).unwrap();
         let times: Vec<_> = words.iter().map(|word| (word.start_secs, word.end_secs)).collect();
         assert_eq!(times, [(0.0, 1.0), (1.0, 1.5), (1.5, 2.0), (2.0, 2.5), (2.5, 3.0), (3.0, 3.0)]);

@@ -266,7 +266,8 @@ impl Transcriber<'_> {
                 (segments.collect::<Vec<_>>(), (language, language_probability), Vec::new())
             }
             Some(text) => {
-                let found = self.recogniser.align(&mut source, n_samples, text.words(), language, &mut progress)?;
+                let (words, within) = (text.words(), text.within(zero_secs));
+                let found = self.recogniser.align(&mut source, n_samples, words, &within, language, &mut progress)?;
                 let (words, unaligned) = text.with_times(&found, secs)?;
                 (sentences(&words), (language.unwrap_or_default().to_owned(), 1.0), unaligned)
             }
