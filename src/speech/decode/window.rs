@@ -157,7 +157,7 @@ mod tests {
                 };
                 let next = text.get(tokens.len() - at).copied().unwrap_or(eot);
                 // Text with a question mark is improbable.
-                logits[next as usize] = if text.contains(&63) { 8.0 } else { 20.0 };
+                logits[next as usize] = if text.contains(&63) { 4.0 } else { 20.0 };
                 logits
             })
         };
