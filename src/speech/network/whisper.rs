@@ -44,7 +44,7 @@ impl Whisper {
             let config = WhisperConfig::read(dir, &weights)?;
             let decoder = TextDecoder::read(&weights, &config)?;
             let encoder = AudioEncoder::read(&weights, &config)?;
-            Ok(Self { config, encoder, decoder })
+            anyhow::Ok(Self { config, encoder, decoder })
         };
         read().with_context(|| format!("{} has no usable Whisper network", dir.display()))
     }
