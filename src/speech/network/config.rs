@@ -59,25 +59,25 @@ impl WhisperConfig {
             ensure!(shape.len() == n && !shape.contains(&0), "{name} has shape {shape:?}, expected {n} axes");
             Ok(shape)
         };
-        let [n_vocab, width] = sizes("decoder/embeddings/weight", 2)?[..] else { unreachable!() };
+        let embedding = sizes("decoder/embeddings/weight", 2)?;
+        let (n_vocab, width) = (embedding[0], embedding[1]);
         let n_mels = sizes("encoder/conv1/weight", 3)?[1];
         let n_audio_frames = sizes("encoder/position_encodings/encodings", 2)?[0];
         let max_tokens = sizes("decoder/position_encodings/encodings", 2)?[0];
         let is_ctranslate2 = weights.is_ctranslate2();
         let (encoder_heads, n_heads) = if is_ctranslate2 {
-            (weights.integer("encoder/num_heads")?, weights.integer("decoder/num_heads")?)
+            (weights.int("encoder/num_heads")?, weights.int("decoder/num_heads")?)
         } else {
             let heads: HeadCount = json(&dir.join("config.json"))?;
             (heads.encoder_attention_heads, heads.decoder_attention_heads)
         };
         ensure!(n_mels == N_MELS, "the network has {n_mels} mel bands; supported are networks with {N_MELS}");
         ensure!(
-            n_heads > 0 && encoder_heads == n_heads && width % n_heads == 0 && (width / n_heads) % COLUMNS == 0,
+            (1..=width).contains(&n_heads) && encoder_heads == n_heads && width.is_multiple_of(n_heads * COLUMNS),
             "{n_heads} heads do not fit a network of width {width}: expected heads of a multiple of {COLUMNS} values"
         );
-        let n_layers = |part: &str| {
-            (0..).take_while(|i| weights.contains(&format!("{part}/layer_{i}/ffn/linear_0/weight"))).count()
-        };
+        let n_layers =
+            |part: &str| (0..).take_while(|i| weights.has(&format!("{part}/layer_{i}/ffn/linear_0/weight"))).count();
         let (n_encoder_layers, n_decoder_layers) = (n_layers("encoder"), n_layers("decoder"));
         let path = dir.join(if is_ctranslate2 { "config.json" } else { "generation_config.json" });
         let file: DecodingFile = if path.exists() { json(&path)? } else { DecodingFile::default() };

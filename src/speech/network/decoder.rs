@@ -11,7 +11,7 @@ use orator_nn::cpu::packed_matrix::COLUMNS;
 use orator_nn::cpu::spin_pool::{parallel_each, parallel_map};
 use orator_nn::cpu::transformer::attend_heads;
 
-pub(super) struct Decoder {
+pub(super) struct TextDecoder {
     embedding: Linear,
     /// Added to the embedding of each token, [tokens, width].
     positions: Vec<f32>,
@@ -44,7 +44,7 @@ pub(super) struct BeamCache {
 /// Scores of a head of the cross-attention, [tokens, positions].
 pub(super) type HeadScores = ((usize, usize), Vec<f32>);
 
-impl Decoder {
+impl TextDecoder {
     pub(super) fn read(weights: &WeightFile, config: &WhisperConfig) -> Result<Self> {
         let &WhisperConfig { width, n_heads, n_vocab, .. } = config;
         let layer = |i: usize| {

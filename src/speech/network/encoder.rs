@@ -8,7 +8,7 @@ use ndarray::ArrayView2;
 use orator_nn::cpu::spin_pool::{parallel_each, parallel_map};
 use orator_nn::cpu::transformer::gelu;
 
-pub(super) struct Encoder {
+pub(super) struct AudioEncoder {
     conv1: Linear,
     conv2: Linear,
     /// Added to the output of the convolutions, [positions, width].
@@ -27,7 +27,7 @@ struct EncoderLayer {
     n_heads: usize,
 }
 
-impl Encoder {
+impl AudioEncoder {
     pub(super) fn read(weights: &WeightFile, config: &WhisperConfig) -> Result<Self> {
         let &WhisperConfig { width, n_heads, .. } = config;
         let layer = |i: usize| {

@@ -96,7 +96,7 @@ impl WeightFile {
         self.is_ctranslate2
     }
 
-    pub(super) fn contains(&self, name: &str) -> bool {
+    pub(super) fn has(&self, name: &str) -> bool {
         self.stored_names(name).iter().any(|name| self.variables.contains_key(name))
     }
 
@@ -106,7 +106,7 @@ impl WeightFile {
     }
 
     /// Value of an integer variable, at least 0.
-    pub(super) fn integer(&self, name: &str) -> Result<usize> {
+    pub(super) fn int(&self, name: &str) -> Result<usize> {
         let stored = self.stored(name)?;
         let is_integer = stored.number == StoredNumber::I16 && stored.shape.iter().product::<usize>() == 1;
         ensure!(is_integer, "{}: {name} is not an i16 number", self.path.display());

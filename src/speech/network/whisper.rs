@@ -1,8 +1,8 @@
 //! Encoder and decoder of one network, and the attention that aligns tokens with time.
 
 use super::config::WhisperConfig;
-use super::decoder::{Decoder, TokenDecoder};
-use super::encoder::Encoder;
+use super::decoder::{TextDecoder, TokenDecoder};
+use super::encoder::AudioEncoder;
 use super::layers::PackedHead;
 use super::weight_file::WeightFile;
 use anyhow::{Context, Result, ensure};
@@ -12,8 +12,8 @@ use std::path::Path;
 /// A Whisper network (Radford et al. 2022), with weights of f32. Results do not depend on the number of threads.
 pub struct Whisper {
     config: WhisperConfig,
-    encoder: Encoder,
-    pub(super) decoder: Decoder,
+    encoder: AudioEncoder,
+    pub(super) decoder: TextDecoder,
 }
 
 /// A window of encoded sound.
@@ -42,8 +42,8 @@ impl Whisper {
         let read = || {
             let weights = WeightFile::open(dir)?;
             let config = WhisperConfig::read(dir, &weights)?;
-            let decoder = Decoder::read(&weights, &config)?;
-            let encoder = Encoder::read(&weights, &config)?;
+            let decoder = TextDecoder::read(&weights, &config)?;
+            let encoder = AudioEncoder::read(&weights, &config)?;
             anyhow::Ok(Self { config, encoder, decoder })
         };
         read().with_context(|| format!("{} has no usable Whisper network", dir.display()))
