@@ -143,17 +143,6 @@ impl Recogniser {
             beam: beam.max(1),
         };
         let decoded = decoder.decode(|| self.network.decoder(audio), previous, window.start as u64)?;
-        if std::env::var_os("DUMP").is_some() {
-            eprintln!(
-                "DUMP {} {:?} {} {} {} {}",
-                window.start,
-                decoded.tokens,
-                decoded.mean_log_prob,
-                decoded.no_speech,
-                decoded.compression,
-                decoded.temperature
-            );
-        }
         let temperature = decoded.temperature;
         let [start_secs, end_secs] = [window.start, window.end].map(|at| at as f64 / RATE as f64);
         if decoded.is_silence() || decoded.is_repetitive() {
