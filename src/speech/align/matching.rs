@@ -155,12 +155,23 @@ mod tests {
 
     #[test]
     fn recognised_words_are_found_in_the_text() {
-        assert_eq!(matched("Printing, in the only sense", "printing in the only sense", "en"), "printing in the only sense");
-        assert_eq!(matched("well-known Gutenberg's b\u{fc}cher", "Well known Gutenburgs Bucher", "de"), "well known gutenbergs bucher");
+        assert_eq!(
+            matched("Printing, in the only sense", "printing in the only sense", "en"),
+            "printing in the only sense"
+        );
+        assert_eq!(
+            matched("well-known Gutenberg's b\u{fc}cher", "Well known Gutenburgs Bucher", "de"),
+            "well known gutenbergs bucher"
+        );
         assert_eq!(matched("we see 1865 now and then", "we see eighteen sixty five now and", "en"), "we see now and");
         assert_eq!(matched("a b", "", "en"), "");
         assert_eq!(matched("", "a b", "en"), "");
-        assert_eq!(matched("\u{65e5}\u{672c}\u{8a9e}\u{3002}\u{3067}\u{3059}", "\u{65e5}\u{672c}\u{3067}\u{3059}", "ja").chars().count(), 7);
+        assert_eq!(
+            matched("\u{65e5}\u{672c}\u{8a9e}\u{3002}\u{3067}\u{3059}", "\u{65e5}\u{672c}\u{3067}\u{3059}", "ja")
+                .chars()
+                .count(),
+            7
+        );
     }
 
     #[test]
@@ -178,7 +189,10 @@ mod tests {
     #[test]
     fn similarity_is_relative_to_the_longer_word() {
         let of = |a: &str, b: &str| similarity(&a.chars().collect::<Vec<_>>(), &b.chars().collect::<Vec<_>>());
-        assert_eq!((of("abc", "abc"), of("abcd", "abxd"), of("abcd", "bcd"), of("a", "abcdef")), (1.0, 0.75, 0.75, 0.0));
+        assert_eq!(
+            (of("abc", "abc"), of("abcd", "abxd"), of("abcd", "bcd"), of("a", "abcdef")),
+            (1.0, 0.75, 0.75, 0.0)
+        );
         assert_eq!((of("", ""), of("kitten", "sittin")), (1.0, 1.0 - 2.0 / 6.0));
     }
 }

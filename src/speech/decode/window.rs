@@ -157,7 +157,7 @@ mod tests {
                 };
                 let next = text.get(tokens.len() - at).copied().unwrap_or(eot);
                 // Text with a question mark is improbable.
-                logits[next as usize] = if text.contains(&63) { 8.0 } else { 20.0 };
+                logits[next as usize] = if text.contains(&63) { 4.0 } else { 20.0 };
                 logits
             })
         };
@@ -172,8 +172,8 @@ mod tests {
         assert_eq!((decoded.temperature, &decoded.tokens[..3]), (0.0, &[begin, 32, 103][..]));
         assert!(decoded.mean_log_prob > -0.1 && decoded.no_speech < 0.1, "{decoded:?}");
         let loops = "very ".repeat(60);
-        let (decoded, prompts) = decode(&[&loops, " good words"], 0.0, &[]);
-        assert!(decoded.temperature == 0.2 && prompts.len() == 4 && !decoded.is_repetitive(), "{decoded:?}");
+        let (decoded, _) = decode(&[&loops, " good words"], 0.0, &[]);
+        assert!(decoded.temperature == 0.2 && !decoded.is_repetitive(), "{decoded:?}");
         let (decoded, _) = decode(&[&loops], 0.0, &[]);
         assert!(decoded.is_repetitive() && decoded.temperature == 1.0, "{decoded:?}");
         // Improbable text is silence if no speech is probable.

@@ -73,7 +73,7 @@ impl WhisperConfig {
         };
         ensure!(n_mels == N_MELS, "the network has {n_mels} mel bands; supported are networks with {N_MELS}");
         ensure!(
-            n_heads > 0 && encoder_heads == n_heads && width % n_heads == 0 && (width / n_heads) % COLUMNS == 0,
+            (1..=width).contains(&n_heads) && encoder_heads == n_heads && width.is_multiple_of(n_heads * COLUMNS),
             "{n_heads} heads do not fit a network of width {width}: expected heads of a multiple of {COLUMNS} values"
         );
         let n_layers =

@@ -45,7 +45,7 @@ impl Linear {
     /// Packs `weight` [out, in].
     pub(super) fn new(weight: &[f32], bias: Vec<f32>) -> Self {
         let (n_in, n_out) = (weight.len() / bias.len(), bias.len());
-        let block_columns = (BLOCK_WEIGHTS / n_in).next_multiple_of(4 * COLUMNS);
+        let block_columns = (BLOCK_WEIGHTS / n_in).max(1).next_multiple_of(4 * COLUMNS);
         let block = |first: usize| {
             let n = block_columns.min(n_out - first);
             PackedMatrix::new(n_in, n, |row, column| weight[(first + column) * n_in + row])
@@ -141,7 +141,7 @@ impl FeedForward {
         let first = format!("{name}/linear_0");
         let hidden = weights.shape(&format!("{first}/weight"))?.first().copied().unwrap_or_default();
         ensure!(
-            hidden > 0 && hidden % COLUMNS == 0,
+            hidden > 0 && hidden.is_multiple_of(COLUMNS),
             "{first}/weight has {hidden} outputs, expected a multiple of {COLUMNS}"
         );
         Ok(Self {

@@ -22,12 +22,16 @@ fn variables() -> Vec<(String, Vec<usize>)> {
         ("decoder/embeddings/weight".to_owned(), vec![40, WIDTH]),
     ];
     let mut add = |name: String, shape: &[usize]| variables.push((name, shape.to_vec()));
-    ["encoder/conv1", "encoder/conv2"].map(|conv| add(format!("{conv}/bias"), &[WIDTH]));
+    for name in ["encoder/conv1/bias", "encoder/conv2/bias"] {
+        add(name.to_owned(), &[WIDTH]);
+    }
     for layer in ["encoder/layer_0", "decoder/layer_0", "decoder/layer_1"] {
         let linears = [("self_attention", &[3, 1][..]), ("attention", &[1, 2, 1]), ("ffn", &[])];
         for (block, outputs) in linears.into_iter().filter(|(block, _)| layer.starts_with('d') || *block != "attention")
         {
-            ["gamma", "beta"].map(|part| add(format!("{layer}/{block}/layer_norm/{part}"), &[WIDTH]));
+            for part in ["gamma", "beta"] {
+                add(format!("{layer}/{block}/layer_norm/{part}"), &[WIDTH]);
+            }
             let of_width = outputs.iter().map(|n| [n * WIDTH, WIDTH]);
             let shapes = if block == "ffn" { vec![[48, WIDTH], [WIDTH, 48]] } else { of_width.collect() };
             for (i, [n_out, n_in]) in shapes.into_iter().enumerate() {
@@ -36,8 +40,10 @@ fn variables() -> Vec<(String, Vec<usize>)> {
             }
         }
     }
-    for part in ["encoder", "decoder"] {
-        ["gamma", "beta"].map(|norm| add(format!("{part}/layer_norm/{norm}"), &[WIDTH]));
+    for name in
+        ["encoder/layer_norm/gamma", "encoder/layer_norm/beta", "decoder/layer_norm/gamma", "decoder/layer_norm/beta"]
+    {
+        add(name.to_owned(), &[WIDTH]);
     }
     variables
 }

@@ -3,4 +3,5 @@
 mod recogniser;
 mod segments;
 
+pub(crate) use recogniser::Request;
 pub use recogniser::{Recogniser, RecogniserOptions, SampleSource};

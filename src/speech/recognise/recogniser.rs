@@ -5,7 +5,7 @@ use crate::align::token_times::{FRAME_SECS, TokenTimes};
 use crate::align::words::{shorten_long_words, words_of};
 use crate::decode::language;
 use crate::decode::rules::LogitRules;
-use crate::decode::window::{DecodedWindow, WindowDecoder};
+use crate::decode::window::WindowDecoder;
 use crate::mel::log_mel;
 use crate::network::{EncodedAudio, Whisper};
 use crate::recognised::{Recognised, RecognisedSegment};
@@ -52,6 +52,16 @@ pub(crate) struct Request {
     pub(crate) tokens: Vec<u32>,
 }
 
+/// Text of a window.
+pub(crate) struct HeardWindow {
+    /// Segments and their tokens.
+    pub(crate) segments: Vec<(RecognisedSegment, Vec<u32>)>,
+    /// Second of the sound at which the next window starts.
+    pub(crate) next_secs: f64,
+    /// Temperature of the last search.
+    pub(crate) temperature: f32,
+}
+
 impl Recogniser {
     /// Reads the network, see [`Whisper::open`], and `tokenizer.json` in the same folder.
     ///
@@ -96,30 +106,19 @@ impl Recogniser {
                 Some(request) => request,
                 none => none.insert(self.detect_language(&audio)?),
             };
-            let decoder = WindowDecoder {
-                tokenizer: &self.tokenizer,
-                rules: &self.rules,
-                request: &request.tokens,
-                max_tokens: self.network.config().max_tokens,
-                beam: options.beam.max(1),
-            };
-            let decoded = decoder.decode(|| self.network.decoder(&audio), &previous, window.start as u64)?;
             let last_secs = segments.last().map_or(0.0, |segment| segment.end_secs);
-            let mut next = window.end;
-            if !decoded.is_silence() && !decoded.is_repetitive() {
-                let (found, next_secs) = self.read_window(&audio, &decoded, &window, request, last_secs)?;
-                next = ((next_secs * RATE as f64) as usize / HOP * HOP).min(window.end);
-                for (segment, tokens) in found {
-                    if spans.overlap(segment.start_secs, segment.end_secs) {
-                        segments.push(segment);
-                        previous.extend(tokens);
-                    }
+            let heard = self.transcribe(&audio, &window, request, (options.beam, &previous), last_secs)?;
+            for (segment, tokens) in heard.segments {
+                if spans.overlap(segment.start_secs, segment.end_secs) {
+                    segments.push(segment);
+                    previous.extend(tokens);
                 }
             }
-            if decoded.temperature > MAX_PROMPT_TEMPERATURE {
+            if heard.temperature > MAX_PROMPT_TEMPERATURE {
                 previous.clear();
             }
             previous.drain(..previous.len().saturating_sub(self.network.config().max_tokens));
+            let next = ((heard.next_secs * RATE as f64) as usize / HOP * HOP).min(window.end);
             from = next.max(window.start + HOP);
             progress(from as f64 / RATE as f64);
         }
@@ -127,16 +126,28 @@ impl Recogniser {
         Ok(Recognised { language, language_probability, segments })
     }
 
-    /// Segments with their tokens, and the second at which the next window starts.
-    fn read_window(
+    /// Decodes an encoded window with a beam search after the text `previous`. `last_secs` is the end of the speech before.
+    pub(crate) fn transcribe(
         &self,
         audio: &EncodedAudio,
-        decoded: &DecodedWindow,
         window: &Range<usize>,
         request: &Request,
+        (beam, previous): (usize, &[u32]),
         last_secs: f64,
-    ) -> Result<(Vec<(RecognisedSegment, Vec<u32>)>, f64)> {
+    ) -> Result<HeardWindow> {
+        let decoder = WindowDecoder {
+            tokenizer: &self.tokenizer,
+            rules: &self.rules,
+            request: &request.tokens,
+            max_tokens: self.network.config().max_tokens,
+            beam: beam.max(1),
+        };
+        let decoded = decoder.decode(|| self.network.decoder(audio), previous, window.start as u64)?;
+        let temperature = decoded.temperature;
         let [start_secs, end_secs] = [window.start, window.end].map(|at| at as f64 / RATE as f64);
+        if decoded.is_silence() || decoded.is_repetitive() {
+            return Ok(HeardWindow { segments: Vec::new(), next_secs: end_secs, temperature });
+        }
         let text = split_at_timestamps(&decoded.tokens, self.tokenizer.timestamp_begin(), end_secs - start_secs);
         let WindowText { phrases, next_secs, is_complete } = text;
         let is_text = |token: &u32| *token < self.tokenizer.eot();
@@ -161,12 +172,10 @@ impl Recogniser {
         shorten_long_words(&mut segments, last_secs);
         let last_word = segments.iter().rev().find_map(|segment| segment.words.last());
         let next = last_word.map(|word| word.end_secs).filter(|&secs| !is_complete && secs > start_secs);
-        let found = segments
-            .into_iter()
-            .zip(phrases)
-            .filter(|(segment, phrase)| !segment.words.is_empty() && phrase.start_secs < phrase.end_secs);
-        let found = found.map(|(segment, phrase)| (segment, phrase.tokens)).collect();
-        Ok((found, next.unwrap_or(start_secs + next_secs)))
+        let found = segments.into_iter().zip(phrases);
+        let found = found.filter(|(segment, phrase)| !segment.words.is_empty() && phrase.start_secs < phrase.end_secs);
+        let segments = found.map(|(segment, phrase)| (segment, phrase.tokens)).collect();
+        Ok(HeardWindow { segments, next_secs: next.unwrap_or(start_secs + next_secs), temperature })
     }
 
     /// Encodes a window; `spans` silence the rest.
