@@ -13,7 +13,7 @@
 SHELL := /bin/bash
 .SHELLFLAGS := -euo pipefail -c
 .DEFAULT_GOAL := build
-.PHONY: spelling test-data setup runtime models readers browser blender validator vrm driver loader build dist check test prove prove-dist prove-rule prove-words prove-people prove-cluster prove-study demo demo-quick demo-study clean-demo docs
+.PHONY: spelling test-data setup runtime models readers aligner browser blender validator vrm driver loader build dist check test prove prove-dist prove-rule prove-words prove-people prove-cluster prove-study demo demo-quick demo-study clean-demo docs
 
 TARGET := $(or $(CARGO_TARGET_DIR),target)
 ORATOR := $(TARGET)/release/orator
@@ -21,6 +21,7 @@ LAB := $(TARGET)/release/orator-lab
 SKIPPED := $(abspath $(TARGET))/skipped-tests.txt
 export ORATOR_SPELLING ?= $(abspath $(TARGET))/spelling
 export ORATOR_READERS ?= $(abspath $(TARGET)/readers)
+export ORATOR_ALIGNER ?= $(abspath $(TARGET)/aligner)
 export ORATOR_MODELS ?= $(abspath $(TARGET)/models)
 export ORATOR_BLENDER ?= $(abspath $(TARGET)/blender)
 # A mismatch with a snapshot is an error.
@@ -33,7 +34,7 @@ export ORATOR_DRIVER ?= $(abspath $(TARGET)/driver)
 setup: ; @.ci/setup/system.sh
 runtime: ; @.ci/setup/onnxruntime.sh
 readers spelling: ; @.ci/setup/python.sh $@
-browser blender validator vrm driver loader: ; @.ci/setup/$@.sh
+aligner browser blender validator vrm driver loader: ; @.ci/setup/$@.sh
 models: build ; @.ci/setup/models.sh
 
 build: setup runtime
@@ -53,7 +54,7 @@ check:
 	cargo test --release --locked --workspace --lib --bins
 	cargo test --release --locked --test it -- $(QUICK)
 
-test: dist models readers browser blender validator vrm driver spelling
+test: dist models readers aligner browser blender validator vrm driver spelling
 	@rm -f $(SKIPPED)
 	cargo fmt --check
 	$(ORATOR_SPELLING)/bin/typos
@@ -71,7 +72,7 @@ test-data: build
 	@if [ -s $(SKIPPED) ]; then cargo test --release --locked --workspace -- --exact $$(sed 's/: .*//' $(SKIPPED) | sort -u); \
 		else echo 'the last `make test` skipped no test'; fi
 
-prove prove-rule prove-words prove-people prove-cluster: build models loader
+prove prove-rule prove-words prove-people prove-cluster: build models aligner loader
 	.ci/$@
 
 prove: prove-dist

@@ -13,7 +13,7 @@
 //! |---|---|
 //! | `orator-base` | plain values, mathematics, body model, audio features, stage records; no foreign library |
 //! | `orator-formats` | every file format; motion capture converted to the skeleton of the program |
-//! | `orator-media` | FFmpeg, OpenCV, the sandbox |
+//! | `orator-media` | FFmpeg, OpenCV, the word aligner, the sandbox |
 //! | `orator-onnx` | ONNX Runtime, the model store, model conversion |
 //! | `orator-nn` | operators with their kernels, and the networks (candle) |
 //! | `orator-speech` | speech recognition and word times (Whisper) |

@@ -3,7 +3,7 @@
 use super::program::Outcome;
 use anyhow::{Result, bail};
 
-/// A former verb; its arguments are accepted and ignored.
+/// A verb that `orator` had before version 0.2; its arguments are accepted and ignored.
 #[derive(clap::Args)]
 #[command(disable_help_flag = true)]
 pub struct MovedVerb {

@@ -2,7 +2,7 @@
 //! exit code (see the parent module for the codes).
 
 use super::cluster::{plan, submit, work};
-use super::dataset::{forget, import, transcribe, verify as dataset};
+use super::dataset::{align, forget, import, transcribe, verify as dataset};
 use super::motion::{lift, sheet};
 use super::moved::MovedVerb;
 use super::pipeline::{init, report, run, status};
@@ -10,7 +10,7 @@ use super::setup::{completions, doctor, models, words};
 use super::signals;
 use super::ui::Ui;
 use super::{animate, evaluate, generate, renamed, study, train, ui, verb_groups};
-use anyhow::{Result, bail};
+use anyhow::Result;
 use clap::{ArgMatches, CommandFactory, FromArgMatches, Parser, Subcommand};
 use orator_base::stage::workdir;
 use orator_pipeline::process::{VERB, serve};
@@ -58,6 +58,7 @@ pub(super) enum Verb {
     Report(report::Args),
     Import(import::Args),
     Transcribe(transcribe::Args),
+    Align(align::Args),
     Forget(forget::Args),
     Dataset(dataset::Args),
     Train(train::Args),
@@ -70,8 +71,6 @@ pub(super) enum Verb {
     Man(completions::ManArgs),
     #[command(hide = true)]
     Demo(MovedVerb),
-    #[command(hide = true)]
-    Align(MovedVerb),
 }
 
 /// Parses the command line, runs the verb, reports an error, and returns the exit code.
@@ -102,6 +101,7 @@ fn run(cli: Cli, ui: &Ui) -> Result<Outcome> {
         Verb::Dataset(args) => dataset::run(args, ui),
         Verb::Import(args) => import::run(args, ui),
         Verb::Transcribe(args) => transcribe::run(args, ui),
+        Verb::Align(args) => align::run(args, ui),
         Verb::Forget(args) => forget::run(args, ui),
         Verb::Train(args) => train::run(args, ui),
         Verb::Evaluate(args) => evaluate::run(args, ui),
@@ -112,9 +112,6 @@ fn run(cli: Cli, ui: &Ui) -> Result<Outcome> {
         Verb::Completions(args) => completions::run(&args, Cli::command(), ui),
         Verb::Man(args) => completions::run_man(&args, Cli::command(), ui),
         Verb::Demo(args) => args.fail("demo"),
-        Verb::Align(_) => {
-            bail!("`orator align` was replaced: run `orator transcribe AUDIO --text TRANSCRIPT --out FILE.json`")
-        }
     }
 }
 

@@ -21,7 +21,7 @@ const FLAGS: [(&str, &str, &str); 12] = [
 ];
 
 /// Renamed keys of the JSON output, as (verb, [(new key, old key)]).
-const KEYS: [(&str, &[(&str, &str)]); 17] = [
+const KEYS: [(&str, &[(&str, &str)]); 18] = [
     ("run", &[("up_to_date", "fresh"), ("accepted_secs", "kept_secs"), ("rejected_secs", "refused_secs")]),
     (
         "status",
@@ -53,6 +53,7 @@ const KEYS: [(&str, &[(&str, &str)]); 17] = [
             ("accepted_secs", "kept_secs"),
         ],
     ),
+    ("align", &[("unaligned", "unfit")]),
     (StageName::Lift.as_str(), &[("frames_per_sec", "frames_a_second")]),
     (
         "sheet",

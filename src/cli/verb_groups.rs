@@ -17,6 +17,7 @@ const GROUPS: [(&str, &[&str]); 5] = [
             StageName::Lift.as_str(),
             "import",
             "transcribe",
+            "align",
             "dataset",
             "forget",
             "plan",

@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 /// Modules of a crate that must not import each other.
 const SIBLINGS: [(&str, &[&str]); 2] = [
     ("src/pipeline", &["extract", "pose2d", "segment", "lift", "transcribe", "dataset"]),
-    ("src/media", &["ffmpeg", "opencv"]),
+    ("src/media", &["ffmpeg", "opencv", "aligner"]),
 ];
 
 /// Folders whose code is not part of the product.

@@ -74,6 +74,19 @@ pub fn readers(package: &str) -> Option<PathBuf> {
     is_installed.then_some(folder)
 }
 
+/// Folder of the Python package for word alignment, if `python3` can import it.
+#[track_caller]
+pub fn aligner() -> Option<PathBuf> {
+    let folder = folder("ORATOR_ALIGNER", "aligner");
+    let mut ask = Command::new("python3");
+    ask.args(["-c", "import pocketsphinx"]).env("PYTHONPATH", &folder).stderr(Stdio::null());
+    let is_installed = ask.status().is_ok_and(|status| status.success());
+    if !is_installed {
+        skip(&format!("no Python package pocketsphinx in {} (`make aligner`)", folder.display()));
+    }
+    is_installed.then_some(folder)
+}
+
 /// Command of a Python 3.11 that can import Blender's module.
 #[track_caller]
 pub fn blender() -> Option<Command> {

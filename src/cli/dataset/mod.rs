@@ -1,5 +1,6 @@
-//! Verbs for datasets: `dataset`, `import`, `forget`, `transcribe`.
+//! Verbs for datasets: `dataset`, `import`, `forget`, `transcribe`, `align`.
 
+pub mod align;
 mod aligned_text;
 pub mod forget;
 pub mod import;

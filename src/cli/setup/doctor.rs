@@ -3,12 +3,14 @@
 use super::words;
 use crate::cli::Outcome;
 use crate::cli::config_args::ConfigArgs;
+use crate::cli::dataset::align::default_python;
 use crate::cli::sandbox::this_program;
 use crate::cli::ui::Ui;
 use anyhow::Result;
 use orator_base::stage::workdir;
 use orator_dataset::config::{Config, Settings};
 use orator_formats::word_vectors::WordVectors;
+use orator_media::aligner::Aligner;
 use orator_onnx::{ModelStore, Runtime};
 use orator_pipeline::pose2d::models;
 use orator_pipeline::process::probe;
@@ -52,6 +54,7 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
             checks.extend(recogniser(&config.settings));
             checks.push(work(&config.settings.work.dir));
             checks.push(sandbox(config.settings.work.sandbox));
+            checks.push(aligner());
         }
         Err(error) => {
             checks.push(missing(
@@ -97,6 +100,18 @@ fn sandbox(is_enabled: bool) -> Check {
         Err(error) => (false, format!("not active: {error:#}")),
     };
     Check { is_full: is_active, ..ok("sandbox", found) }
+}
+
+/// The word aligner. Only `orator align` needs it, so nothing counts as missing without it.
+fn aligner() -> Check {
+    let python = default_python();
+    match Aligner::version(&python) {
+        Ok(version) => ok("word aligner (English)", format!("pocketsphinx {version} ({})", python.display())),
+        Err(error) => {
+            let found = format!("needed by `orator align` only: {error:#}");
+            Check { is_full: false, ..ok("word aligner (English)", found) }
+        }
+    }
 }
 
 /// ONNX Runtime, and the models that the configuration selects.

@@ -174,12 +174,3 @@ fn invalid_arguments_and_inputs_are_errors() {
     assert!(!recording.path("a.json").exists());
     recording.expect_no_scratch();
 }
-
-#[test]
-fn the_former_verb_names_its_replacement() {
-    let output =
-        Command::new(env!("CARGO_BIN_EXE_orator")).args(["align", "a.wav", "a.txt", "--out", "a.json"]).output();
-    let output = output.unwrap();
-    let errors = String::from_utf8_lossy(&output.stderr);
-    assert!(output.status.code() == Some(1) && errors.contains("orator transcribe AUDIO --text"), "{errors}");
-}

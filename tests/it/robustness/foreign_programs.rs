@@ -1,18 +1,21 @@
 //! Foreign programs (Python, npm, pip, cluster clients) run, load and read no files of the working directory.
 
+use crate::fixtures::clips::tone;
 use crate::fixtures::faults::shim::path_with;
 use crate::fixtures::source_models::packages::{package_models, script};
+use orator_formats::wav;
 use orator_test_support::project::Project;
 use orator_test_support::skip::skip;
 use std::ffi::OsString;
 use std::fs;
 use std::io::{Read as _, Write as _};
 use std::net::TcpListener;
+use std::os::unix::fs::symlink;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 use std::sync::{Arc, Mutex};
 
-const MODULES: [&str; 5] = ["os", "pip", "sitecustomize", "importlib/__init__", "encodings/__init__"];
+const MODULES: [&str; 6] = ["pocketsphinx", "os", "pip", "sitecustomize", "importlib/__init__", "encodings/__init__"];
 const PROGRAMS: [&str; 8] = ["python3", "npm", "node", "pip3", "scontrol", "sbatch", "kubectl", "ssh"];
 
 /// A working directory with planted modules and programs, each of which writes to the file `ran` when executed.
@@ -80,6 +83,11 @@ fn real_python() -> Option<String> {
 fn python_imports_no_module_from_the_working_directory() {
     let Some(python) = real_python() else { return };
     let planted = Planted::new();
+    for args in [&["doctor"][..], &["align", "a.wav", "a.txt", "--out", "a.words.json"]] {
+        let output = planted.command(args).env("ORATOR_PYTHON", "python3").output().unwrap();
+        expect_none_ran(planted.dir.path(), &output);
+    }
+
     // Without pip3, Python runs its pip module.
     let (models, bin) = (planted.path("models"), planted.path("bin"));
     [&models, &bin].into_iter().for_each(|folder| fs::create_dir(folder).unwrap());
@@ -91,6 +99,66 @@ fn python_imports_no_module_from_the_working_directory() {
     let output = command.env_remove("PIP_FIND_LINKS").output().unwrap();
     expect_none_ran(planted.dir.path(), &output);
     assert!(text_of(&output).contains("python3 -I -m pip failed"), "{}", text_of(&output));
+}
+
+#[test]
+fn python_of_an_environment_in_the_working_directory_has_its_packages() {
+    if real_python().is_none() {
+        return;
+    }
+    let dir = tempfile::tempdir().unwrap();
+    let mut make = Command::new("python3");
+    make.args(["-m", "venv", "--without-pip", "aligner"]).current_dir(dir.path());
+    assert!(make.status().unwrap().success(), "python3 -m venv");
+    let version = fs::read_dir(dir.path().join("aligner/lib")).unwrap().next().unwrap().unwrap().path();
+    let packages = version.join("site-packages");
+    fs::create_dir(packages.join("pocketsphinx-5.1.1.dist-info")).unwrap();
+    fs::write(packages.join("pocketsphinx.py"), "").unwrap();
+    let about = "Metadata-Version: 2.1\nName: pocketsphinx\nVersion: 5.1.1\n";
+    fs::write(packages.join("pocketsphinx-5.1.1.dist-info/METADATA"), about).unwrap();
+    plant(dir.path());
+    fs::remove_file(dir.path().join("python3")).unwrap();
+    let mut command = Command::new(env!("CARGO_BIN_EXE_orator"));
+    let output = command.arg("doctor").current_dir(dir.path()).env("ORATOR_PYTHON", "aligner/bin/python").output();
+    let output = output.unwrap();
+    assert!(text_of(&output).contains("pocketsphinx 5.1.1 (aligner/bin/python)"), "{}", text_of(&output));
+    expect_none_ran(dir.path(), &output);
+}
+
+/// A configured Python keeps its path with its links, and runs isolated in an empty folder that is removed afterwards.
+#[test]
+fn python_runs_in_an_empty_temporary_folder() {
+    let planted = Planted::new();
+    let log = planted.path("log");
+    for folder in ["real", "env", "temporary"] {
+        fs::create_dir(planted.path(folder)).unwrap();
+    }
+    // Prints a version, or for two words that neither is aligned.
+    let lines = format!(
+        "{{ echo \"$0 $1 $2\"; pwd; ls -A; }} >> '{}'\n\
+         case \"$3\" in *print\\(m.version*) echo 5.1.1;; *) echo; cat > /dev/null; echo -; echo -;; esac",
+        log.display()
+    );
+    script(&planted.path("real/python"), &lines);
+    symlink("../real/python", planted.path("env/python")).unwrap();
+    wav::write(&planted.path("a.wav"), &tone(16_000, 1.0, 200.0)).unwrap();
+    fs::write(planted.path("a.txt"), "good evening").unwrap();
+    let align: &[&str] = &["align", "a.wav", "a.txt", "--out", "a.words.json", "--python", "env/python"];
+    for (args, n_processes) in [(&["doctor"][..], 1), (align, 2)] {
+        let mut command = planted.command(args);
+        command.env("ORATOR_PYTHON", "./env/python").env("TMPDIR", planted.path("temporary"));
+        let output = command.output().unwrap();
+        expect_none_ran(planted.dir.path(), &output);
+        let text = fs::read_to_string(&log).unwrap_or_default();
+        let lines: Vec<&str> = text.lines().collect();
+        assert_eq!(lines.len(), 2 * n_processes, "the folder is not empty: {text}{}", text_of(&output));
+        for process in lines.chunks(2) {
+            assert_eq!(process[0], format!("{} -I -c", planted.path("env/python").display()));
+            assert!(Path::new(process[1]).starts_with(planted.path("temporary")), "{text}");
+        }
+        assert_eq!(fs::read_dir(planted.path("temporary")).unwrap().count(), 0, "{}", text_of(&output));
+        fs::remove_file(&log).unwrap();
+    }
 }
 
 /// A registry without packages that records its requests.
