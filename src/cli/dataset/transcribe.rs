@@ -28,7 +28,7 @@ use std::time::Instant;
 /// Maximum number of unaligned words that the summary lists.
 const SHOWN: usize = 8;
 
-/// Write the words of audio or video files and their times, by speech recognition.
+/// Write the words of audio or video files with their times.
 ///
 /// The network, Whisper, runs on this computer: `orator models fetch whisper-tiny-en` (English) or `whisper-base` (99
 /// languages) downloads it. The extension of --out selects the format: .json (segments and words as WhisperX writes
@@ -220,7 +220,7 @@ impl Transcriber<'_> {
     fn open(&self, input: &Path, out: &Path) -> Result<OpenedSound> {
         let scratch = workdir::attempt_folder(&out.with_extension("audio"))?;
         let open = || -> Result<OpenedSound> {
-            let path = scratch.join("audio.wav");
+            let path = scratch.join("sound.wav");
             sound::extract_wav(input, 0, &path, SAMPLE_RATE)?;
             ensure!(path.exists(), "{} has no audio", input.display());
             let speech = match SpeechDetector::find(self.settings)? {

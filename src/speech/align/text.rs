@@ -77,6 +77,7 @@ impl Recogniser {
                 .clamp(window.start + RATE / 2, window.end.max(window.start + RATE / 2));
             progress(from as f64 / RATE as f64);
         }
+        text.found.iter_mut().flatten().for_each(|word| self.correct_delay(word, n_samples));
         Ok(text.found)
     }
 

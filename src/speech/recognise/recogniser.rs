@@ -8,7 +8,7 @@ use crate::decode::rules::LogitRules;
 use crate::decode::window::WindowDecoder;
 use crate::mel::log_mel;
 use crate::network::{EncodedAudio, Whisper};
-use crate::recognised::{Recognised, RecognisedSegment};
+use crate::recognised::{Recognised, RecognisedSegment, RecognisedWord};
 use crate::spans::{HOP, RATE, SpeechSpans};
 use crate::tokenizer::Tokenizer;
 use anyhow::{Context as _, Result, bail, ensure};
@@ -122,8 +122,18 @@ impl Recogniser {
             from = next.max(window.start + HOP);
             progress(from as f64 / RATE as f64);
         }
+        let words = segments.iter_mut().flat_map(|segment| &mut segment.words);
+        words.for_each(|word| self.correct_delay(word, n_samples));
         let (language, language_probability) = request.map_or((String::new(), 0.0), |it| (it.language, it.probability));
         Ok(Recognised { language, language_probability, segments })
+    }
+
+    /// Removes the delay of the network from the times of a word in a sound of `n_samples`.
+    pub(crate) fn correct_delay(&self, word: &mut RecognisedWord, n_samples: usize) {
+        let (delay, end) = (self.network.config().delay_secs(), n_samples as f64 / RATE as f64);
+        // An end beyond that of the sound stays.
+        let on_sound = |secs: f64| (secs - delay).clamp(0.0, secs.max(end));
+        (word.start_secs, word.end_secs) = (on_sound(word.start_secs), on_sound(word.end_secs));
     }
 
     /// Decodes an encoded window with a beam search after the text `previous`. `last_secs` is the end of the speech before.
