@@ -1,11 +1,9 @@
 //! `orator transcribe --text` on speech synthesised by espeak-ng, with known word times, by the model whisper-tiny-en.
 //! `ORATOR_LONG=1` (`make prove`) aligns more than eight minutes of speech, otherwise half a minute.
 
+use crate::fixtures::media::spoken::{KnownWord, SynthesisedSpeech};
 use orator_formats::transcript::{Transcript, WordSource};
-use orator_test_support::skip::{fetched_model, skip};
-use serde_json::Value;
-use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+use std::process::Output;
 
 const SENTENCES: [&str; 14] = [
     "Good evening, everybody.",
@@ -28,57 +26,25 @@ const UNRELATED_TEXT: &str = "the committee met on tuesday to consider a proposa
     any support during winter the chairman replied that money was short and that every department had been told to \
     save a tenth of its budget";
 
-/// Synthesised speech: its words with their start and end times, where the synthesiser reports them.
-struct Speech {
-    dir: tempfile::TempDir,
-    models: PathBuf,
-    words: Vec<(String, Option<f64>, Option<f64>)>,
+/// Speaks `n_sentences`, ordered so that none is repeated within a minute.
+#[track_caller]
+fn synthesise(n_sentences: usize) -> Option<SynthesisedSpeech> {
+    let text: Vec<&str> = (0..n_sentences).map(|n| SENTENCES[(n * 5 + n / 14) % 14]).collect();
+    SynthesisedSpeech::new(&text.join(" "), "en-us+f2", "whisper-tiny-en")
 }
 
-impl Speech {
-    /// Synthesises `n_sentences`, ordered so that none is repeated within a minute.
-    #[track_caller]
-    fn synthesise(n_sentences: usize) -> Option<Self> {
-        let models = fetched_model("whisper-tiny-en/model.bin")?;
-        let dir = tempfile::tempdir().unwrap();
-        let text: Vec<&str> = (0..n_sentences).map(|n| SENTENCES[(n * 5 + n / 14) % 14]).collect();
-        let path = |name: &str| dir.path().join(name);
-        std::fs::write(path("speech.txt"), text.join(" ")).unwrap();
-        let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/reference/spoken_words.py");
-        let files = ["speech.txt", "speech.wav", "speech.json"].map(path);
-        let synthesis = Command::new("python3").arg(script).args(files).arg("en-us+f2").output().unwrap();
-        if !synthesis.status.success() {
-            skip(&format!("no voice of espeak-ng (`make setup`): {}", String::from_utf8_lossy(&synthesis.stderr)));
-            return None;
-        }
-        let known: Value = serde_json::from_slice(&std::fs::read(path("speech.json")).unwrap()).unwrap();
-        let words = known.as_array().unwrap().iter().map(|word| {
-            (word["word"].as_str().unwrap().to_owned(), word["start_secs"].as_f64(), word["end_secs"].as_f64())
-        });
-        let words = words.collect();
-        Some(Self { dir, models, words })
+/// Transcript that the program writes for `text` and this speech, or its error output.
+fn aligned(speech: &SynthesisedSpeech, file: &str, text: impl AsRef<[u8]>) -> Result<Transcript, String> {
+    std::fs::write(speech.path(file), text).unwrap();
+    let output = align(speech, "speech.wav", file, "out.words.json");
+    if !output.status.success() {
+        return Err(String::from_utf8_lossy(&output.stderr).into_owned());
     }
-
-    fn path(&self, name: &str) -> PathBuf {
-        self.dir.path().join(name)
-    }
-
-    /// Transcript that the program writes for `text` and this speech, or its error output.
-    fn aligned(&self, file: &str, text: impl AsRef<[u8]>) -> Result<Transcript, String> {
-        std::fs::write(self.path(file), text).unwrap();
-        let output = align(&self.models, &self.path("speech.wav"), &self.path(file), &self.path("out.words.json"));
-        if !output.status.success() {
-            return Err(String::from_utf8_lossy(&output.stderr).into_owned());
-        }
-        Ok(Transcript::read(&self.path("out.words.json")).unwrap())
-    }
+    Ok(Transcript::read(&speech.path("out.words.json")).unwrap())
 }
 
-fn align(models: &Path, audio: &Path, text: &Path, out: &Path) -> Output {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_orator"));
-    command.arg("transcribe").arg(audio).arg("--text").arg(text).arg("--out").arg(out).args(["--language", "en"]);
-    command.arg("--set").arg(format!("models.dir={}", models.display()));
-    command.current_dir(out.parent().unwrap()).output().unwrap()
+fn align(speech: &SynthesisedSpeech, sound: &str, text: &str, out: &str) -> Output {
+    speech.transcribe(sound, out).args(["--text", text, "--language", "en"]).output().unwrap()
 }
 
 /// Sorted absolute errors of the boundaries of aligned words, seconds; `known` is `None` for a mismatched word.
@@ -106,10 +72,11 @@ fn marked_share(found: &Transcript, is_selected: impl Fn(usize) -> bool) -> f64 
 #[test]
 fn words_of_plain_text_are_aligned_to_the_audio() {
     let n_sentences = if std::env::var("ORATOR_LONG").is_ok() { 140 } else { 8 };
-    let Some(speech) = Speech::synthesise(n_sentences) else { return };
-    let text: Vec<&str> = speech.words.iter().map(|word| word.0.as_str()).collect();
-    let found = speech.aligned("text.txt", text.join("\n")).unwrap();
-    let known: Vec<_> = speech.words.iter().map(|(_, start, end)| Some((*start, *end))).collect();
+    let Some(speech) = synthesise(n_sentences) else { return };
+    let text: Vec<&str> = speech.words.iter().map(|word| word.word.as_str()).collect();
+    let found = aligned(&speech, "text.txt", text.join("\n")).unwrap();
+    let times = |word: &KnownWord| (word.start_secs, word.end_secs);
+    let known: Vec<_> = speech.words.iter().map(|word| Some(times(word))).collect();
     let errors = boundary_errors(&found, &known);
     let (median, p95) = (errors[errors.len() / 2], errors[errors.len() * 95 / 100]);
     let mismatched = marked_share(&found, |_| true);
@@ -127,15 +94,17 @@ fn words_of_plain_text_are_aligned_to_the_audio() {
 
 #[test]
 fn mismatched_words_are_marked_and_do_not_shift_the_others() {
-    let Some(speech) = Speech::synthesise(8) else { return };
+    let Some(speech) = synthesise(8) else { return };
     let other: Vec<&str> = UNRELATED_TEXT.split_whitespace().collect();
     let words = &speech.words;
     let is_replaced = |n: usize| n % 25 >= 20 && n / 25 < 3;
     // One spoken sentence is missing in the text.
     let chosen: Vec<usize> = (0..words.len()).filter(|n| !(32..42).contains(n)).collect();
-    let text = chosen.iter().map(|&n| if is_replaced(n) { other[(5 * n) % other.len()] } else { words[n].0.as_str() });
-    let found = speech.aligned("text.txt", text.collect::<Vec<_>>().join(" ")).unwrap();
-    let known: Vec<_> = chosen.iter().map(|&n| (!is_replaced(n)).then_some((words[n].1, words[n].2))).collect();
+    let text =
+        chosen.iter().map(|&n| if is_replaced(n) { other[(5 * n) % other.len()] } else { words[n].word.as_str() });
+    let found = aligned(&speech, "text.txt", text.collect::<Vec<_>>().join(" ")).unwrap();
+    let known: Vec<_> =
+        chosen.iter().map(|&n| (!is_replaced(n)).then_some((words[n].start_secs, words[n].end_secs))).collect();
     let errors = boundary_errors(&found, &known);
     let far = errors.iter().filter(|error| **error > 0.2).count() as f64 / errors.len() as f64;
     let (mismatched, matching) =
@@ -145,27 +114,28 @@ fn mismatched_words_are_marked_and_do_not_shift_the_others() {
     );
     assert!(mismatched >= 0.7 && matching <= 0.15 && far <= 0.05, "{mismatched} {matching} {far}");
 
-    let error = speech.aligned("other.txt", UNRELATED_TEXT).unwrap_err();
+    let error = aligned(&speech, "other.txt", UNRELATED_TEXT).unwrap_err();
     assert!(error.contains("words match the") && error.contains("of audible speech"), "{error}");
 }
 
 #[test]
 fn unalignable_input_is_an_error_with_its_location() {
-    let Some(speech) = Speech::synthesise(1) else { return };
-    let error = |file: &str, text: &[u8]| speech.aligned(file, text).unwrap_err();
+    let Some(speech) = synthesise(1) else { return };
+    let error = |file: &str, text: &[u8]| aligned(&speech, file, text).unwrap_err();
     assert!(error("text.txt", b"so\nsch\xf6n").contains("line 2: byte 0xf6"));
     assert!(error("text.txt", b" \n").contains("contains no words"));
     assert!(error("text.txt", "\u{434}\u{430} \u{43d}\u{435}\u{442}".as_bytes()).contains("of audible speech"));
-    let out = speech.path("silent.words.json");
+    let (out, absent) = ("silent.words.json", speech.path("silent.words.json"));
     std::fs::write(speech.path("text.txt"), "Good evening").unwrap();
     // The WAV header of the speech, followed by silence.
     let mut silent = std::fs::read(speech.path("speech.wav")).unwrap();
     silent[44..].fill(0);
     std::fs::write(speech.path("silent.wav"), silent).unwrap();
-    let output = align(&speech.models, &speech.path("silent.wav"), &speech.path("text.txt"), &out);
+    let output = align(&speech, "silent.wav", "text.txt", out);
     assert!(
-        String::from_utf8_lossy(&output.stderr).contains("expected the transcript of audible speech") && !out.exists()
+        String::from_utf8_lossy(&output.stderr).contains("expected the transcript of audible speech")
+            && !absent.exists()
     );
-    let output = align(&speech.models, &speech.path("text.txt"), &speech.path("text.txt"), &out);
-    assert!(!output.status.success() && !out.exists());
+    let output = align(&speech, "text.txt", "text.txt", out);
+    assert!(!output.status.success() && !absent.exists());
 }

@@ -5,6 +5,7 @@ pub(crate) mod blender;
 pub(crate) mod dataset_readers;
 pub(crate) mod fbx;
 pub(crate) mod joint_structure;
+pub(crate) mod recognised_words;
 pub(crate) mod retargeted;
 pub(crate) mod training_readers;
 pub(crate) mod transcripts;
