@@ -4,6 +4,7 @@
 #![allow(clippy::duplicate_mod)]
 
 mod animate;
+mod base;
 /// The benchmark's own modules, so that its parts are tested without a release build.
 #[path = "../bench/mod.rs"]
 #[allow(dead_code)] // what only the benchmark calls
