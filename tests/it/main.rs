@@ -16,6 +16,7 @@ mod dataset;
 mod evaluate;
 mod fixtures;
 mod foreign;
+mod formats;
 mod fuzz;
 mod generate;
 mod keypoints;
