@@ -22,6 +22,7 @@ mod generate;
 mod keypoints;
 mod lift;
 mod media;
+mod nn;
 mod parity;
 mod pose2d;
 mod report;
