@@ -16,3 +16,4 @@ mod serve_load;
 mod server_killed;
 mod side_by_side;
 mod stats_golden;
+mod store;

@@ -7,6 +7,7 @@ pub(crate) mod gan;
 pub(crate) mod gan_program;
 mod gan_words;
 pub(crate) mod interrupted;
+pub(crate) mod losses;
 pub(crate) mod networks;
 pub(crate) mod operators;
 pub(crate) mod reading;
