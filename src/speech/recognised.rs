@@ -32,10 +32,3 @@ pub struct RecognisedWord {
     /// Mean probability of its tokens, 0..1.
     pub probability: f32,
 }
-
-impl RecognisedWord {
-    /// Length in seconds.
-    pub(crate) fn secs(&self) -> f64 {
-        self.end_secs - self.start_secs
-    }
-}

@@ -4,4 +4,5 @@ mod matching;
 mod text;
 pub(crate) mod token_times;
 mod warping;
+pub(crate) mod word_bounds;
 pub(crate) mod words;

@@ -3,8 +3,7 @@
 
 use super::matching::{match_units, units_of};
 use super::words::{WITHOUT_SPACES, words_of};
-use crate::network::EncodedAudio;
-use crate::recognise::{Recogniser, Request, SampleSource};
+use crate::recognise::{EncodedWindow, Recogniser, Request, SampleSource};
 use crate::recognised::RecognisedWord;
 use crate::spans::{RATE, SpeechSpans};
 use anyhow::Result;
@@ -55,63 +54,54 @@ impl Recogniser {
         let mut text = TextWords { words, within, found: vec![None; words.len()], next: 0 };
         let (mut from, mut matched_secs) = (0, 0.0);
         while let Some(window) = spans.window(from).filter(|_| text.next < words.len()) {
-            let audio = self.encode(source, &window, &spans)?;
+            let window = self.encode(source, window, &spans)?;
             let request = match &mut request {
                 Some(request) => request,
-                none => none.insert(self.detect_language(&audio)?),
+                none => none.insert(self.detect_language(&window.audio)?),
             };
-            let heard = self.transcribe(&audio, &window, request, (1, &[]), matched_secs)?;
-            let [start_secs, end_secs] = [window.start, window.end].map(|at| at as f64 / RATE as f64);
+            let heard = self.transcribe(&window, request, 1, &[])?;
+            let [start_secs, end_secs] = window.secs();
             let recognised: Vec<RecognisedWord> =
                 heard.segments.into_iter().flat_map(|(segment, _)| segment.words).collect();
             let n_words = MAX_WORDS + (MAX_RATE * (start_secs - matched_secs).max(0.0)) as usize;
             let candidates = text.candidates(start_secs, end_secs, n_words);
-            let spoken = text.place(candidates, &recognised, &request.language, window.end == n_samples);
-            self.force(&audio, request, &mut text, spoken, &window)?;
+            let spoken = text.place(candidates, &recognised, &request.language, window.range.end == n_samples);
+            self.force(&window, request, &mut text, &spoken)?;
             let last = text.found[..text.next].iter().flatten().last().map_or(0.0, |word| word.end_secs);
             let is_matched = last > start_secs;
             let next_secs =
                 if is_matched { last.max(heard.next_secs.min(end_secs - TAIL_SECS)) } else { heard.next_secs };
             matched_secs = matched_secs.max(last);
-            from = ((next_secs * RATE as f64) as usize)
-                .clamp(window.start + RATE / 2, window.end.max(window.start + RATE / 2));
+            let earliest = window.range.start + RATE / 2;
+            from = ((next_secs * RATE as f64) as usize).clamp(earliest, window.range.end.max(earliest));
             progress(from as f64 / RATE as f64);
         }
-        text.found.iter_mut().flatten().for_each(|word| self.correct_delay(word, n_samples));
         Ok(text.found)
     }
 
     /// Times of the words in `spoken` without times, by the times of the tokens of all of these words.
-    fn force(
-        &self,
-        audio: &EncodedAudio,
-        request: &Request,
-        text: &mut TextWords,
-        spoken: Vec<usize>,
-        window: &Range<usize>,
-    ) -> Result<()> {
+    fn force(&self, window: &EncodedWindow, request: &Request, text: &mut TextWords, spoken: &[usize]) -> Result<()> {
         if spoken.iter().all(|&word| text.found[word].is_some()) {
             return Ok(());
         }
         let space = if WITHOUT_SPACES.contains(&request.language.as_str()) { "" } else { " " };
         let encode = |word: &usize| self.tokenizer.encode(&format!("{space}{}", text.words[*word]));
         let tokens: Vec<Vec<u32>> = spoken.iter().map(encode).collect();
-        let times = self.token_times(audio, request, &tokens.concat(), window.len())?;
-        let (start_secs, end_secs) = (window.start as f64 / RATE as f64, window.end as f64 / RATE as f64);
+        let times = self.token_times(window, request, &tokens.concat())?;
+        let [start_secs, end_secs] = window.secs();
         let (mut first, mut earliest) = (0, start_secs);
         for (nth, (&word, tokens)) in spoken.iter().zip(&tokens).enumerate() {
-            let parts = words_of(&self.tokenizer, &request.language, tokens, &times, first);
+            let mut parts = words_of(&self.tokenizer, &request.language, tokens, &times, first);
+            parts.iter_mut().for_each(|part| window.correct(part));
+            let probability = times.mean_probability(first..first + tokens.len());
             first += tokens.len();
-            if text.found[word].is_none() {
+            if let (None, Some(from), Some(to)) = (&text.found[word], parts.first(), parts.last()) {
                 let later = spoken[nth..].iter().find_map(|&word| text.found[word].as_ref());
-                let latest = later.map_or(end_secs, |word| word.start_secs);
-                let [from, to] = [parts.first().map(|part| part.start_secs), parts.last().map(|part| part.end_secs)]
-                    .map(|secs| (start_secs + secs.unwrap_or(0.0)).clamp(earliest, latest.max(earliest)));
-                let probability = times.mean_probability(first - tokens.len()..first);
-                if probability >= MIN_PROBABILITY && to - from >= MIN_SECS {
+                let latest = later.map_or(end_secs, |word| word.start_secs).max(earliest);
+                let [start_secs, end_secs] = [from.start_secs, to.end_secs].map(|secs| secs.clamp(earliest, latest));
+                if probability >= MIN_PROBABILITY && end_secs - start_secs >= MIN_SECS {
                     let word_text = text.words[word].clone();
-                    text.found[word] =
-                        Some(RecognisedWord { word: word_text, start_secs: from, end_secs: to, probability });
+                    text.found[word] = Some(RecognisedWord { word: word_text, start_secs, end_secs, probability });
                 }
             }
             earliest = text.found[word].as_ref().map_or(earliest, |word| word.end_secs.max(earliest));

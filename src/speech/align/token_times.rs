@@ -1,9 +1,10 @@
-//! Times of tokens from the attention of the alignment heads, as in OpenAI's program: softmax over the frames of the
-//! window, standardisation over the tokens, median filter, mean of the heads, dynamic time warping.
+//! Times of tokens from the attention of the alignment heads: softmax over the frames of the window, median filter, mean
+//! of the heads, dynamic time warping. OpenAI's program also standardises the attention over the tokens; without that,
+//! 95 % of the boundaries of synthetic speech are off by at most 123 ms instead of 150 ms (tiny.en, delay removed).
 
 use super::warping::first_frames;
 use crate::network::TokenAttention;
-use ndarray::{Array2, ArrayView2, Axis, s};
+use ndarray::{Array2, ArrayView2, s};
 
 /// Seconds of an encoded frame.
 pub(crate) const FRAME_SECS: f64 = 0.02;
@@ -29,23 +30,11 @@ impl TokenTimes {
         let rows = n_prompt.saturating_sub(1)..(n_prompt + text.len()).min(n_tokens);
         let mut fit = Array2::<f32>::zeros((rows.len(), n_frames));
         for head in attention.weights.outer_iter() {
-            let mut weights = head.slice(s![.., ..n_frames]).to_owned();
-            for mut row in weights.outer_iter_mut() {
+            for (mut fit, row) in fit.outer_iter_mut().zip(head.slice(s![rows.clone(), ..n_frames]).outer_iter()) {
                 let top = row.iter().copied().fold(f32::NEG_INFINITY, f32::max);
-                row.mapv_inplace(|weight| (weight - top).exp());
-                let sum = row.sum();
-                row.mapv_inplace(|weight| weight / sum);
-            }
-            for mut column in weights.axis_iter_mut(Axis(1)) {
-                let n = n_tokens as f32;
-                let mean = column.sum() / n;
-                let variance = column.iter().map(|weight| (weight - mean) * (weight - mean)).sum::<f32>() / n;
-                let scale = variance.sqrt().max(f32::MIN_POSITIVE);
-                column.mapv_inplace(|weight| (weight - mean) / scale);
-            }
-            for (mut fit, row) in fit.outer_iter_mut().zip(weights.slice(s![rows.clone(), ..]).outer_iter()) {
-                let filtered = median_filter(&row.to_vec());
-                fit.iter_mut().zip(filtered).for_each(|(fit, weight)| *fit += weight / n_heads as f32);
+                let weights: Vec<f32> = row.iter().map(|score| (score - top).exp()).collect();
+                let scale = weights.iter().sum::<f32>() * n_heads as f32;
+                fit.iter_mut().zip(median_filter(&weights)).for_each(|(fit, weight)| *fit += weight / scale);
             }
         }
         let frames = first_frames(fit.mapv(|fit| -fit).view());

@@ -1,8 +1,9 @@
 //! Recognition window by window: each starts where the recognised text of the last one ends.
 
 use super::segments::{WindowText, split_at_timestamps};
-use crate::align::token_times::{FRAME_SECS, TokenTimes};
-use crate::align::words::{shorten_long_words, words_of};
+use crate::align::token_times::TokenTimes;
+use crate::align::word_bounds::WordBounds;
+use crate::align::words::words_of;
 use crate::decode::language;
 use crate::decode::rules::LogitRules;
 use crate::decode::window::WindowDecoder;
@@ -50,6 +51,28 @@ pub(crate) struct Request {
     pub(crate) language: String,
     pub(crate) probability: f32,
     pub(crate) tokens: Vec<u32>,
+}
+
+/// A window of the sound as the network reads it.
+pub(crate) struct EncodedWindow {
+    /// Samples of the window.
+    pub(crate) range: Range<usize>,
+    pub(crate) audio: EncodedAudio,
+    bounds: WordBounds,
+}
+
+impl EncodedWindow {
+    /// Start and end in seconds of the sound.
+    pub(crate) fn secs(&self) -> [f64; 2] {
+        [self.range.start, self.range.end].map(|at| at as f64 / RATE as f64)
+    }
+
+    /// Corrects the times of a word, in seconds of the window, and converts them to those of the sound.
+    pub(crate) fn correct(&self, word: &mut RecognisedWord) {
+        self.bounds.correct(word);
+        let [start_secs, _] = self.secs();
+        (word.start_secs, word.end_secs) = (start_secs + word.start_secs, start_secs + word.end_secs);
+    }
 }
 
 /// Text of a window.
@@ -101,13 +124,12 @@ impl Recogniser {
         let (mut segments, mut previous): (Vec<RecognisedSegment>, Vec<u32>) = (Vec::new(), Vec::new());
         let mut from = 0;
         while let Some(window) = spans.window(from) {
-            let audio = self.encode(source, &window, &spans)?;
+            let window = self.encode(source, window, &spans)?;
             let request = match &mut request {
                 Some(request) => request,
-                none => none.insert(self.detect_language(&audio)?),
+                none => none.insert(self.detect_language(&window.audio)?),
             };
-            let last_secs = segments.last().map_or(0.0, |segment| segment.end_secs);
-            let heard = self.transcribe(&audio, &window, request, (options.beam, &previous), last_secs)?;
+            let heard = self.transcribe(&window, request, options.beam, &previous)?;
             for (segment, tokens) in heard.segments {
                 if spans.overlap(segment.start_secs, segment.end_secs) {
                     segments.push(segment);
@@ -118,32 +140,21 @@ impl Recogniser {
                 previous.clear();
             }
             previous.drain(..previous.len().saturating_sub(self.network.config().max_tokens));
-            let next = ((heard.next_secs * RATE as f64) as usize / HOP * HOP).min(window.end);
-            from = next.max(window.start + HOP);
+            let next = ((heard.next_secs * RATE as f64) as usize / HOP * HOP).min(window.range.end);
+            from = next.max(window.range.start + HOP);
             progress(from as f64 / RATE as f64);
         }
-        let words = segments.iter_mut().flat_map(|segment| &mut segment.words);
-        words.for_each(|word| self.correct_delay(word, n_samples));
         let (language, language_probability) = request.map_or((String::new(), 0.0), |it| (it.language, it.probability));
         Ok(Recognised { language, language_probability, segments })
     }
 
-    /// Removes the delay of the network from the times of a word in a sound of `n_samples`.
-    pub(crate) fn correct_delay(&self, word: &mut RecognisedWord, n_samples: usize) {
-        let (delay, end) = (self.network.config().delay_secs(), n_samples as f64 / RATE as f64);
-        // An end beyond that of the sound stays.
-        let on_sound = |secs: f64| (secs - delay).clamp(0.0, secs.max(end));
-        (word.start_secs, word.end_secs) = (on_sound(word.start_secs), on_sound(word.end_secs));
-    }
-
-    /// Decodes an encoded window with a beam search after the text `previous`. `last_secs` is the end of the speech before.
+    /// Decodes a window with a beam search after the text `previous`.
     pub(crate) fn transcribe(
         &self,
-        audio: &EncodedAudio,
-        window: &Range<usize>,
+        window: &EncodedWindow,
         request: &Request,
-        (beam, previous): (usize, &[u32]),
-        last_secs: f64,
+        beam: usize,
+        previous: &[u32],
     ) -> Result<HeardWindow> {
         let decoder = WindowDecoder {
             tokenizer: &self.tokenizer,
@@ -152,9 +163,9 @@ impl Recogniser {
             max_tokens: self.network.config().max_tokens,
             beam: beam.max(1),
         };
-        let decoded = decoder.decode(|| self.network.decoder(audio), previous, window.start as u64)?;
+        let decoded = decoder.decode(|| self.network.decoder(&window.audio), previous, window.range.start as u64)?;
         let temperature = decoded.temperature;
-        let [start_secs, end_secs] = [window.start, window.end].map(|at| at as f64 / RATE as f64);
+        let [start_secs, end_secs] = window.secs();
         if decoded.is_silence() || decoded.is_repetitive() {
             return Ok(HeardWindow { segments: Vec::new(), next_secs: end_secs, temperature });
         }
@@ -163,64 +174,54 @@ impl Recogniser {
         let is_text = |token: &u32| *token < self.tokenizer.eot();
         let tokens: Vec<Vec<u32>> =
             phrases.iter().map(|phrase| phrase.tokens.iter().copied().filter(is_text).collect()).collect();
-        let times = self.token_times(audio, request, &tokens.concat(), window.len())?;
-        let (mut segments, mut first) = (Vec::new(), 0);
-        for (phrase, tokens) in phrases.iter().zip(&tokens) {
+        let times = self.token_times(window, request, &tokens.concat())?;
+        let (mut segments, mut first, mut last_secs) = (Vec::new(), 0, 0.0);
+        for (phrase, tokens) in phrases.into_iter().zip(&tokens) {
             let mut words = words_of(&self.tokenizer, &request.language, tokens, &times, first);
             first += tokens.len();
-            for word in &mut words {
-                word.start_secs += start_secs;
-                word.end_secs += start_secs;
+            last_secs = words.last().map_or(last_secs, |word| word.end_secs);
+            words.iter_mut().for_each(|word| window.correct(word));
+            if let (Some(from), Some(to)) = (words.first(), words.last())
+                && phrase.start_secs < phrase.end_secs
+            {
+                let (start_secs, end_secs) = (from.start_secs, to.end_secs);
+                let text = self.tokenizer.decode(tokens).trim().to_owned();
+                segments.push((RecognisedSegment { start_secs, end_secs, text, words }, phrase.tokens));
             }
-            segments.push(RecognisedSegment {
-                start_secs: start_secs + phrase.start_secs,
-                end_secs: start_secs + phrase.end_secs,
-                text: self.tokenizer.decode(tokens).trim().to_owned(),
-                words,
-            });
         }
-        shorten_long_words(&mut segments, last_secs);
-        let last_word = segments.iter().rev().find_map(|segment| segment.words.last());
-        let next = last_word.map(|word| word.end_secs).filter(|&secs| !is_complete && secs > start_secs);
-        let found = segments.into_iter().zip(phrases);
-        let found = found.filter(|(segment, phrase)| !segment.words.is_empty() && phrase.start_secs < phrase.end_secs);
-        let segments = found.map(|(segment, phrase)| (segment, phrase.tokens)).collect();
-        Ok(HeardWindow { segments, next_secs: next.unwrap_or(start_secs + next_secs), temperature })
+        // The end of the last word before its correction, which must not be recognised again.
+        let next_secs = if is_complete || last_secs <= 0.0 { next_secs } else { last_secs };
+        Ok(HeardWindow { segments, next_secs: start_secs + next_secs, temperature })
     }
 
     /// Encodes a window; `spans` silence the rest.
     pub(crate) fn encode(
         &self,
         source: &mut SampleSource,
-        window: &Range<usize>,
+        range: Range<usize>,
         spans: &SpeechSpans,
-    ) -> Result<EncodedAudio> {
-        let mut samples = source(window.clone())?;
-        samples.resize(window.len(), 0.0);
-        spans.silence(&mut samples, window.start);
+    ) -> Result<EncodedWindow> {
+        let mut samples = source(range.clone())?;
+        samples.resize(range.len(), 0.0);
+        spans.silence(&mut samples, range.start);
         let mut mel = log_mel(&samples);
         // Frames after the end are no silence, but the mean of the scale, as in training.
-        let n_frames = (window.len() / HOP).min(mel.ncols());
+        let n_frames = (range.len() / HOP).min(mel.ncols());
         mel.slice_mut(s![.., n_frames..]).fill(0.0);
-        self.network.encode(mel.view())
+        let bounds = WordBounds::new(mel.slice(s![.., ..n_frames]), self.network.config().delay_secs());
+        Ok(EncodedWindow { range, audio: self.network.encode(mel.view())?, bounds })
     }
 
-    /// Times of text tokens in an encoded window of `n_samples`.
-    pub(crate) fn token_times(
-        &self,
-        audio: &EncodedAudio,
-        request: &Request,
-        text: &[u32],
-        n_samples: usize,
-    ) -> Result<TokenTimes> {
+    /// Times of text tokens in a window.
+    pub(crate) fn token_times(&self, window: &EncodedWindow, request: &Request, text: &[u32]) -> Result<TokenTimes> {
         let mut tokens = request.tokens.clone();
         tokens.push(self.tokenizer.no_timestamps());
         let n_prompt = tokens.len();
         let n_text = text.len().min(self.network.config().max_tokens - n_prompt - 1);
         tokens.extend(&text[..n_text]);
         tokens.push(self.tokenizer.eot());
-        let attention = self.network.token_attention(audio, &tokens)?;
-        let n_frames = (n_samples as f64 / RATE as f64 / FRAME_SECS) as usize;
+        let attention = self.network.token_attention(&window.audio, &tokens)?;
+        let n_frames = window.range.len() / (2 * HOP);
         Ok(TokenTimes::new(&attention, n_prompt, &text[..n_text], n_frames, self.tokenizer.eot()))
     }
 
