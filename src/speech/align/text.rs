@@ -4,7 +4,7 @@
 use super::matching::{match_units, units_of};
 use super::words::{WITHOUT_SPACES, words_of};
 use crate::network::EncodedAudio;
-use crate::recognise::{Recogniser, Request, SampleSource};
+use crate::recognise::{Recogniser, RecognitionRequest, SampleSource};
 use crate::recognised::RecognisedWord;
 use crate::spans::{RATE, SpeechSpans};
 use anyhow::Result;
@@ -85,7 +85,7 @@ impl Recogniser {
     fn force(
         &self,
         audio: &EncodedAudio,
-        request: &Request,
+        request: &RecognitionRequest,
         text: &mut TextWords,
         spoken: Vec<usize>,
         window: &Range<usize>,

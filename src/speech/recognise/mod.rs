@@ -3,5 +3,5 @@
 mod recogniser;
 mod segments;
 
-pub(crate) use recogniser::Request;
+pub(crate) use recogniser::RecognitionRequest;
 pub use recogniser::{Recogniser, RecogniserOptions, SampleSource};
