@@ -9,7 +9,7 @@ use orator_speech::RecognisedWord;
 use std::path::Path;
 
 /// Minimum share of words that must be aligned; with fewer, the text probably belongs to another sound.
-const MIN_ALIGNED: f64 = 0.25;
+const MIN_ALIGNED: f64 = 0.5;
 
 /// Words of a text, in order.
 pub(super) struct AlignedText {
@@ -60,7 +60,7 @@ impl AlignedText {
         let n_words = counted.count();
         let n_aligned = n_words - unaligned.len();
         ensure!(
-            n_aligned as f64 >= MIN_ALIGNED * n_words as f64,
+            n_aligned as f64 > MIN_ALIGNED * n_words as f64,
             "only {n_aligned} of {n_words} words match the {} of audio: expected the transcript of audible speech, in the \
              language of --language and of the model",
             length(secs)

@@ -3,7 +3,7 @@
 
 use super::matching::{match_units, units_of};
 use super::words::{WITHOUT_SPACES, words_of};
-use crate::recognise::{EncodedWindow, Recogniser, Request, SampleSource};
+use crate::recognise::{EncodedWindow, Recogniser, RecognitionRequest, SampleSource};
 use crate::recognised::RecognisedWord;
 use crate::spans::{RATE, SpeechSpans};
 use anyhow::Result;
@@ -80,7 +80,13 @@ impl Recogniser {
     }
 
     /// Times of the words in `spoken` without times, by the times of the tokens of all of these words.
-    fn force(&self, window: &EncodedWindow, request: &Request, text: &mut TextWords, spoken: &[usize]) -> Result<()> {
+    fn force(
+        &self,
+        window: &EncodedWindow,
+        request: &RecognitionRequest,
+        text: &mut TextWords,
+        spoken: &[usize],
+    ) -> Result<()> {
         if spoken.iter().all(|&word| text.found[word].is_some()) {
             return Ok(());
         }

@@ -86,7 +86,8 @@ impl WhisperConfig {
         ensure!(n_mels == N_MELS, "the network has {n_mels} mel bands; supported are networks with {N_MELS}");
         ensure!(
             (1..=width).contains(&n_heads) && encoder_heads == n_heads && width.is_multiple_of(n_heads * COLUMNS),
-            "{n_heads} heads do not fit a network of width {width}: expected heads of a multiple of {COLUMNS} values"
+            "{}: {n_heads} heads do not fit a network of width {width}: expected heads of a multiple of {COLUMNS} values",
+            if is_ctranslate2 { "model.bin" } else { "config.json" }
         );
         let n_layers =
             |part: &str| (0..).take_while(|i| weights.has(&format!("{part}/layer_{i}/ffn/linear_0/weight"))).count();

@@ -3,5 +3,5 @@
 mod recogniser;
 mod segments;
 
-pub(crate) use recogniser::{EncodedWindow, Request};
+pub(crate) use recogniser::{EncodedWindow, RecognitionRequest};
 pub use recogniser::{Recogniser, RecogniserOptions, SampleSource};

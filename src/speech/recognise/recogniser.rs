@@ -47,7 +47,7 @@ impl Default for RecogniserOptions {
 }
 
 /// Language of a sound, and the tokens that request text in it.
-pub(crate) struct Request {
+pub(crate) struct RecognitionRequest {
     pub(crate) language: String,
     pub(crate) probability: f32,
     pub(crate) tokens: Vec<u32>,
@@ -152,7 +152,7 @@ impl Recogniser {
     pub(crate) fn transcribe(
         &self,
         window: &EncodedWindow,
-        request: &Request,
+        request: &RecognitionRequest,
         beam: usize,
         previous: &[u32],
     ) -> Result<HeardWindow> {
@@ -213,7 +213,12 @@ impl Recogniser {
     }
 
     /// Times of text tokens in a window.
-    pub(crate) fn token_times(&self, window: &EncodedWindow, request: &Request, text: &[u32]) -> Result<TokenTimes> {
+    pub(crate) fn token_times(
+        &self,
+        window: &EncodedWindow,
+        request: &RecognitionRequest,
+        text: &[u32],
+    ) -> Result<TokenTimes> {
         let mut tokens = request.tokens.clone();
         tokens.push(self.tokenizer.no_timestamps());
         let n_prompt = tokens.len();
@@ -226,7 +231,7 @@ impl Recogniser {
     }
 
     /// The request for text in a language.
-    pub(crate) fn request(&self, code: &str) -> Result<Request> {
+    pub(crate) fn request(&self, code: &str) -> Result<RecognitionRequest> {
         let is_multilingual = self.network.config().is_multilingual;
         let Some(token) = self.tokenizer.language(code).filter(|_| is_multilingual || code == "en") else {
             let known = if is_multilingual { "a code such as `en` or `de`" } else { "`en`, the only one" };
@@ -234,15 +239,15 @@ impl Recogniser {
         };
         let request = [self.tokenizer.sot(), token, self.tokenizer.transcribe()];
         let tokens = request[..if is_multilingual { 3 } else { 1 }].to_vec();
-        Ok(Request { language: code.to_owned(), probability: 1.0, tokens })
+        Ok(RecognitionRequest { language: code.to_owned(), probability: 1.0, tokens })
     }
 
-    pub(crate) fn detect_language(&self, audio: &EncodedAudio) -> Result<Request> {
+    pub(crate) fn detect_language(&self, audio: &EncodedAudio) -> Result<RecognitionRequest> {
         if !self.network.config().is_multilingual {
             return self.request("en");
         }
         let (token, probability) = language::detect(&mut self.network.decoder(audio), &self.tokenizer)?;
         let request = self.request(&self.tokenizer.language_code(token)).context("language detection")?;
-        Ok(Request { probability, ..request })
+        Ok(RecognitionRequest { probability, ..request })
     }
 }

@@ -92,7 +92,7 @@ fn speech_at_8_khz_is_recognised() {
     let mut narrow = WordComparison::default();
     narrow.add(&speech.words, &recognised(&speech, "narrow.wav", &["--language", "en"]));
     narrow.print("8 kHz");
-    assert!(narrow.error_rate() <= 0.3, "{}", narrow.error_rate());
+    assert!(narrow.error_rate() <= 0.35, "{}", narrow.error_rate());
 }
 
 #[test]
