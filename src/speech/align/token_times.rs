@@ -1,6 +1,6 @@
 //! Times of tokens from the attention of the alignment heads: softmax over the frames of the window, median filter, mean
-//! of the heads, dynamic time warping. OpenAI's program also standardises the attention over the tokens; without that,
-//! 95 % of the boundaries of synthetic speech are off by at most 123 ms instead of 150 ms (tiny.en, delay removed).
+//! of the heads, dynamic time warping. OpenAI's program also standardises the attention over the tokens, which makes 95 %
+//! of the boundaries of synthetic speech uncertain by 150 ms instead of 123 ms (tiny.en, after removal of the delay).
 
 use super::warping::first_frames;
 use crate::network::TokenAttention;

@@ -2,55 +2,41 @@
 
 use ndarray::{Array2, ArrayView2};
 
-/// The path of the least total cost from the first token and frame to the last ones, in steps of one token, one frame
-/// or both, through `cost` [tokens, frames]: the first frame of each token. Of equal paths, the later tokens are longer.
+/// Minimum length of a token, frames, if the sound is long enough for twice that.
+const MIN_FRAMES: usize = 3;
+
+/// Divides the frames between the tokens, in order, so that the total of `cost` [tokens, frames] is least: the first
+/// frame of each token. Tokens are spread evenly if there are fewer frames.
 pub(crate) fn first_frames(cost: ArrayView2<f32>) -> Vec<usize> {
     let (n_tokens, n_frames) = cost.dim();
-    if n_tokens == 0 || n_frames == 0 {
-        return vec![0; n_tokens];
+    if n_frames < n_tokens || n_tokens == 0 {
+        return (0..n_tokens).map(|token| token * n_frames / n_tokens).collect();
     }
-    // Totals up to each frame, of the token before and of this one; the first column precedes all frames.
-    let mut before = vec![f32::INFINITY; n_frames + 1];
-    before[0] = 0.0;
-    let mut totals = before.clone();
-    let mut steps = Array2::from_elem((n_tokens, n_frames), Step::Frame);
-    for (token, costs) in cost.outer_iter().enumerate() {
-        totals[0] = f32::INFINITY;
-        for (frame, &cost) in costs.iter().enumerate() {
-            let [both, next_token, next_frame] = [before[frame], before[frame + 1], totals[frame]];
-            let (least, step) = if both < next_token && both < next_frame {
-                (both, Step::Both)
-            } else if next_token < both && next_token < next_frame {
-                (next_token, Step::Token)
-            } else {
-                (next_frame, Step::Frame)
-            };
-            totals[frame + 1] = least + cost;
-            steps[(token, frame)] = step;
-        }
-        std::mem::swap(&mut before, &mut totals);
-    }
-    let mut first = vec![0; n_tokens];
-    let (mut token, mut frame) = (n_tokens - 1, n_frames - 1);
-    loop {
-        first[token] = frame;
-        match steps[(token, frame)] {
-            _ if token == 0 => break,
-            Step::Both if frame > 0 => (token, frame) = (token - 1, frame - 1),
-            Step::Frame if frame > 0 => frame -= 1,
-            _ => token -= 1,
+    // Each token is a chain of states that each last a frame or longer.
+    let n_states = (n_frames / (2 * n_tokens)).clamp(1, MIN_FRAMES);
+    let mut totals = vec![f32::INFINITY; n_tokens * n_states];
+    totals[0] = 0.0;
+    let mut is_next = Array2::from_elem((n_frames, totals.len()), false);
+    for (frame, costs) in cost.columns().into_iter().enumerate() {
+        for state in (0..totals.len()).rev() {
+            if frame > 0 && state > 0 && totals[state - 1] < totals[state] {
+                totals[state] = totals[state - 1];
+                is_next[(frame, state)] = true;
+            }
+            totals[state] += costs[state / n_states];
         }
     }
-    first[0] = 0;
+    let (mut first, mut state) = (vec![0; n_tokens], totals.len() - 1);
+    for frame in (1..n_frames).rev() {
+        // Costs that are no numbers leave the path; it must still reach the first state.
+        if state > 0 && (is_next[(frame, state)] || state == frame) {
+            if state % n_states == 0 {
+                first[state / n_states] = frame;
+            }
+            state -= 1;
+        }
+    }
     first
-}
-
-/// Last step of the best path to a token and frame.
-#[derive(Clone, Copy)]
-enum Step {
-    Token,
-    Frame,
-    Both,
 }
 
 #[cfg(test)]
@@ -59,45 +45,42 @@ mod tests {
     use rand::{Rng as _, SeedableRng as _};
     use rand_chacha::ChaCha8Rng;
 
-    /// Least cost of all paths from a cell to the last one.
-    fn least(cost: &Array2<f32>, token: usize, frame: usize) -> f32 {
-        let Some(&here) = cost.get((token, frame)) else { return f32::INFINITY };
-        if (token + 1, frame + 1) == cost.dim() {
-            return here;
+    /// Least cost of the tokens from `token` on, each of at least `min` frames, in the frames from `from` on.
+    fn least(cost: &Array2<f32>, token: usize, from: usize, min: usize) -> f32 {
+        let sum = |until: usize| cost.row(token).iter().take(until).skip(from).sum::<f32>();
+        let n_frames = cost.ncols();
+        if token + 1 == cost.nrows() {
+            return if from + min <= n_frames { sum(n_frames) } else { f32::INFINITY };
         }
-        let onward = [(1, 0), (0, 1), (1, 1)].map(|(tokens, frames)| least(cost, token + tokens, frame + frames));
-        here + onward.into_iter().fold(f32::INFINITY, f32::min)
+        let totals = (from + min..n_frames).map(|until| sum(until) + least(cost, token + 1, until, min));
+        totals.fold(f32::INFINITY, f32::min)
     }
 
     #[test]
-    fn path_is_the_best_of_all_paths() {
+    fn division_is_the_best_of_all_divisions() {
         let mut rng = ChaCha8Rng::seed_from_u64(5);
-        for (n_tokens, n_frames) in [(1, 1), (1, 6), (4, 1), (3, 5), (5, 5), (6, 3), (4, 8)] {
+        for (n_tokens, n_frames, min) in [(1, 1, 1), (1, 6, 3), (3, 5, 1), (5, 5, 1), (4, 8, 1), (2, 9, 2), (3, 20, 3)]
+        {
             for _ in 0..20 {
                 let cost = Array2::from_shape_fn((n_tokens, n_frames), |_| rng.random::<f32>() - 0.5);
                 let first = first_frames(cost.view());
-                assert!(first.is_sorted() && first[0] == 0 && first[n_tokens - 1] < n_frames);
-                // The cheapest path whose tokens start in these frames ends each token in the next one's first frame
-                // or before it.
-                let mut total = 0.0;
-                for token in 0..n_tokens {
-                    let until = first.get(token + 1).copied().unwrap_or(n_frames - 1);
-                    let sum = |until: usize| (first[token]..=until).map(|frame| cost[(token, frame)]).sum::<f32>();
-                    let is_last = token + 1 == n_tokens;
-                    let short = if is_last || until == first[token] { f32::INFINITY } else { sum(until - 1) };
-                    total += sum(until).min(short);
-                }
-                assert!((total - least(&cost, 0, 0)).abs() < 1e-4, "{total} {cost}");
+                let until = |token: usize| first.get(token + 1).copied().unwrap_or(n_frames);
+                let ranges = (0..n_tokens).map(|token| first[token]..until(token));
+                assert!(first[0] == 0 && ranges.clone().all(|range| range.len() >= min), "{first:?}");
+                let total: f32 =
+                    ranges.enumerate().flat_map(|(token, range)| cost.row(token).to_vec()[range].to_vec()).sum();
+                assert!((total - least(&cost, 0, 0, min)).abs() < 1e-4, "{total} {cost}");
             }
         }
     }
 
     #[test]
-    fn any_costs_give_a_path() {
+    fn any_costs_give_a_division() {
         for value in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, 0.0] {
-            for (n_tokens, n_frames) in [(0, 0), (0, 3), (3, 0), (3, 7), (7, 3)] {
+            for (n_tokens, n_frames) in [(0, 0), (0, 3), (3, 0), (3, 7), (3, 30), (7, 3), (3, 3)] {
                 let first = first_frames(Array2::from_elem((n_tokens, n_frames), value).view());
                 assert!(first.len() == n_tokens && first.is_sorted() && first.iter().all(|&at| at <= n_frames));
+                assert!(first.first().is_none_or(|&at| at == 0));
             }
         }
     }

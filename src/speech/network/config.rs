@@ -57,9 +57,9 @@ impl WhisperConfig {
     pub(crate) fn delay_secs(&self) -> f64 {
         match (self.n_encoder_layers, self.width, self.is_multilingual) {
             // tiny.en
-            (4, 384, false) => 0.09,
+            (4, 384, false) => 0.1,
             // base
-            (6, 512, true) => -0.04,
+            (6, 512, true) => -0.03,
             _ => 0.0,
         }
     }

@@ -20,6 +20,9 @@ use std::path::Path;
 /// Temperature above which the text of a window is no prompt for the next one.
 const MAX_PROMPT_TEMPERATURE: f32 = 0.5;
 
+/// Probability of the words of a segment that is dropped: text invented in silence and noise.
+const MIN_PROBABILITY: f32 = 0.15;
+
 /// Returns the samples, mono at 16 kHz, of a range of sample numbers; ranges are asked for in ascending order and may
 /// overlap.
 pub type SampleSource<'a> = dyn FnMut(Range<usize>) -> Result<Vec<f32>> + 'a;
@@ -183,6 +186,7 @@ impl Recogniser {
             words.iter_mut().for_each(|word| window.correct(word));
             if let (Some(from), Some(to)) = (words.first(), words.last())
                 && phrase.start_secs < phrase.end_secs
+                && words.iter().any(|word| word.probability >= MIN_PROBABILITY)
             {
                 let (start_secs, end_secs) = (from.start_secs, to.end_secs);
                 let text = self.tokenizer.decode(tokens).trim().to_owned();
