@@ -13,7 +13,7 @@
 SHELL := /bin/bash
 .SHELLFLAGS := -euo pipefail -c
 .DEFAULT_GOAL := build
-.PHONY: spelling test-data setup runtime models readers aligner browser blender validator vrm driver loader build dist check test prove prove-dist prove-rule prove-people prove-cluster prove-study demo demo-quick demo-study clean-demo docs
+.PHONY: spelling test-data setup runtime models readers aligner browser blender validator vrm driver loader build dist check test prove prove-dist prove-rule prove-words prove-people prove-cluster prove-study demo demo-quick demo-study clean-demo docs
 
 TARGET := $(or $(CARGO_TARGET_DIR),target)
 ORATOR := $(TARGET)/release/orator
@@ -72,7 +72,7 @@ test-data: build
 	@if [ -s $(SKIPPED) ]; then cargo test --release --locked --workspace -- --exact $$(sed 's/: .*//' $(SKIPPED) | sort -u); \
 		else echo 'the last `make test` skipped no test'; fi
 
-prove prove-rule prove-people prove-cluster: build models aligner loader
+prove prove-rule prove-words prove-people prove-cluster: build models aligner loader
 	.ci/$@
 
 prove: prove-dist

@@ -16,9 +16,10 @@
 //! | `orator-media` | FFmpeg, OpenCV, the word aligner, the sandbox |
 //! | `orator-onnx` | ONNX Runtime, the model store, model conversion |
 //! | `orator-nn` | operators with their kernels, and the networks (candle) |
+//! | `orator-speech` | speech recognition and word times (Whisper) |
 //! | `orator-avatar` | rigs, retargeting, export, the software renderer |
 //! | `orator-dataset` | `pipeline.toml`, and the dataset on disk: write, read, verify, import, forget |
-//! | `orator-pipeline` | the five stages, their order, and their processes |
+//! | `orator-pipeline` | the six stages, their order, and their processes |
 //! | `orator-gesture` | training, generation, metrics, evaluation |
 //! | `orator-report` | HTML pages and contact sheets |
 //! | `orator-study` | user studies: films, server, statistics |

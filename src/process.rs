@@ -1,11 +1,9 @@
-//! What holds for the whole process, for the program and for its benchmarks: how memory is kept, and what libraries read
-//! from the environment.
+//! For the process of the program and its benchmarks: how memory is kept, what libraries read from the environment.
 
 /// Prepares the process; before it starts a thread.
 pub fn prepare() {
     keep_freed_memory();
-    // ONNX Runtime reports its use to its maker unless this is set before it is loaded.
-    // SAFETY: no other thread has been started yet.
+    // ONNX Runtime reports its use to its maker unless this is set before loading. SAFETY: no other thread runs yet.
     unsafe { std::env::set_var(orator_onnx::TELEMETRY_OFF, "1") };
     // The tensor library's own threads spin while they wait, which costs more than they help beside rayon's.
     if std::env::var_os("CANDLE_NUM_THREADS").is_none() {

@@ -2,7 +2,7 @@
 //! exit code (see the parent module for the codes).
 
 use super::cluster::{plan, submit, work};
-use super::dataset::{align, forget, import, verify as dataset};
+use super::dataset::{align, forget, import, transcribe, verify as dataset};
 use super::motion::{lift, sheet};
 use super::moved::MovedVerb;
 use super::pipeline::{init, report, run, status};
@@ -57,6 +57,7 @@ pub(super) enum Verb {
     Sheet(sheet::Args),
     Report(report::Args),
     Import(import::Args),
+    Transcribe(transcribe::Args),
     Align(align::Args),
     Forget(forget::Args),
     Dataset(dataset::Args),
@@ -99,6 +100,7 @@ fn run(cli: Cli, ui: &Ui) -> Result<Outcome> {
         Verb::Report(args) => report::run(args, ui),
         Verb::Dataset(args) => dataset::run(args, ui),
         Verb::Import(args) => import::run(args, ui),
+        Verb::Transcribe(args) => transcribe::run(args, ui),
         Verb::Align(args) => align::run(args, ui),
         Verb::Forget(args) => forget::run(args, ui),
         Verb::Train(args) => train::run(args, ui),

@@ -16,6 +16,7 @@ const GROUPS: [(&str, &[&str]); 5] = [
             "sheet",
             StageName::Lift.as_str(),
             "import",
+            "transcribe",
             "align",
             "dataset",
             "forget",

@@ -1,8 +1,7 @@
-//! Assignment of units to workers by files that are created once and never changed. `NUMBER.claim.EPOCH` names the
-//! worker that owns a unit; `NUMBER.end.EPOCH` records how the unit ended. A worker that takes a unit over from a dead
-//! worker, or retries it after a failure, creates the claim of the next epoch: if two workers try, one succeeds, and no
-//! other claim is affected. The claim of the highest epoch is valid; the owner of an older one discards its work
-//! (`Claims::is_mine`).
+//! Assignment of units to workers by files created once and never changed. `NUMBER.claim.EPOCH` names the worker that
+//! owns a unit; `NUMBER.end.EPOCH` records how it ended. A worker that takes a unit over from a dead worker, or retries
+//! it after a failure, creates the claim of the next epoch: if two workers try, one succeeds, and no other claim is
+//! affected. The claim of the highest epoch is valid; the owner of an older one discards its work (`Claims::is_mine`).
 
 use super::heartbeat::BeatWatch;
 use super::shared_folder::SharedFolder;
@@ -18,8 +17,7 @@ use std::time::Duration;
 const UNITS_PER_FOLDER: usize = 1000;
 /// Number of free units from which the next one is drawn at random, so that workers seldom try the same unit.
 const FREE_CANDIDATES: usize = 16;
-/// Maximum number of claims whose owners are checked at a time; the random choices of all waiting workers together
-/// cover all units.
+/// Maximum number of claims whose owners are checked at a time; the random choices of waiting workers cover all units.
 const MAX_CHECKED: usize = 32;
 /// First waiting time of a worker. It grows by half each time, up to the interval between two checks for dead workers.
 const FIRST_WAIT: Duration = Duration::from_secs(2);
@@ -55,8 +53,7 @@ impl Claim {
         Ok(claim.map_or(ClaimOwner::Unreadable(file), ClaimOwner::Worker))
     }
 
-    /// Reads how the unit ended under this claim; `None` if no end is visible yet. An unreadable file counts as a
-    /// failure.
+    /// Reads how the unit ended under this claim; `None` if no end is visible yet. An unreadable file is a failure.
     pub fn read_end(self, folder: &impl SharedFolder) -> Result<Option<UnitEnd>> {
         let file = self.file("end");
         let damaged = || UnitEnd {
@@ -328,8 +325,7 @@ impl<'a, F: SharedFolder> Claims<'a, F> {
         Ok(failed)
     }
 
-    /// Collects the claims of dead workers and of workers that exited before the unit ended; `now` is the time on this
-    /// worker's clock.
+    /// Collects claims of dead workers and of workers that exited before the unit ended; `now`: this worker's clock.
     fn check_workers(&mut self, now: Duration) -> Result<()> {
         if !self.orphaned.is_empty() || now < self.next_check {
             return Ok(());

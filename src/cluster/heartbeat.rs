@@ -53,8 +53,7 @@ impl Heartbeat {
         self.media_secs / self.secs.max(1.0)
     }
 
-    /// Whether the worker is known to have exited: its status says so, or it was a process of this machine that no
-    /// longer exists.
+    /// Whether the worker is known to have exited: its status says so, or its process on this machine no longer exists.
     pub fn is_over(&self, machine: &str) -> bool {
         self.ended || (!machine.is_empty() && self.machine == machine && !workdir::is_alive(self.pid))
     }

@@ -1,5 +1,4 @@
-//! Parts shared by the jobs of all schedulers: the command lines of the workers and of the final job, quoted for a
-//! POSIX shell.
+//! Parts of the jobs of all schedulers: command lines of the workers and of the final job, quoted for a POSIX shell.
 
 use super::plan::ClusterPlan;
 use orator_base::stage::artifacts::{StageName, speaker_dir};
@@ -7,9 +6,7 @@ use std::path::{Path, PathBuf};
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TaskLimits {
-    /// Processor cores.
     pub cores: usize,
-    /// Memory, GiB.
     pub memory_gib: f64,
     /// Time limit, hours.
     pub hours: f64,

@@ -1,5 +1,4 @@
-//! Kubernetes manifests: an Indexed Job of workers and a Job that builds the datasets, on the volume that holds the
-//! project.
+//! Kubernetes manifests: an Indexed Job of workers and a Job that builds the datasets, on the project's volume.
 
 use super::job::{JobRequest, shell};
 use super::plan::ClusterPlan;
@@ -11,8 +10,7 @@ pub struct KubernetesTarget {
     /// Container image with the program.
     pub image: String,
     pub namespace: String,
-    /// PersistentVolumeClaim of the project, writable from every node, and its size (GiB) if the manifests should
-    /// create it.
+    /// PersistentVolumeClaim of the project, writable from every node, and its size (GiB) if the manifests create it.
     pub claim: String,
     pub claim_gib: Option<u64>,
     /// Mount path of the volume: a folder that contains the plan, the videos and the work folder.

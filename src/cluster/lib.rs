@@ -17,6 +17,3 @@ pub mod slurm;
 pub mod stage_times;
 pub mod timing;
 pub mod worker;
-
-#[cfg(test)]
-mod simulation;

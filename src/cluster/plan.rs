@@ -27,7 +27,6 @@ const LONGEST_SECS: f64 = 1e9;
 /// The units to process and what they depend on.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ClusterPlan {
-    /// Version of the file format.
     pub version: u32,
     /// BLAKE3 of the program.
     pub program: String,
@@ -294,8 +293,7 @@ impl ClusterPlan {
         Ok(self.videos().into_iter().filter(|unit| !is_known(unit)).collect())
     }
 
-    /// Videos of the plan at `path` that the pipeline does not find; empty if `path` is not a plan with the pipeline's
-    /// settings.
+    /// Videos of the plan at `path` that the pipeline does not find; empty if `path` is not a plan with these settings.
     pub fn missing_videos(path: &Path, pipeline: &Pipeline) -> Result<Vec<PlannedUnit>> {
         match Self::read(path) {
             Ok(plan) if plan.settings == settings_hash(pipeline.config())? => plan.missing(pipeline),

@@ -12,8 +12,7 @@ const NOTICE_SECS: u64 = 120;
 pub struct SlurmScripts {
     /// Arrays of workers, each within the cluster's size limit.
     pub arrays: Vec<String>,
-    /// The job after all arrays, whatever their result: it processes the remaining units, builds the datasets and
-    /// verifies them.
+    /// The job after all arrays, whatever their result: it processes remaining units, builds and verifies the datasets.
     pub last: String,
     /// Arrays after the last job, one training per speaker; empty if no training is requested.
     pub trainings: Vec<String>,

@@ -85,6 +85,12 @@ impl StageTimes {
         self.stages.get(stage.as_str()).copied().unwrap_or_default()
     }
 
+    /// Stages that were timed or always run, in order.
+    pub fn timed_stages(&self) -> impl Iterator<Item = StageName> {
+        let is_timed = |stage: &StageName| self.stages.contains_key(stage.as_str());
+        StageName::ALL.into_iter().filter(move |stage| *stage != StageName::Transcribe || is_timed(stage))
+    }
+
     /// Seconds of work on a video in all its stages.
     pub fn video_secs(&self, length_secs: f64) -> f64 {
         StageName::OF_VIDEOS.into_iter().map(|stage| self.cost(stage).secs(length_secs)).sum()

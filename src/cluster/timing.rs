@@ -1,5 +1,4 @@
-//! Times every stage on this machine: excerpts spread over all videos are processed like videos, with the same number
-//! of parallel jobs.
+//! Times every stage on this machine: excerpts spread over all videos are processed like videos, with as many jobs.
 
 use super::stage_times::{StageCost, StageTimes};
 use crate::plan::{PlannedUnit, settings_hash};
@@ -66,8 +65,7 @@ pub fn fingerprint(pipeline: &Pipeline, program: &Path, jobs: usize) -> Result<S
     Ok(blake3::hash(&serde_json::to_vec(&inputs)?).to_hex().to_string())
 }
 
-/// Times the stages on excerpts of the units of known length, `jobs` in parallel. The excerpts and their artifacts are
-/// removed afterwards.
+/// Times the stages on excerpts of units of known length, `jobs` in parallel. Excerpts and artifacts are then removed.
 ///
 /// # Errors
 /// No excerpt could be copied or processed, or the work folder cannot be written.
@@ -120,6 +118,8 @@ fn time_excerpts(
     task.advance(1);
     let peak_mib = peak_mib();
     let excerpt_secs: f64 = secs.values().sum();
+    let transcribes = pipeline.config().settings.transcribes_any();
+    let is_timed = |stage: &StageName| transcribes || *stage != StageName::Transcribe;
     let cost = |stage: StageName| {
         let own = times.iter().filter(|time| time.stage == stage);
         let length = |time: &StageTime| match stage {
@@ -133,7 +133,7 @@ fn time_excerpts(
     Ok(StageTimes {
         n_excerpts: files.len(),
         excerpt_secs,
-        stages: StageName::ALL.map(cost).into(),
+        stages: StageName::ALL.into_iter().filter(is_timed).map(cost).collect(),
         peak_mib,
         ..StageTimes::default()
     })

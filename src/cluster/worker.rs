@@ -70,8 +70,7 @@ pub(super) fn read_stop(folder: &DiskFolder) -> Result<Option<String>> {
 /// Processes the plan at `path`.
 ///
 /// # Errors
-/// The shared folder cannot be written, another process locks the work folder, or the disk is full (which stops every
-/// worker of the plan).
+/// The shared folder cannot be written, the work folder is locked, or the disk is full (which stops every worker).
 pub fn work(
     plan: &ClusterPlan,
     path: &Path,
@@ -273,7 +272,7 @@ impl Session<'_> {
         let ended = match (planned.check_inputs(self.hashes), planned.share) {
             // Stages that are up to date do not call `check_claim`, so the inputs are also checked here.
             (Err(error), _) => vec![StageOutcome::Failed(Arc::new(error))],
-            (Ok(()), UnitShare::AllStages) => run(&StageName::OF_VIDEOS)?,
+            (Ok(()), UnitShare::AllStages) => run(&self.pipeline.config().settings.stages_of(&unit.speaker))?,
             (Ok(()), UnitShare::Extract) => run(&[StageName::Extract])?,
             (Ok(()), UnitShare::Parts { idx, of }) => {
                 self.pipeline.run_parts(&unit, (idx, of), self.hashes, &check_claim, self.progress)?

@@ -8,7 +8,6 @@ use orator_base::types::skeleton::N_BONES;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
-/// Bone lengths of one video.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct VideoBones {
     /// Lengths from joints 1..=48 to their parents, metres; 0: not measured.

@@ -44,7 +44,6 @@ const MEMBERS: [(&str, &str); 3] = [
     ),
 ];
 
-/// Text of the dataset card.
 pub fn text(info: &DatasetInfo, stats: &DatasetStats, leakage: &Leakage) -> String {
     let mut text = header(info);
     let speaker = &info.speaker;

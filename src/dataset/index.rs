@@ -31,7 +31,6 @@ pub struct ShardRef {
     pub file: FileName,
     /// Size of the file, bytes.
     pub bytes: u64,
-    /// Number of samples in the shard.
     #[serde(deserialize_with = "count")]
     pub n_samples: usize,
     /// BLAKE3 of the file, hexadecimal.
@@ -43,15 +42,12 @@ pub struct ShardRef {
 pub struct SampleRef {
     /// Name, unique in the dataset.
     pub key: FileName,
-    /// Split that the sample belongs to.
     pub split: Split,
-    /// File name of the shard.
     pub shard: FileName,
     /// Start of the sample including its tar headers; the bytes from here on form a valid tar stream.
     pub offset: u64,
     /// Number of bytes of the sample from `offset` on.
     pub size: u64,
-    /// Number of frames of motion.
     #[serde(deserialize_with = "count")]
     pub n_frames: usize,
     /// BLAKE3 of the `size` bytes at `offset`, hexadecimal.

@@ -103,7 +103,11 @@ pub struct ModelUsed {
     pub licence: String,
 }
 
-/// Size of a split.
+impl ModelUsed {
+    /// Role of the speech recogniser.
+    pub const WORDS: &str = "words";
+}
+
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct SplitInfo {
     pub shards: Vec<ShardRef>,
@@ -222,7 +226,6 @@ impl DatasetInfo {
         self
     }
 
-    /// Shards of all splits.
     pub fn shards(&self) -> impl Iterator<Item = &ShardRef> {
         self.splits.values().flat_map(|split| &split.shards)
     }

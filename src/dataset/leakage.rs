@@ -1,5 +1,4 @@
-//! Leakage file `leakage.json`: pairs of videos that share sound, and the pairs whose shared sound is in different
-//! splits.
+//! Leakage file `leakage.json`: pairs of videos that share sound, and those whose shared sound is in different splits.
 
 use super::shared_sound::SharedSound;
 use super::split::{Split, TimeBlock, blocks};

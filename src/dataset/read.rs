@@ -41,8 +41,7 @@ pub struct Dataset {
 
 impl Dataset {
     /// Opens the folder of one speaker (`work/dataset/<speaker>`): reads its JSON files and checks that every shard
-    /// exists and has the recorded size. Contents are checked by `read` and `verify`. Other processes cannot write the
-    /// folder while it is open.
+    /// exists and has the recorded size. Contents are checked by `read` and `verify`. Others cannot write it meanwhile.
     ///
     /// # Errors
     /// A folder that is not a dataset, is damaged, or is being written (`BusyFolder`).
@@ -102,7 +101,6 @@ impl Dataset {
         Ok(Dataset { dir, info, stats, samples, shards, _lock: lock })
     }
 
-    /// Dataset folder.
     pub fn dir(&self) -> &Path {
         &self.dir
     }
@@ -165,8 +163,7 @@ impl Dataset {
         words.with_context(|| format!("cannot read {}.{WORDS_EXTENSION} in {}", sample.key, sample.shard))
     }
 
-    /// Reads the posture of a range of frames of a sample, without checking the hash. `None`: the sample has no
-    /// posture.
+    /// Reads the posture of frames of a sample, without checking the hash. `None`: the sample has no posture.
     pub fn posture(&self, sample: &SampleRef, frames: Range<usize>) -> Result<Option<Posture>> {
         let (Some(head), Some(trunk)) = (sample.head, sample.trunk) else { return Ok(None) };
         let angles = |range: ByteRange| -> Result<Array2<f32>> {

@@ -37,12 +37,10 @@ pub struct Sample {
 pub const EXTENSIONS: [&str; 5] = ["json", "mask.npy", "pose2d.npy", "pose3d.npy", "wav"];
 /// Extension of the member with the words.
 pub const WORDS_EXTENSION: &str = "words.json";
-/// Extensions of the optional members, which follow `EXTENSIONS` in a shard; a sample has both `head.npy` and
-/// `trunk.npy` or neither.
+/// Extensions of the optional members, after `EXTENSIONS` in a shard; `head.npy` and `trunk.npy` occur together.
 pub const OPTIONAL_EXTENSIONS: [&str; 3] = [WORDS_EXTENSION, "head.npy", "trunk.npy"];
 
 impl Sample {
-    /// Number of frames T.
     pub fn n_frames(&self) -> usize {
         self.motion.n_frames()
     }

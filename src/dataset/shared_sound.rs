@@ -9,8 +9,7 @@ use orator_base::audio::fingerprint::PER_SEC;
 use serde::{Deserialize, Serialize};
 use std::cmp::Ordering;
 
-/// Largest share of different bits within shared sound; unrelated sounds differ in about half of the bits, with little
-/// variation.
+/// Largest share of different bits in shared sound; unrelated ones differ in about half of them, with little variation.
 const MAX_BIT_ERROR_RATE: f64 = 0.33;
 /// Window over which the share of different bits is computed, seconds.
 const WINDOW_SECS: f64 = 3.0;
@@ -89,8 +88,7 @@ pub fn find(names: &[String], codes: impl Fn(usize) -> Result<Vec<u32>>, min_sec
     Ok(found)
 }
 
-/// For every pair of videos with equal codes, the offsets (position in the second minus position in the first) with at
-/// least `MIN_VOTES`.
+/// For pairs of videos with equal codes, the offsets (position in the second less the first) with at least `MIN_VOTES`.
 fn votes(landmarks: &[Landmark]) -> Vec<((u32, u32), Vec<i64>)> {
     let mut votes: Vec<((u32, u32), i64)> = Vec::new();
     for group in landmarks.chunk_by(|x, y| x.0 == y.0).filter(|group| group.len() <= MAX_OCCURRENCES) {

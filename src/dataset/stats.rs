@@ -67,7 +67,6 @@ pub struct FootageCount {
     pub secs: f64,
     #[serde(rename = "kept_secs")]
     pub accepted_secs: f64,
-    /// Rejected seconds by reason.
     #[serde(rename = "refused_secs")]
     pub rejected_secs: BTreeMap<String, f64>,
     pub failed_secs: f64,
@@ -86,8 +85,7 @@ impl DatasetStats {
         table(&self.mean)
     }
 
-    /// Standard deviation of each joint coordinate, [49, 3], metres; 0 for the neck and for joints that are never
-    /// visible.
+    /// Standard deviation of each joint coordinate, [49, 3], metres; 0 for the neck and joints that are never visible.
     pub fn std(&self) -> Array2<f32> {
         table(&self.std)
     }
@@ -147,7 +145,6 @@ impl Default for StatsCollector {
 }
 
 impl StatsCollector {
-    /// Adds a video.
     pub fn push(&mut self, entry: &VideoEntry) {
         // The moments of a video in several splits are those of its training samples.
         let is_training = entry.split.map_or(!entry.samples.is_empty(), |split| split == Split::Train);
@@ -184,7 +181,6 @@ impl StatsCollector {
         }
     }
 
-    /// Returns the statistics.
     pub fn finish(self) -> DatasetStats {
         let std = self.moments.std();
         let JointMoments { n_visible, mean, min, max, .. } = self.moments;

@@ -7,8 +7,7 @@ use orator_base::stage::ledger::{TranscriptReport, WordCount};
 use orator_formats::transcript::{Transcript, TranscriptChoice, Word};
 use std::path::{Path, PathBuf};
 
-/// Number and share of words that may be after the end of the sound; if both are exceeded, the transcript belongs to
-/// another sound.
+/// Number and share of words that may be after the end of the sound; beyond both, the transcript is of another sound.
 const MAX_OUTSIDE: (usize, f64) = (3, 0.1);
 /// Tolerance for the end of a word after the end of its sample, seconds: both are rounded.
 const ROUNDING_SECS: f64 = 1e-5;
@@ -110,8 +109,7 @@ fn check_end(words: &[Word], path: &Path, sound_secs: f64) -> Result<()> {
     Ok(())
 }
 
-/// Moves the words of a file to the clock of its sound and frames, which starts at `start_secs` of the file; words
-/// before it are removed.
+/// Moves a file's words to the clock of its sound and frames, which starts at `start_secs`; earlier ones are removed.
 pub fn from_secs(words: &mut Vec<Word>, start_secs: f64) {
     words.retain(|word| start_secs == 0.0 || word.end_secs > start_secs);
     for word in words {

@@ -11,7 +11,6 @@ use serde_json::json;
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
-/// Contents of a description file.
 #[derive(Debug, Deserialize)]
 struct JointsDescription {
     fps: DescribedRate,
@@ -33,7 +32,6 @@ pub fn path_of(path: &Path) -> PathBuf {
     name.into()
 }
 
-/// Whether a file name is that of a description file.
 pub fn is_description(path: &Path) -> bool {
     let name = path.file_name().unwrap_or_default().to_string_lossy().to_lowercase();
     [".npy.json", ".txt.json"].iter().any(|ending| name.ends_with(ending))
@@ -93,36 +91,4 @@ pub fn with(path: &Path, fps: FrameRate, shape: &[usize], write: impl FnOnce(&Pa
         "axes": "x image right, y down, z away from the camera, the neck at the origin",
     });
     workdir::write_file(&description_path, format!("{description}\n").as_bytes())
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn rate_round_trips_and_other_frame_count_is_rejected() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("a.npy");
-        let text = |description: &str| std::fs::write(path_of(&path), description).unwrap();
-        let assert_error = |words: &str| {
-            let error = format!("{:#}", rate(&path, 4).unwrap_err());
-            assert!(error.contains("a.npy.json") && error.contains(words), "{error}");
-        };
-        assert_eq!(rate(&path, 4).unwrap(), None);
-        let ntsc = FrameRate::new(30_000, 1001);
-        with(&path, ntsc, &[4, 49, 3], |attempt| Ok(std::fs::write(attempt, "numbers")?)).unwrap();
-        assert_eq!(rate(&path, 4).unwrap(), Some(ntsc));
-        assert!(is_description(&path_of(&path)) && !is_description(&path) && !is_description(Path::new("a.json")));
-        assert!(format!("{:#}", rate(&path, 5).unwrap_err()).contains("describes 4 frames"));
-        text("{\"fps\": 29.97}");
-        assert_eq!(rate(&path, 9).unwrap(), Some(ntsc));
-        text("{\"fps\": [30, 0]}");
-        assert_error("1 to 1000");
-        text("{\"fps\": 0.5}");
-        assert_error("1 to 1000");
-        text("{\"rate\": 30}");
-        assert_error("has no frame rate");
-        text("no JSON");
-        assert_error("delete it");
-    }
 }

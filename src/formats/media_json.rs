@@ -28,7 +28,6 @@ pub struct MediaInfo {
     pub source_fps: Option<FrameRate>,
     #[serde(default)]
     pub has_audio: bool,
-    /// Length of the audio, seconds.
     pub audio_secs: Option<f64>,
     /// Description of the parts of the file that could not be read.
     pub damage: Option<String>,

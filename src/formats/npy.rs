@@ -54,8 +54,7 @@ pub(crate) fn file_bytes(head: &[u8]) -> Option<u64> {
     header.shape.iter().try_fold(bytes, |n, &axis| n.checked_mul(axis as u64))?.checked_add(n_header)
 }
 
-/// Parses an array from the bytes of its file. The size in the header is checked against these bytes before memory is
-/// allocated.
+/// Parses an array from its file's bytes. The size in the header is checked against them before memory is allocated.
 pub(crate) fn parse<T: ReadableElement, D: Dimension>(bytes: &[u8]) -> Result<Array<T, D>, ReadNpyError> {
     if !has_small_header(bytes) {
         return Err(ReadNpyError::MissingData);
@@ -91,8 +90,7 @@ pub(crate) fn numbers(bytes: &[u8]) -> Result<Option<ArrayD<f64>>, ReadNpyError>
     })
 }
 
-/// Whether the header is complete and has few brackets: its parser is recursive and deep nesting would overflow the
-/// stack.
+/// Whether the header is complete and has few brackets: its parser is recursive, so nesting would overflow the stack.
 fn has_small_header(bytes: &[u8]) -> bool {
     let header = match bytes {
         [_, _, _, _, _, _, 1, _, a, b, rest @ ..] => rest.get(..usize::from(u16::from_le_bytes([*a, *b]))),
@@ -184,8 +182,7 @@ impl Layout {
     ///
     /// # Errors
     ///
-    /// The elements are not of type `element`, the rows do not have the shape `row`, or the file is not exactly as
-    /// long as the header implies.
+    /// The elements are not `element`, the rows not of shape `row`, or the file is not as long as the header implies.
     pub fn parse(bytes: &[u8], file_bytes: u64, element: Element, row: &[usize]) -> anyhow::Result<Layout> {
         ensure!(bytes.starts_with(MAGIC), "not a .npy file of version 1.0");
         let length = match bytes.get(8..10) {

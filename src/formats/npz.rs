@@ -31,8 +31,7 @@ impl Npz {
     ///
     /// # Errors
     ///
-    /// The file is missing or is not a zip archive, or its arrays unpack to more than `MAX_BYTES` (or than the file
-    /// itself).
+    /// The file is missing or no zip archive, or its arrays unpack to more than `MAX_BYTES` (or than the file itself).
     pub fn open(path: &Path) -> Result<Self> {
         let file = input::open(path).with_context(|| format!("cannot open {}", path.display()))?;
         let n_file_bytes = file.metadata().with_context(|| format!("cannot open {}", path.display()))?.len();
@@ -85,7 +84,6 @@ impl Npz {
         Ok(self.numbers(name, shape)?.mapv(|v| v as f32))
     }
 
-    /// Boolean array.
     pub fn bools(&mut self, name: &str, shape: &[AxisLength]) -> Result<ArrayD<bool>> {
         let found = npy::typed(&self.bytes(name)?);
         let Some(array) = self.readable(name, found)? else {

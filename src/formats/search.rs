@@ -6,7 +6,6 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 
-/// Maximum nesting depth of folders.
 const MAX_DEPTH: usize = 64;
 
 /// Files found by name. Accented letters may be composed or decomposed, and endings have any case, since cameras,
@@ -15,8 +14,7 @@ const MAX_DEPTH: usize = 64;
 pub struct NamedFiles(BTreeMap<PathBuf, BTreeMap<String, PathBuf>>);
 
 impl NamedFiles {
-    /// Existing files `STEM.ENDING` in `folder`, in the order of `stems`, then of `endings` (without the dot). An exact
-    /// name is preferred.
+    /// Existing files `STEM.ENDING` in `folder`, by `stems`, then `endings` (without dot). An exact name is preferred.
     pub fn find(&mut self, folder: &Path, stems: &[&str], endings: &[&str]) -> Vec<PathBuf> {
         let listed = self.0.entry(folder.to_owned()).or_insert_with(|| names_in(folder));
         let named = |(stem, ending): (&str, &str)| {
@@ -48,8 +46,7 @@ fn name_key(stem: &str, ending: &str) -> String {
     format!("{}.{}", composed(stem), ending.to_ascii_lowercase())
 }
 
-/// The existing file or folder that `path` names, whose accented letters may be composed differently; `path` itself if
-/// there is none.
+/// The existing file or folder that `path` names in any form of its accents; `path` itself if there is none.
 pub fn existing(path: &Path) -> PathBuf {
     let (Some(folder), Some(name), false) = (path.parent(), path.file_name(), path.exists()) else {
         return path.to_owned();
@@ -62,8 +59,7 @@ pub fn existing(path: &Path) -> PathBuf {
     found.unwrap_or_else(|| path.to_owned())
 }
 
-/// All files below `folder` that have one of the `endings` (lower case, without the dot) in any case, sorted by name
-/// within each folder.
+/// Files below `folder` with one of the `endings` (lower case, without dot) in any case, by name within each folder.
 pub fn below(folder: &Path, endings: &[&str]) -> Result<Vec<PathBuf>> {
     let mut files = files(folder, &mut |_| true)?;
     let is_one = |ending: &str| endings.contains(&ending.to_ascii_lowercase().as_str());
@@ -71,8 +67,7 @@ pub fn below(folder: &Path, endings: &[&str]) -> Result<Vec<PathBuf>> {
     Ok(files)
 }
 
-/// All files below `folder`, sorted by name within each folder; hidden names and folders rejected by `enter` are
-/// skipped.
+/// All files below `folder`, by name within each folder; hidden names and folders rejected by `enter` are skipped.
 ///
 /// # Errors
 ///

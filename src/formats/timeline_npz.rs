@@ -26,7 +26,6 @@ pub struct Timeline {
 }
 
 impl Timeline {
-    /// Number of frames T.
     pub fn n_frames(&self) -> usize {
         self.repeated.len()
     }

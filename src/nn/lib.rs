@@ -1,5 +1,4 @@
-//! Network architectures and their operators: tensors in, tensors out. `weights` reads and writes weight files. The
-//! optimisers are elsewhere.
+//! Networks and operators: tensors in, tensors out. `weights` reads and writes weight files. Optimisers are elsewhere.
 //!
 //! candle's operators are used only where finite differences confirm their gradients (`tests/it/train/operators.rs`
 //! lists them and rejects the others); convolution, batch norm and recurrent layers are implemented here. The layers

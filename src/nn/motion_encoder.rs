@@ -55,8 +55,7 @@ pub fn norm(params: &mut Params, name: &str, n: usize, slope: f64) -> Result<Bat
     BatchNorm::new(params, &format!("{name}.norm"), n, 1e-5, MOMENTUM, slope)
 }
 
-/// Creates fully connected layers between successive `widths`, with their norms; `last` is the negative slope of the
-/// last layer.
+/// Fully connected layers between successive `widths`, with their norms; `last`: the negative slope of the last layer.
 pub fn dense(params: &mut Params, prefix: &str, widths: &[usize], last: f64) -> Result<Vec<(Linear, BatchNorm)>> {
     let mut layers = Vec::new();
     for (i, pair) in widths.windows(2).enumerate() {
@@ -115,9 +114,8 @@ impl MotionEncoder {
         through(&self.dense, &through(&self.convs, x, mode)?.flatten_from(1)?, mode)
     }
 
-    /// Returns the codes [n, 32] of the windows of `frames` [T, n_in] that start at 0, `stride`, 2 `stride` ...;
-    /// `stride` is a multiple of 2. No layer is padded, so neighbouring windows share the convolutions; only the dense
-    /// layers run per window.
+    /// Codes [n, 32] of the windows of `frames` [T, n_in] that start at 0, `stride`, 2 `stride` ...; `stride` is a
+    /// multiple of 2. Without padding, neighbouring windows share the convolutions; only dense layers run per window.
     pub fn codes(&self, frames: ArrayView2<f32>, stride: usize) -> Result<Array2<f32>> {
         let (n_frames, n_in) = frames.dim();
         let n = (n_frames + 1).saturating_sub(WINDOW).div_ceil(stride);

@@ -1,7 +1,8 @@
 //! Validation of model descriptions: existing names, a role that matches the decoding, complete keypoint maps. The
 //! file itself is checked in `model`.
 
-use super::{Decode, KeypointOutputs, ModelEntry, ModelRole as Role, ModelSource, PictureFit as Fit, TensorAxes};
+use super::TensorAxes;
+use super::{Decode, KeypointOutputs, ModelEntry, ModelRole as Role, ModelSource, PictureFit as Fit, SourceFile};
 use anyhow::{Result, bail, ensure};
 use orator_base::types::file_name::FileName;
 
@@ -59,6 +60,15 @@ impl ModelEntry {
         if self.role == Role::Speech {
             return super::speech::check(self);
         }
+        if self.role == Role::Recogniser {
+            let parts = self.sources.iter().flat_map(|source| &source.files).map(SourceFile::name);
+            let mut names = self.files.iter().map(|file| file.path.as_str()).chain(parts);
+            let invalid = names.find(|name| !is_plain_name(name));
+            ensure!(invalid.is_none(), "files: expected plain names of files, found {:?}", invalid.unwrap_or_default());
+            ensure!(!self.files.is_empty(), "files: expected the files of the folder, the weights last");
+            return Ok(());
+        }
+        ensure!(self.files.is_empty(), "files: expected only for the role recogniser");
         ensure!(self.inputs.len() == 1, "inputs must list 1 input, not {}", self.inputs.len());
         let [height, width] = self.input_size()?;
         let numbers = [self.picture.scale].into_iter().chain(self.picture.mean).chain(self.picture.std);
@@ -111,7 +121,6 @@ impl ModelEntry {
 }
 
 impl Decode {
-    /// Names of the outputs used for decoding.
     fn names(&self) -> Vec<&str> {
         match self {
             Self::Detections { boxes, labels, .. } => {

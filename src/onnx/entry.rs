@@ -1,9 +1,9 @@
 //! Description of one model: its sources, preprocessing and decoding. A strict data type (unknown keys are errors).
 
-use super::{Conversion, ModelSource};
+use super::{Conversion, ModelSource, SourceFile};
 use serde::{Deserialize, Serialize};
 
-/// One model file: its identity, sources, preprocessing and decoding.
+/// One model, a file or a folder of files: its identity, sources, preprocessing and decoding.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ModelEntry {
@@ -18,10 +18,14 @@ pub struct ModelEntry {
     pub sha256: String,
     #[serde(default)]
     pub bytes: u64,
+    /// Files of a model that is a folder named `file`, the weights last; empty if it is a single file.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub files: Vec<SourceFile>,
     /// URL that serves exactly the pinned bytes.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub url: Option<String>,
-    /// Sources of the files from which the model is built, in the order in which they are tried, after `url`.
+    /// Sources of the files from which the model is built, in the order in which they are tried, after `url`. A folder
+    /// needs all of its sources.
     #[serde(default, rename = "source", skip_serializing_if = "Vec::is_empty")]
     pub sources: Vec<ModelSource>,
     /// Conversion from the files of a source; `None`: the single file of a source is the model.
@@ -53,7 +57,6 @@ pub struct Port {
     pub shape: Vec<i64>,
 }
 
-/// Task of a model.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum ModelRole {
@@ -63,10 +66,11 @@ pub enum ModelRole {
     Palm,
     Face,
     Speech,
+    /// A folder with a Whisper network, for speech recognition.
+    Recogniser,
     Other,
 }
 
-/// Origin and licence of the weights.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ModelOrigin {
@@ -118,8 +122,7 @@ pub enum TensorAxes {
 pub enum PictureFit {
     /// The complete image with its aspect ratio preserved, padded with grey level `pad`.
     Letterbox { anchor: Anchor, pad: u8 },
-    /// A person's bounding box extended to the aspect ratio of the input, then by the factor `margin`; black outside
-    /// the image.
+    /// A person's bounding box extended to the aspect ratio of the input, then by `margin`; black outside the image.
     Box { margin: f64 },
     /// A rotated square; black outside the image.
     #[default]
@@ -166,7 +169,6 @@ pub enum Decode {
     Regression {
         landmarks: String,
         score: String,
-        /// Whether the score is a logit.
         #[serde(default, skip_serializing_if = "std::ops::Not::not")]
         logit: bool,
         right: Option<String>,

@@ -2,18 +2,21 @@
 //! order. Every file is checked against its pinned SHA-256 before conversion, and the result after it.
 
 use super::convert::{ConversionOptions, convert};
-use super::{ModelEntry, ModelSource, PinnedFile, SourceKind, package, sha256_of};
+use super::{ModelEntry, ModelSource, PinnedFile, SourceFile, SourceKind, package, sha256_of};
 use anyhow::{Context, Result, anyhow, bail, ensure};
 use orator_base::input;
 use orator_base::stage::workdir;
 use sha2::{Digest, Sha256};
 use std::collections::BTreeMap;
 use std::fmt::{self, Write as _};
+use std::fs::File;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 /// Maximum file size, 1 GiB.
 pub(super) const MAX_BYTES: u64 = 1 << 30;
+/// Terms and licences of a model that is a folder.
+const LICENCE_FILE: &str = "licence.txt";
 /// Maximum folder depth searched in a mirror.
 const MAX_DEPTH: usize = 3;
 
@@ -71,9 +74,12 @@ impl<'a> Fetcher<'a> {
         Ok(Self { mirror_files, downloads, packages: BTreeMap::new() })
     }
 
-    /// Writes the file of the model to `path`, with the licence text of its source in a file next to it. Errors: no
-    /// source has the file; the message gives the reason for each.
+    /// Writes the file of the model to `path`, with the licence text of its source in a file next to it, or its folder.
+    /// Errors: no source has the file; the message gives the reason for each.
     pub(crate) fn get(&mut self, entry: &ModelEntry, path: &Path) -> Result<FetchSource> {
+        if !entry.files.is_empty() {
+            return self.get_folder(entry, path);
+        }
         let without_licence = |bytes, source| Obtained { bytes, licence: None, source };
         if let Some(found) = self.in_mirror(&entry.sha256) {
             let bytes =
@@ -103,6 +109,43 @@ impl<'a> Fetcher<'a> {
             "cannot fetch the file:{failures}\n      to use a copy (sha256 {}), name its folder with --mirror DIR",
             entry.sha256
         )
+    }
+
+    /// Writes the files of a model to `folder`, from the mirror or else from its sources. Parts of a file are joined.
+    /// Files that are there already are not fetched again, so a fetch that was interrupted continues.
+    fn get_folder(&mut self, entry: &ModelEntry, folder: &Path) -> Result<FetchSource> {
+        let in_mirror: Option<Vec<&Path>> = entry.files.iter().map(|file| self.in_mirror(&file.sha256)).collect();
+        if let Some(paths) = in_mirror {
+            workdir::write_file(&folder.join(LICENCE_FILE), entry.terms().as_bytes())?;
+            for (path, file) in paths.iter().zip(&entry.files) {
+                workdir::write_file(&folder.join(&file.path), &input::read(path, MAX_BYTES)?)?;
+            }
+            return Ok(FetchSource::Mirror(paths.iter().find_map(|path| path.parent()).unwrap_or(folder).to_owned()));
+        }
+        let mut text = entry.terms();
+        for source in &entry.sources {
+            if source.files.iter().all(|file| has_hash(&folder.join(file.name()), &file.sha256)) {
+                continue;
+            }
+            let obtained = if self.has_mirrored(source) { self.mirrored(source) } else { self.files(source) };
+            let (files, licence) = obtained.map_err(|error| {
+                anyhow!("cannot fetch {source}: {error:#}\n      to use a copy, name its folder with --mirror DIR")
+            })?;
+            text += &licence.map(|text| format!("\n{}\n", text.trim_end())).unwrap_or_default();
+            workdir::write_file(&folder.join(LICENCE_FILE), text.as_bytes())?;
+            for (bytes, file) in files.iter().zip(&source.files) {
+                workdir::write_file(&folder.join(file.name()), bytes)?;
+            }
+        }
+        for file in &entry.files {
+            let (path, parts) = (folder.join(&file.path), parts(entry, file, folder));
+            if !parts.is_empty() && !has_hash(&path, &file.sha256) {
+                workdir::replace(&path, |attempt| join(&parts, attempt, file))?;
+            }
+            parts.iter().try_for_each(|part| workdir::remove_file(part))?;
+        }
+        let source = entry.sources.first().with_context(|| format!("{} has no source to download", entry.id))?;
+        Ok(FetchSource::Source(source.clone()))
     }
 
     /// Writes a file other than a model to `path`. Errors: no source has it; the message gives the reason for each.
@@ -157,7 +200,7 @@ impl<'a> Fetcher<'a> {
         if let Some(package) = self.in_mirror(&source.sha256).filter(|_| !source.sha256.is_empty()) {
             return unpacked(source, package);
         }
-        let read = |file: &super::SourceFile| {
+        let read = |file: &SourceFile| {
             let path =
                 self.in_mirror(&file.sha256).with_context(|| format!("the mirror does not contain {}", file.path))?;
             Ok(input::read(path, input::MAX_DATA)?)
@@ -168,7 +211,7 @@ impl<'a> Fetcher<'a> {
     /// Files of a source, and its licence text if it has one.
     fn files(&mut self, source: &ModelSource) -> Result<(Vec<Vec<u8>>, Option<String>)> {
         if source.from == SourceKind::Address {
-            let get = |file: &super::SourceFile| {
+            let get = |file: &SourceFile| {
                 let url = format!("{}{}", source.name, file.path);
                 checked_part(file, download(&url).with_context(|| url.clone())?)
             };
@@ -228,7 +271,7 @@ fn unpacked(source: &ModelSource, package: &Path) -> Result<(Vec<Vec<u8>>, Optio
 }
 
 /// The used byte range of a file, checked against its pinned hash.
-fn checked_part(file: &super::SourceFile, bytes: Vec<u8>) -> Result<Vec<u8>> {
+fn checked_part(file: &SourceFile, bytes: Vec<u8>) -> Result<Vec<u8>> {
     let bytes = match file.range {
         None => bytes,
         Some([start, end]) => {
@@ -246,6 +289,27 @@ fn checked_part(file: &super::SourceFile, bytes: Vec<u8>) -> Result<Vec<u8>> {
 fn check_hash(bytes: &[u8], sha256: &str, name: &str) -> Result<()> {
     let found = format!("{:x}", Sha256::digest(bytes));
     ensure!(found.eq_ignore_ascii_case(sha256), "{name} has sha256 {found}, expected {sha256}");
+    Ok(())
+}
+
+fn has_hash(path: &Path, sha256: &str) -> bool {
+    sha256_of(path).is_ok_and(|found| found.eq_ignore_ascii_case(sha256))
+}
+
+/// Parts of the file of a folder (`model.bin.part1`, ...), in the order of the sources.
+fn parts(entry: &ModelEntry, file: &SourceFile, folder: &Path) -> Vec<PathBuf> {
+    let prefix = format!("{}.part", file.path);
+    let names = entry.sources.iter().flat_map(|source| &source.files).map(SourceFile::name);
+    names.filter(|name| name.starts_with(&prefix)).map(|name| folder.join(name)).collect()
+}
+
+/// Joins the parts of a file at `path`, and checks the result.
+fn join(parts: &[PathBuf], path: &Path, file: &SourceFile) -> Result<()> {
+    let mut joined = File::create(path)?;
+    for part in parts {
+        std::io::copy(&mut input::open(part)?, &mut joined)?;
+    }
+    ensure!(has_hash(path, &file.sha256), "the joined parts of {} have another sha256 than {}", file.path, file.sha256);
     Ok(())
 }
 

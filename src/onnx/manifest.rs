@@ -30,7 +30,6 @@ pub struct Manifest {
 }
 
 impl Manifest {
-    /// The built-in manifest.
     pub fn builtin() -> Result<Self> {
         Self::parse(BUILTIN).context("built-in model manifest")
     }
@@ -103,7 +102,7 @@ mod tests {
     #[test]
     fn builtin_manifest_round_trips() {
         let manifest = Manifest::builtin().unwrap();
-        assert_eq!((manifest.models.len(), manifest.layouts.len()), (16, 5));
+        assert_eq!((manifest.models.len(), manifest.layouts.len()), (18, 5));
         assert_eq!(Manifest::parse(&toml::to_string(&manifest).unwrap()).unwrap(), manifest);
         for entry in &manifest.models {
             assert!(entry.is_served() != entry.conversion.is_some(), "{}: a source or a conversion", entry.id);
@@ -133,7 +132,7 @@ mod tests {
         let text = toml::to_string(&Manifest { models: vec![own.clone()], ..Manifest::default() }).unwrap();
         std::fs::write(dir.path().join(MANIFEST_FILE), text).unwrap();
         let manifest = Manifest::load(dir.path()).unwrap();
-        assert_eq!((manifest.models.len(), manifest.get("person-mine").unwrap()), (17, &own));
+        assert_eq!((manifest.models.len(), manifest.get("person-mine").unwrap()), (19, &own));
         assert!(manifest.get("nobody").unwrap_err().to_string().contains("expected one of"));
         assert!(manifest.get_as("person-mine", ModelRole::Hand).is_err());
     }

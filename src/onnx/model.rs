@@ -12,8 +12,7 @@ use sha2::{Digest, Sha256};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-/// Reason why a model cannot be used: `id` is the model, `path` its file, `found` the actual value instead of
-/// `expected`.
+/// Reason why a model cannot be used: `id` is the model, `path` its file, `found` the value instead of `expected`.
 #[derive(Clone, Debug, thiserror::Error, Serialize, Deserialize)]
 pub enum ModelError {
     /// The file does not exist.
@@ -61,7 +60,6 @@ impl Model {
         Ok(Self { entry: entry.clone(), session, shape, input, inside: Duration::ZERO, n_runs: 0 })
     }
 
-    /// Description of the model.
     pub fn entry(&self) -> &ModelEntry {
         &self.entry
     }
@@ -71,7 +69,6 @@ impl Model {
         &mut self.input
     }
 
-    /// Runs the model on its input tensor.
     pub fn run(&mut self) -> Result<Outputs<'_>> {
         let input = TensorRef::from_array_view((self.shape.as_slice(), self.input.as_slice()))?;
         let start = Instant::now();

@@ -16,7 +16,6 @@ const VARIABLE: &str = "ORT_DYLIB_PATH";
 /// that use this crate must do the same.
 pub const TELEMETRY_OFF: &str = "ORT_DISABLE_TELEMETRY";
 
-/// The loaded ONNX Runtime.
 #[derive(Clone)]
 pub struct Runtime {
     environment: Environment,
@@ -27,8 +26,7 @@ pub struct Runtime {
 static LOADED: Mutex<Option<Runtime>> = Mutex::new(None);
 
 impl Runtime {
-    /// Loads the library `explicit` (if empty, the one found by [`find_library`]). Later calls return the first
-    /// library.
+    /// Loads the library `explicit` (if empty, that of [`find_library`]). Later calls return the first library.
     ///
     /// # Errors
     ///
@@ -54,7 +52,6 @@ impl Runtime {
         Ok(runtime)
     }
 
-    /// Path of the loaded library.
     pub fn library(&self) -> &Path {
         &self.library
     }

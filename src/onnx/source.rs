@@ -31,7 +31,6 @@ pub struct ModelSource {
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct PinnedFile {
-    /// File name.
     pub file: String,
     /// SHA-256 of the file, 64 hex digits.
     pub sha256: String,
@@ -64,13 +63,11 @@ pub struct SourceFile {
     pub sha256: String,
 }
 
-/// Conversion of the files of a source to a model.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Conversion {
     pub format: SourceFormat,
-    /// Names for the outputs of the source, in its order, "" for outputs to omit; if empty, the output names of the
-    /// model.
+    /// Names for the outputs of the source, in its order, "" for outputs to omit; if empty, the model's output names.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub outputs: Vec<String>,
 }
@@ -96,6 +93,13 @@ impl PinnedFile {
     pub(super) fn check(&self) -> Result<()> {
         ensure!(FileName::new(&self.file).is_ok(), "file must be a plain file name, not {:?}", self.file);
         self.sources.iter().try_for_each(ModelSource::check)
+    }
+}
+
+impl SourceFile {
+    /// File name without folders.
+    pub(super) fn name(&self) -> &str {
+        self.path.rsplit('/').next().unwrap_or_default()
     }
 }
 

@@ -43,8 +43,7 @@ impl SpeechModel {
         })
     }
 
-    /// Probability of speech, 0..1, in the next window of the audio; a window of fewer than 512 samples is padded
-    /// with silence.
+    /// Probability of speech, 0..1, in the next window; a window of fewer than 512 samples is padded with silence.
     pub fn probability(&mut self, window: &[f32]) -> Result<f32> {
         ensure!(window.len() <= WINDOW, "a window has {} samples, expected at most {WINDOW}", window.len());
         let (sound, silence) = self.input[CONTEXT..].split_at_mut(window.len());

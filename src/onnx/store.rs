@@ -100,6 +100,13 @@ impl ModelStore {
 
     /// State of the file of a model by its hash; names and shapes are not checked.
     pub fn state(&self, entry: &ModelEntry) -> ModelState {
+        if !entry.files.is_empty() {
+            return match self.check_folder(entry) {
+                Ok(()) => ModelState::Present,
+                Err(ModelError::HashMismatch { .. }) => ModelState::HashMismatch,
+                Err(_) => ModelState::Missing,
+            };
+        }
         match sha256_of(&self.path(entry)) {
             Ok(found) if found.eq_ignore_ascii_case(&entry.sha256) => ModelState::Present,
             Ok(_) => ModelState::HashMismatch,
@@ -115,6 +122,47 @@ impl ModelStore {
     /// Opens the file of a model after checking its hash, names and shapes.
     pub fn check(&self, runtime: &Runtime, entry: &ModelEntry) -> Result<Model, ModelError> {
         Model::open(runtime, entry, &self.dir)
+    }
+
+    /// Checks the hashes of the files of a model that is a folder.
+    pub fn check_folder(&self, entry: &ModelEntry) -> Result<(), ModelError> {
+        for file in &entry.files {
+            let (id, path) = (entry.id.clone(), self.path(entry).join(&file.path));
+            match sha256_of(&path) {
+                Ok(found) if found.eq_ignore_ascii_case(&file.sha256) => {}
+                Ok(found) => {
+                    return Err(ModelError::HashMismatch { id, path, expected: file.sha256.clone(), found });
+                }
+                Err(_) if !path.exists() => return Err(ModelError::Missing { id, path }),
+                Err(error) => return Err(ModelError::Unreadable { id, path, error: format!("{error:#}") }),
+            }
+        }
+        Ok(())
+    }
+
+    /// Folder of the speech recogniser `id`: a model of the manifest, or else a folder with a Whisper network, in the
+    /// models folder or by its path, which is not checked.
+    ///
+    /// # Errors
+    ///
+    /// It is missing, or its files differ from the manifest (`ModelError`); the message names the command that fetches
+    /// it.
+    pub fn recogniser(&self, id: &str) -> Result<PathBuf> {
+        let known = || self.with_role(ModelRole::Recogniser);
+        let Some(entry) = known().find(|entry| entry.id == id) else {
+            let own = [self.dir.join(id), PathBuf::from(id)].into_iter().find(|folder| folder.is_dir());
+            let ids: Vec<&str> = known().map(|entry| entry.id.as_str()).collect();
+            return own.with_context(|| {
+                format!(
+                    "no speech recogniser {id:?}: expected {}, or a folder with a Whisper network, by its path or in {}",
+                    ids.join(", "),
+                    self.dir.display()
+                )
+            });
+        };
+        let fetch = || format!("speech recognition needs a model: fetch it with `orator models fetch {}`", entry.id);
+        self.check_folder(entry).with_context(fetch)?;
+        Ok(self.path(entry))
     }
 
     /// The model with this id and role. `auto` selects the first model of the role, in manifest order, whose file

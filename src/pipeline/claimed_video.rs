@@ -10,7 +10,7 @@ use orator_base::stage::fingerprint::HashCache;
 use orator_base::stage::progress::Progress;
 use orator_base::stage::runner::StageOutcome;
 use orator_base::stage::{Input, Report, Stage, Unit, runner};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 /// Checks that the worker still holds its claim on the video; fails with `runner::ClaimLost` if it does not.
@@ -87,7 +87,11 @@ impl Pipeline {
         let hash = |(_, entry): &(_, &orator_onnx::ModelEntry)| {
             Ok((entry.file.clone(), hashes.hash(&settings.models.dir.join(&entry.file))?))
         };
-        used.iter().map(hash).collect()
+        let recogniser = settings.transcribes_any().then(|| -> Result<_> {
+            let id = settings.transcribe.model_id();
+            Ok((id.to_owned(), hashes.hash(&chosen.store.recogniser(id)?)?))
+        });
+        used.iter().map(hash).chain(recogniser).collect()
     }
 
     /// Checks that the stages have what they need: models, manifest, weights.
@@ -98,6 +102,8 @@ impl Pipeline {
         if self.all_videos().iter().any(orator_dataset::config::videos::Videos::has_video_files) {
             stages::check_models(&self.config().settings)?;
         }
-        StageName::OF_VIDEOS.into_iter().try_for_each(|name| self.stage(name, &[]).map(drop))
+        let settings = &self.config().settings;
+        let names = self.all_videos().iter().flat_map(|videos| settings.stages_of(&videos.speaker));
+        names.collect::<BTreeSet<_>>().into_iter().try_for_each(|name| self.stage(name, &[]).map(drop))
     }
 }

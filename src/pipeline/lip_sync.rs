@@ -19,13 +19,11 @@ const WINDOW_SECS: f64 = 8.0;
 const MIN_KNOWN_SHARE: f64 = 0.75;
 /// Least duration of known frames, in seconds, for the offset of a complete video.
 const MIN_KNOWN_SECS: f64 = 3.0;
-/// Standard deviation of the log opening below which the score is reduced: the correlation of nearly static lips is
-/// chance.
+/// Standard deviation of the log opening below which the score is reduced: correlation of nearly static lips is chance.
 const MIN_LIP_DEVIATION: f64 = 0.06;
 /// Correlation of lips and own voice that is tested against 0, the correlation with unrelated voices.
 const OWN_CORRELATION: f64 = 0.25;
-/// Independent samples per second, at most one a frame: the correlation of unrelated pairs deviates from 0 by
-/// 1 / sqrt(9 * seconds).
+/// Independent samples per second, at most one a frame: unrelated pairs correlate by 1 / sqrt(9 * seconds).
 const INDEPENDENT_PER_SEC: f64 = 9.0;
 /// Limit of the normalised signals in standard deviations.
 const MAX_DEVIATIONS: f64 = 3.0;
@@ -41,8 +39,7 @@ const SPEECH_DB: f32 = -50.0;
 /// Result of comparing lips and voice.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct LipSync {
-    /// Probability that the voice is that of the visible mouth, 0..1, [T]; NaN where mouth or speech is unknown for too
-    /// long.
+    /// Probability that the voice is that of the visible mouth, 0..1, [T]; NaN where mouth or speech is long unknown.
     pub score: Vec<f32>,
     /// Offset of the complete video; `None` if too few frames could be compared.
     pub offset: Option<SoundOffset>,
@@ -196,8 +193,7 @@ impl PairSums {
         (probabilities, evidence)
     }
 
-    /// Correlation over the frames `start..end`, scaled down where the lips hardly move; `None` if fewer than `least`
-    /// are known.
+    /// Correlation over `start..end`, scaled down where the lips hardly move; `None` if fewer than `least` are known.
     fn score(&self, start: usize, end: usize, least: f64) -> Option<f64> {
         let [n, x, y, xx, yy, xy]: [f64; 6] = std::array::from_fn(|k| self.0[end][k] - self.0[start][k]);
         if n < least.max(2.0) {

@@ -54,7 +54,6 @@ impl Pipeline {
         }
     }
 
-    /// The configuration.
     pub fn config(&self) -> &Config {
         &self.config
     }
@@ -72,7 +71,6 @@ impl Pipeline {
         Ok(chosen.cloned().collect())
     }
 
-    /// Videos of all speakers.
     pub(super) fn all_videos(&self) -> &[Videos] {
         &self.videos
     }
@@ -88,7 +86,9 @@ impl Pipeline {
         let (config, videos) = (self.config(), self.all_videos());
         let stage = stages::build(name, config, videos, ready)?;
         Ok(match self.program() {
-            Some(program) if name < StageName::Lift => Box::new(SubprocessStage { stage, program, config, videos }),
+            Some(program) if !matches!(name, StageName::Lift | StageName::Dataset) => {
+                Box::new(SubprocessStage { stage, program, config, videos })
+            }
             _ => stage,
         })
     }

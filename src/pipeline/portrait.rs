@@ -10,8 +10,7 @@ use std::path::Path;
 /// Face shape and colours of the person in a video.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Portrait {
-    /// Face points, centred, with a root mean square distance of 1 from the centre; empty if the face was never seen
-    /// from the front.
+    /// Face points, centred, at a root mean square distance of 1; empty if the face was never seen from the front.
     pub face: Vec<Vec3>,
     /// Cumulative distributions of lightness and two colour differences.
     pub skin: Vec<f32>,
@@ -27,8 +26,7 @@ impl Portrait {
         serde_json::from_slice(&bytes).with_context(|| format!("{} is not a portrait", path.display()))
     }
 
-    /// Distance between two face shapes after similarity alignment: root mean square over the points, in thousandths
-    /// of the face size.
+    /// Distance between two face shapes after similarity alignment: root mean square, in thousandths of the face size.
     pub fn face_distance(&self, other: &Self) -> Option<f64> {
         let fit = similarity(&self.face, &other.face)?;
         let pairs = || self.face.iter().zip(&other.face);

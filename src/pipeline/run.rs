@@ -2,7 +2,7 @@
 
 use super::pipeline::Pipeline;
 use super::pose2d::models;
-use super::segment::speech_rule::SpeechDetector;
+use super::speech::speech_rule::SpeechDetector;
 use super::stages::{self, HookedStage, UnitWork};
 use super::timing::{StageClock, StageTime};
 use anyhow::{Context, Result, ensure};
@@ -47,13 +47,11 @@ impl Selection {
         Self { from: stage, to: stage, ..Self::default() }
     }
 
-    /// Whether the stage is selected.
     pub fn has(&self, stage: StageName) -> bool {
         (self.from..=self.to).contains(&stage)
     }
 }
 
-/// Outcome of a run.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct RunReport {
     /// Number of units per stage and outcome.
@@ -79,7 +77,6 @@ pub struct StageCounts {
     pub done: usize,
     /// Already up to date.
     pub up_to_date: usize,
-    /// Failed.
     pub failed: usize,
 }
 
@@ -92,7 +89,6 @@ pub struct UnitFailure {
     /// The unit: `speaker/video`; for a dataset, the speaker.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub unit: Option<String>,
-    /// The stage that failed.
     pub stage: StageName,
     /// Error message with its causes.
     pub error: String,
@@ -106,7 +102,6 @@ pub struct UnitFailure {
 pub struct UnitReport {
     /// `speaker/video`; for a dataset, the speaker.
     pub unit: String,
-    /// The stage.
     pub stage: StageName,
     /// Whether this run processed the unit.
     pub state: RunState,
@@ -135,7 +130,6 @@ fn with_present_keys(mut facts: Map<String, Value>) -> Map<String, Value> {
 pub enum RunState {
     /// Processed in this run.
     Done,
-    /// Already up to date.
     #[serde(rename = "fresh")]
     UpToDate,
 }
@@ -154,8 +148,14 @@ impl Pipeline {
         if selection.has(StageName::Pose2d) && remaining.iter().any(Videos::has_video_files) {
             stages::check_models(settings)?;
         }
+        let transcribes = remaining.iter().any(|videos| settings.transcribes(&videos.speaker));
+        ensure!(
+            transcribes || (from, to) != (StageName::Transcribe, StageName::Transcribe),
+            "no words are to be recognised: set `transcripts = \"auto\"` under [[speaker]]"
+        );
+        let is_selected = |name: &StageName| selection.has(*name) && (transcribes || *name != StageName::Transcribe);
         // Missing weights or manifest entries are reported before hours of work, not after.
-        for name in StageName::ALL.into_iter().filter(|name| selection.has(*name)) {
+        for name in StageName::ALL.into_iter().filter(is_selected) {
             stages::build(name, self.config(), self.all_videos(), &[])?;
         }
         let _lock = workdir::lock(&settings.work.dir).context(
@@ -163,8 +163,7 @@ impl Pipeline {
                  --set work.dir=FOLDER",
         )?;
         for videos in &remaining {
-            // An interrupted replacement of a dataset is undone now, since its record is read before the dataset stage
-            // runs.
+            // An interrupted replacement of a dataset is undone now, since its record is read before that stage runs.
             workdir::recover_folder(&speaker_dir(&settings.work.dir, StageName::Dataset, &videos.speaker))?;
         }
         // Stage outputs and the work folder's own files are at most two folders deep.
@@ -192,8 +191,11 @@ impl Pipeline {
                 });
             }
         }
-        let names: Vec<StageName> = StageName::OF_VIDEOS.into_iter().filter(|name| selection.has(*name)).collect();
+        // Not every speaker's words are recognised, so this stage has its own units.
+        let (transcribe, names): (Vec<_>, Vec<_>) =
+            StageName::OF_VIDEOS.into_iter().filter(is_selected).partition(|name| *name == StageName::Transcribe);
         run.stages(&names, &[], &mut remaining)?;
+        run.stages(&transcribe, &[], &mut remaining)?;
         if selection.has(StageName::Dataset) {
             let ready = run.ready(&remaining)?;
             let failed = run.stages(&[StageName::Dataset], &ready, &mut remaining)?;

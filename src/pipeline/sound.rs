@@ -3,15 +3,24 @@
 
 use anyhow::{Context, Result};
 use orator_base::audio::openness::{Openness, OpennessMeter};
+use orator_base::types::sound::SAMPLE_RATE;
 use orator_base::types::time::FrameRate;
 use orator_formats::wav::WavWriter;
 use orator_media::ffmpeg::audio::{StreamedSound, stream_mono};
+use std::ops::Range;
 use std::path::Path;
 
 /// Window of the loudness in seconds; it averages over syllables and short pauses.
 const LOUDNESS_SECS: f64 = 1.0;
 /// Loudness of digital silence, dB.
 const SILENCE_DB: f64 = -120.0;
+/// Samples per level of `loud_ranges`; range of the levels of speech below the loudest ones, and lowest level of speech,
+/// dB; margin around speech, and pauses that are part of it, seconds.
+const LEVEL_SAMPLES: usize = 1_600;
+const SPEECH_RANGE_DB: f32 = 40.0;
+const SOFTEST_DB: f32 = -65.0;
+const MARGIN_SECS: f64 = 0.4;
+const MAX_PAUSE_SECS: f64 = 2.0;
 /// Samples per read.
 const CHUNK_SAMPLES: usize = 1 << 14;
 
@@ -85,31 +94,27 @@ pub fn pieces(path: &Path, n: usize, mut work: impl FnMut(&[f32]) -> Result<()>)
     if piece.is_empty() { Ok(()) } else { work(&piece) }
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn levels_of_a_tone_quiet_and_silence_are_measured() {
-        let path = tempfile::tempdir().unwrap().keep().join("tone.wav");
-        let spec = hound::WavSpec {
-            channels: 1,
-            sample_rate: 16_000,
-            bits_per_sample: 16,
-            sample_format: hound::SampleFormat::Int,
-        };
-        let mut wav = hound::WavWriter::create(&path, spec).unwrap();
-        for n in 0..16_000 * 6 {
-            let amplitude = if n < 48_000 { 0.1 } else { 0.0001 };
-            wav.write_sample((amplitude * 32_768.0 * (f64::from(n) * 0.3).sin()).round() as i16).unwrap();
+/// Ranges in seconds of a 16 kHz wav file that may contain speech, by loudness alone: parts as loud as soft speech, each
+/// with a margin; ranges less than 2 s apart are one.
+pub fn loud_ranges(path: &Path) -> Result<Vec<Range<f64>>> {
+    let mut levels = Vec::new();
+    pieces(path, LEVEL_SAMPLES, |piece| {
+        let power = piece.iter().map(|level| level * level).sum::<f32>() / piece.len() as f32;
+        levels.push((10.0 * power.max(1e-12).log10()).max(SILENCE_DB as f32));
+        Ok(())
+    })?;
+    let mut sorted = levels.clone();
+    sorted.sort_by(f32::total_cmp);
+    let loudest = sorted.get(sorted.len() * 95 / 100).copied().unwrap_or_default();
+    let softest = (loudest - SPEECH_RANGE_DB).max(SOFTEST_DB);
+    let secs = |n: usize| (n * LEVEL_SAMPLES) as f64 / f64::from(SAMPLE_RATE);
+    let mut ranges: Vec<Range<f64>> = Vec::new();
+    for at in (0..levels.len()).filter(|at| levels[*at] >= softest) {
+        let (start, end) = (secs(at) - MARGIN_SECS, (secs(at + 1) + MARGIN_SECS).min(secs(levels.len())));
+        match ranges.last_mut().filter(|range| start - range.end < MAX_PAUSE_SECS) {
+            Some(range) => range.end = end,
+            None => ranges.push(start.max(0.0)..end),
         }
-        wav.finalize().unwrap();
-        let (has_audio, db) = levels(&path, FrameRate::new(15, 1), 100).unwrap();
-        assert_eq!(has_audio.iter().sum::<f32>(), 90.0);
-        assert!((db[20] + 23.0).abs() < 0.1, "{}", db[20]);
-        assert!((db[70] + 83.0).abs() < 3.0, "{}", db[70]);
-        assert_eq!(db[99], -120.0);
-        assert_eq!(levels(Path::new("no.wav"), FrameRate::new(15, 1), 2).unwrap(), (vec![0.0; 2], vec![-120.0; 2]));
-        std::fs::remove_dir_all(path.parent().unwrap()).unwrap();
     }
+    Ok(ranges)
 }

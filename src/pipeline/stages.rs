@@ -8,7 +8,8 @@ use super::lift::lifter::context_secs;
 use super::pose2d::Pose2dStage;
 use super::pose2d::models::ChosenModels;
 use super::segment::SegmentStage;
-use super::segment::speech_rule::SpeechDetector;
+use super::speech::speech_rule::SpeechDetector;
+use super::transcribe::TranscribeStage;
 use anyhow::Result;
 use orator_base::stage::artifacts::StageName;
 use orator_base::stage::fingerprint::HashCache;
@@ -34,6 +35,7 @@ pub fn build(name: StageName, config: &Config, all: &[Videos], ready: &[Unit]) -
             SegmentStage::new(&settings.segment, &settings.work.dir).with_speech(SpeechDetector::find(settings)?),
         ),
         StageName::Lift => Box::new(LiftStage::new(&settings.lift, &settings.segment, &settings.work.dir)?),
+        StageName::Transcribe => Box::new(TranscribeStage::new(settings, SpeechDetector::find(settings)?)?),
         StageName::Dataset => {
             let inputs = DatasetInputs {
                 ready: ready.to_vec(),
@@ -47,13 +49,14 @@ pub fn build(name: StageName, config: &Config, all: &[Videos], ready: &[Unit]) -
     })
 }
 
-/// Units of a stage: every video, or the speaker for `dataset`.
+/// Units of a stage: the speaker for `dataset`, otherwise every video, if the stage is configured for the speaker.
 pub fn units(name: StageName, config: &Config, videos: &Videos) -> Vec<Unit> {
-    if name != StageName::Dataset {
-        return videos.units.clone();
-    }
     let speaker = videos.speaker.clone();
-    vec![Unit { speaker, video: String::new(), source: config.file.clone() }]
+    match name {
+        StageName::Dataset => vec![Unit { speaker, video: String::new(), source: config.file.clone() }],
+        _ if config.settings.stages_of(&speaker).contains(&name) => videos.units.clone(),
+        _ => Vec::new(),
+    }
 }
 
 /// Videos of a speaker that are fresh at every stage before `dataset`: the dataset is built from them.
@@ -62,8 +65,8 @@ pub fn units(name: StageName, config: &Config, videos: &Videos) -> Vec<Unit> {
 /// Those of `build`.
 pub fn ready(config: &Config, videos: &Videos, hashes: &HashCache) -> Result<Vec<Unit>> {
     let all = std::slice::from_ref(videos);
-    let stages =
-        StageName::OF_VIDEOS.into_iter().map(|name| build(name, config, all, &[])).collect::<Result<Vec<_>>>()?;
+    let names = config.settings.stages_of(&videos.speaker).into_iter();
+    let stages = names.map(|name| build(name, config, all, &[])).collect::<Result<Vec<_>>>()?;
     let state = |stage: &dyn Stage, unit: &Unit| runner::state(stage, unit, &config.settings.work.dir, hashes);
     let fresh = |unit: &&Unit| stages.iter().all(|stage| matches!(state(&**stage, unit), State::UpToDate(_)));
     Ok(videos.units.iter().filter(fresh).cloned().collect())
@@ -87,7 +90,12 @@ fn models_used(settings: &Settings) -> Result<Vec<ModelUsed>> {
         let ModelEntry { id, sha256, origin, .. } = entry.clone();
         ModelUsed { role: role.into(), id, sha256, licence: origin.licence }
     });
-    Ok(named.chain(SpeechDetector::find(settings)?.map(|detector| detector.used())).collect())
+    let mut models: Vec<ModelUsed> =
+        named.chain(SpeechDetector::find(settings)?.map(|detector| detector.used())).collect();
+    if settings.transcribes_any() {
+        models.push(TranscribeStage::used(settings)?);
+    }
+    Ok(models)
 }
 
 /// Processing of one unit by a stage.

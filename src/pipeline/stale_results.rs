@@ -36,7 +36,6 @@ pub const OLD_MODEL: &str = "-old";
 pub struct ModelStatus {
     /// `gan/FOLDER` or `seq2seq/FOLDER`.
     pub name: String,
-    /// State of the model.
     pub state: UnitState,
     /// Step of the newest checkpoint.
     pub step: Option<usize>,
@@ -66,8 +65,7 @@ pub fn has_other_lifter(lift: &dyn Stage, videos: &[Unit], work: &Path, hashes: 
     Ok(false)
 }
 
-/// Datasets and models to rebuild, and all models; `speakers` states for each speaker whether [`has_other_lifter`]
-/// holds.
+/// Datasets and models to rebuild, and all models; `speakers` states for each whether [`has_other_lifter`] holds.
 pub fn find(work: &Path, speakers: &BTreeMap<String, bool>) -> (Vec<StaleResult>, Vec<ModelStatus>) {
     let hash = |speaker: &String| hash_file(&speaker_dir(work, StageName::Dataset, speaker).join(CHECKSUMS)).ok();
     let datasets: BTreeMap<&str, (String, bool)> = speakers

@@ -1,5 +1,4 @@
-//! Status of a pipeline: the state of every unit at every stage, what a run would do, and the time budget of every
-//! video.
+//! Status of a pipeline: the state of every unit at every stage, what a run would do, the time budget of every video.
 
 use super::pipeline::Pipeline;
 use super::stages;
@@ -17,7 +16,6 @@ use serde::Serialize;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 
-/// Status of a pipeline.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct StatusReport {
     /// Status of every unit at every stage: the videos of a speaker, then the dataset of that speaker.
@@ -43,7 +41,6 @@ pub struct StatusReport {
 pub struct UnitStatus {
     /// `speaker/video`; for a dataset, the speaker.
     pub unit: String,
-    /// The stage.
     pub stage: StageName,
     /// State of the unit.
     pub state: UnitState,
@@ -75,9 +72,7 @@ pub enum UnitState {
 /// What a run would do at one stage.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct StagePlan {
-    /// The stage.
     pub stage: StageName,
-    /// Number of units that are up to date.
     pub up_to_date: usize,
     /// Number of units that would be processed.
     pub would_run: usize,
@@ -98,7 +93,6 @@ impl fmt::Display for UnitState {
 }
 
 impl StatusReport {
-    /// Whether every dataset is up to date.
     pub fn datasets_are_up_to_date(&self) -> bool {
         self.units.iter().all(|unit| unit.stage != StageName::Dataset || unit.state == UnitState::UpToDate)
     }
@@ -123,7 +117,8 @@ impl Pipeline {
             }));
             let ready = stages::ready(self.config(), &videos, &hashes).unwrap_or_default();
             let check = StatusCheck { pipeline: self, hashes: &hashes, videos: &videos, ready: &ready };
-            let of_videos = StageName::OF_VIDEOS.map(|name| (name, check.stage(name)));
+            let names = self.config().settings.stages_of(&videos.speaker).into_iter();
+            let of_videos: Vec<_> = names.map(|name| (name, check.stage(name))).collect();
             let (mut speaker_waits_for, mut usable) = (None, Vec::new());
             let mut total = TimeBudget::of_speaker(&videos.speaker);
             for unit in &videos.units {
@@ -138,8 +133,9 @@ impl Pipeline {
                     (Some(UnitStatus { stage, reason, .. }), _) => {
                         VideoProgress::Failed { stage: *stage, error: reason }
                     }
+                    // The words do not change which seconds are accepted.
+                    (None, None | Some(StageName::Transcribe)) => VideoProgress::Judged,
                     (None, Some(_)) => VideoProgress::Waiting,
-                    (None, None) => VideoProgress::Judged,
                 };
                 let is_extracted = stage_statuses.first().is_some_and(|status| status.state == UnitState::UpToDate);
                 let budget = TimeBudget::of_video(work, unit, video_progress, is_extracted);
@@ -168,14 +164,6 @@ impl Pipeline {
         report.adds_up = report.total.n_mismatched == 0;
         Ok(report)
     }
-
-    /// Time budgets of all videos, each speaker's total following the speaker's videos.
-    ///
-    /// # Errors
-    /// An unknown speaker.
-    pub fn time_budgets(&self, speakers: &[String]) -> Result<Vec<TimeBudget>> {
-        Ok(self.status(speakers)?.time_budget)
-    }
 }
 
 struct StatusCheck<'a> {
@@ -191,8 +179,7 @@ impl StatusCheck<'_> {
         stages::build(name, self.pipeline.config(), std::slice::from_ref(self.videos), self.ready)
     }
 
-    /// State of `unit` at a stage. `waits_for` is the first earlier stage that is not fresh; set to this stage if it
-    /// is not.
+    /// State of `unit` at a stage. `waits_for` is the first earlier stage not fresh; set to this stage if it is not.
     fn at(
         &self,
         name: StageName,

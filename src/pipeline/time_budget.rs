@@ -34,7 +34,6 @@ pub struct TimeBudget {
     /// Seconds in accepted intervals.
     #[serde(rename = "accepted_secs")]
     pub accepted: f64,
-    /// Rejected seconds by reason.
     #[serde(rename = "rejected_secs")]
     pub rejected: BTreeMap<String, f64>,
     /// Seconds lost to a failed stage.
@@ -65,11 +64,9 @@ pub struct TimeBudget {
     pub kind: BudgetKind,
 }
 
-/// Scope of a time budget.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum BudgetKind {
-    /// One video.
     Video,
     /// All videos of one or several speakers.
     #[default]
@@ -82,8 +79,7 @@ impl TimeBudget {
         Self { unit: speaker.to_owned(), ..Self::default() }
     }
 
-    /// Budget of one video from the stage outputs under `work`. `is_extracted`: the output of the extract stage is up
-    /// to date.
+    /// Budget of one video from the stage outputs under `work`. `is_extracted`: the extract stage is up to date.
     pub(super) fn of_video(work: &Path, unit: &Unit, progress: VideoProgress, is_extracted: bool) -> Self {
         let budget = Self { unit: unit.to_string(), kind: BudgetKind::Video, ..Self::default() };
         let media = if is_extracted { MediaInfo::read(&Artifact::MediaInfo.path(work, unit)).ok() } else { None };
@@ -111,7 +107,6 @@ impl TimeBudget {
         budget
     }
 
-    /// Adds another budget to this one.
     pub(super) fn add(&mut self, other: &Self) {
         self.accepted += other.accepted;
         for (reason, secs) in &other.rejected {
@@ -125,7 +120,6 @@ impl TimeBudget {
         self.sum = self.total();
     }
 
-    /// Total of the rejected seconds.
     pub fn rejected_secs(&self) -> f64 {
         self.rejected.values().sum::<f64>() + 0.0
     }

@@ -20,7 +20,6 @@ pub struct StageTime {
     pub secs: f64,
 }
 
-/// Collects processing times.
 #[derive(Default)]
 pub struct StageClock(Mutex<Vec<StageTime>>);
 

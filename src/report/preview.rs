@@ -36,8 +36,7 @@ pub struct MotionPreview {
 }
 
 impl MotionPreview {
-    /// Preview of the longest of `intervals`; `None` without intervals. `anchor` is the anchor of the video on the
-    /// page.
+    /// Preview of the longest of `intervals`; `None` without intervals. `anchor`: that of the video on the page.
     pub fn new(name: &str, anchor: String, motion: &Motion, intervals: &[Interval]) -> Option<Self> {
         let longest = intervals.iter().max_by_key(|interval| (interval.n_frames(), usize::MAX - interval.start))?;
         let fps = motion.fps.per_sec();

@@ -1,7 +1,6 @@
 //! Builds a study folder from a study file: clips, motion, films, plan and key, and last the seal. An interrupted build
-//! reuses the films that are complete. Output is deterministic for any number of workers. All films have the same size
-//! in bytes, so that size does not reveal the condition: an mp4 is padded with a `free` box at its end, which players
-//! skip.
+//! reuses the films that are complete. Output is deterministic for any number of workers. All films have equal size, so
+//! that it does not reveal the condition: an mp4 is padded with a `free` box at its end, which players skip.
 
 use super::design::{ClipNeeds, design};
 use super::file::{StudyFile, StudySpeaker};

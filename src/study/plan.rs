@@ -1,5 +1,4 @@
-//! Plan of a study, fixed before the first participant: the trials of each session in order, and the content of each
-//! film.
+//! Plan of a study, fixed before the first participant: the trials of each session in order, the content of each film.
 
 use super::vote::Response;
 use serde::{Deserialize, Serialize};

@@ -62,8 +62,7 @@ pub struct PowerCurve {
     pub rows: Vec<PowerRow>,
     /// Number of votes from the closed formula for independent votes.
     pub naive_votes: u64,
-    /// Simulated power for that number of votes, rounded up to whole participants and limited to the range of the
-    /// search.
+    /// Simulated power for that number of votes, rounded up to participants and limited to the range of the search.
     pub at_naive: PowerRow,
 }
 
@@ -263,8 +262,7 @@ pub struct CrossedEffects {
 }
 
 impl CrossedEffects {
-    /// Fixed intercept (log odds of a participant and clip with effect 0) that gives `share` as the marginal
-    /// proportion, found by bisection.
+    /// Fixed intercept (log odds at effects of 0) that gives the marginal proportion `share`, by bisection.
     pub fn log_odds(&self) -> f64 {
         let sd = self.sd_participants.hypot(self.sd_clips);
         let (mut low, mut high) = (-50.0, 50.0);

@@ -1,5 +1,4 @@
-//! Response of a participant to a trial, and the record of one answered trial that `serve` exports and the analysis
-//! reads.
+//! Response of a participant to a trial, the record of one answered trial that `serve` exports and the analysis reads.
 
 use super::plan::{TaskDesign, TrialPhase};
 use serde::{Deserialize, Serialize};

@@ -63,7 +63,7 @@ pub(crate) fn run(args: &Args, progress: &dyn Progress) -> Result<Report> {
             let stream = std::iter::once(Ok(sound.samples.clone()));
             let chunk = args.chunk.unwrap_or(CHUNK);
             let (motion, _) =
-                pool.install(|| speaker.motion_from_stream(stream, sound.samples.len(), chunk, &mut |_| ()))?;
+                pool.install(|| speaker.motion_from_stream(stream, sound.samples.len(), &[], chunk, &mut |_| ()))?;
             secs.push(start.elapsed().as_secs_f64());
             ensure!(motion.joints.iter().all(|v| v.is_finite()), "the generated motion is not finite");
             task.advance(1);
@@ -105,5 +105,5 @@ fn untrained(preset: Preset) -> Result<GestureGenerator> {
     let table = ndarray::Array2::from_elem((N_JOINTS, 3), 0.1);
     let normalisation = Normalisation::new(&table, &table, vec![0.1; N_BONES]);
     let facts = SpeakerMetadata::new("untrained", FPS, "", network, normalisation, Representation::Positions);
-    Ok(GestureGenerator { metadata: facts, generator })
+    Ok(GestureGenerator::new(facts, generator))
 }

@@ -29,7 +29,7 @@ pub(crate) fn generate(checkpoint: &Path, speech: &Path, out: &Path) -> Result<S
     let format = ExportFormat::from_path(out)?;
     let generator = GestureGenerator::open(checkpoint)?;
     let sound = read_sound(speech)?;
-    let motion = generator.motion(&sound)?;
+    let motion = generator.motion(&sound, &[])?;
 
     // A film (.mp4) has the sound; other formats do not use it.
     let performance = perform(&motion, None, &AnimationOptions::default());

@@ -4,6 +4,7 @@
 #![allow(clippy::duplicate_mod)]
 
 mod animate;
+mod base;
 /// The benchmark's own modules, so that its parts are tested without a release build.
 #[path = "../bench/mod.rs"]
 #[allow(dead_code)] // what only the benchmark calls
@@ -15,11 +16,13 @@ mod dataset;
 mod evaluate;
 mod fixtures;
 mod foreign;
+mod formats;
 mod fuzz;
 mod generate;
 mod keypoints;
 mod lift;
 mod media;
+mod nn;
 mod parity;
 mod pose2d;
 mod report;

@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 
 /// Modules of a crate that must not import each other.
 const SIBLINGS: [(&str, &[&str]); 2] = [
-    ("src/pipeline", &["extract", "pose2d", "segment", "lift", "dataset"]),
+    ("src/pipeline", &["extract", "pose2d", "segment", "lift", "transcribe", "dataset"]),
     ("src/media", &["ffmpeg", "opencv", "aligner"]),
 ];
 

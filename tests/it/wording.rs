@@ -137,7 +137,7 @@ const STORED: [&str; 7] = [
     "src/cli/renamed.rs",
     "src/dataset/card.rs",
     "src/gesture/metrics/",
-    "src/pipeline/segment/speech_rule.rs",
+    "src/pipeline/speech/speech_rule.rs",
     "tests/it/segment/voices.rs",
     "fixtures/",
 ];

@@ -27,14 +27,11 @@ use std::ops::Range;
 /// Largest share of clamped finger angles of a clip with usable fingers; clips of real hands have at most 10 %.
 pub const MAX_FINGER_CLAMPS: f64 = 0.25;
 
-/// Settings of the animation.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct AnimationOptions {
-    /// Temporal filter.
     pub smoothing: Smoothing,
     /// Joint limits to apply.
     pub constraints: Constraints,
-    /// Treatment of the shoulders' yaw.
     pub yaw: Yaw,
     /// Treatment of the lower body.
     pub legs: Legs,
@@ -57,7 +54,6 @@ pub enum Yaw {
 /// Statistics of the processing of a motion.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct AnimationReport {
-    /// Number of frames of the motion.
     pub n_frames: usize,
     /// Jerk of the arms at the motion's own rate, over frames in which they were detected.
     pub arms: Jerk,
@@ -80,8 +76,7 @@ pub struct AnimationReport {
     pub captured: Vec<CapturedPart>,
 }
 
-/// Number of frames, at the motion's own rate, in which a part of the body was detected; in all others it is
-/// interpolated or held.
+/// Number of frames, at the motion's rate, in which a body part was detected; in all others it is interpolated or held.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct DetectedFrames {
     /// Shoulder, elbow and wrist.
@@ -136,8 +131,7 @@ impl AnimationReport {
         LIMBS.iter().filter(|limb| !limb.is_visible(frame)).map(|limb| limb.name).collect()
     }
 
-    /// Frames [start, end) in which each limb was not detected, in a clip of `n_frames` frames; limbs that were always
-    /// detected are left out.
+    /// Frames [start, end) in which each limb was not detected, in a clip of `n_frames` frames; others are left out.
     pub fn hidden_ranges(&self, n_frames: usize) -> BTreeMap<&'static str, Vec<[usize; 2]>> {
         let mut hidden = BTreeMap::<&'static str, Vec<[usize; 2]>>::new();
         for frame_idx in 0..n_frames {
@@ -162,19 +156,15 @@ pub struct Jerk {
     pub after: Option<f64>,
 }
 
-/// An animated motion with its rig.
 #[derive(Clone, Debug)]
 pub struct Performance {
     /// The skeleton with its bone lengths.
     pub rig: Rig,
-    /// The joint rotations.
     pub clip: BvhClip,
-    /// Statistics of the processing.
     pub report: AnimationReport,
 }
 
-/// Animates a motion on a rig with its own bone lengths; a `posture` turns head and trunk without moving joints
-/// relative to the neck.
+/// Animates a motion on a rig of its lengths; a `posture` turns head and trunk without moving joints from the neck.
 ///
 /// Joint limits are applied before directions are smoothed, so that a misplaced joint does not distort neighbouring
 /// frames, and again after smoothing and at the output rate, so that they hold in every written frame. Noise of hands
@@ -273,8 +263,7 @@ fn animate(
 }
 
 impl Performance {
-    /// The performance at another rate: rotations between frames are interpolated spherically, existing frames are
-    /// unchanged.
+    /// The performance at another rate: rotations are interpolated spherically, existing frames are unchanged.
     pub fn resampled(&self, fps: FrameRate) -> Self {
         Self { rig: self.rig.clone(), clip: self.clip.resampled(fps), report: self.report.clone() }
     }

@@ -14,8 +14,7 @@ pub struct Background {
 
 /// Static surfaces in front of and behind the figures, rendered for one camera.
 pub trait StaticScene: Debug + Send + Sync {
-    /// Inverse depth of each sample, 1/cm; 0 where there is no surface. Shape: pixels of the image, row by row, four
-    /// samples each.
+    /// Inverse depth of each sample, 1/cm; 0 where there is no surface. Shape: pixels, row by row, four samples each.
     fn inverse_depth(&self) -> &[[f32; 4]];
 
     /// Mesh, label and depth (cm) at a pixel index; `None` where there is no surface.

@@ -30,8 +30,7 @@ impl Light {
         [across, cross(to_key, across), to_key.map(|v| -v)].map(|axis| axis.map(|v| v as f32))
     }
 
-    /// Linear RGB that a surface reflects without the key light, and the part that the key light adds where it is not
-    /// shadowed.
+    /// Linear RGB that a surface reflects without the key light, and the part that the unshadowed key light adds.
     #[inline(always)]
     pub fn on(&self, normal: [f32; 3], to_viewer: [f32; 3], colour: [f32; 3], gloss: f32) -> [[f32; 3]; 2] {
         let lambert = ((dot(normal, self.to_key) + WRAP) / (1.0 + WRAP)).max(0.0);

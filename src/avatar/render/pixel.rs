@@ -145,7 +145,6 @@ impl Shading {
         }
     }
 
-    /// Radiance at the corners of a triangle.
     #[inline(never)]
     fn corner_radiances(&mut self, surfaces: &Surfaces, shadows: Option<&ShadowMap>, number: u32) -> [Radiance; 3] {
         let triangle = &surfaces.triangles[number as usize];
@@ -196,8 +195,7 @@ impl Shading {
         light
     }
 
-    /// Draws a row of pixels over the background in `image` and stores the frontmost triangles in `front`; `[left, y]`
-    /// is the first pixel.
+    /// Draws a row of pixels over `image` and stores the frontmost triangles in `front`; `[left, y]`: the first pixel.
     pub fn draw_row(
         &mut self,
         surfaces: &Surfaces,

@@ -1,8 +1,6 @@
-//! Frontmost triangle at four samples of each pixel, for one band of rows at a time so that it fits into the
-//! processor's cache.
+//! Frontmost triangle at four samples of each pixel, one band of rows at a time, which fits into the cache.
 
-/// Subpixels per pixel, to which vertices are rounded: integer arithmetic leaves no gaps between triangles that share
-/// an edge.
+/// Subpixels per pixel, to which vertices are rounded: integers leave no gaps between triangles that share an edge.
 pub const SUBPIXELS: i32 = 16;
 /// Maximum extent of a triangle whose edge functions fit into i32, subpixels.
 const MAX_I32_EXTENT: i32 = 512 * SUBPIXELS;
@@ -18,7 +16,6 @@ pub const BAND_ROWS: usize = 16;
 /// Pixels that may have a sample within a triangle: half-open ranges of columns and rows.
 pub type Extent = [[u16; 2]; 2];
 
-/// A triangle projected to the image.
 #[derive(Clone, Copy, Debug)]
 pub struct FlatTriangle {
     /// Corners, in subpixels from the centre of the top left pixel.
@@ -50,7 +47,6 @@ impl FlatTriangle {
     }
 }
 
-/// Depth and triangle of all samples of a band.
 #[derive(Clone, Debug, Default)]
 pub struct RowBand {
     width: usize,
@@ -174,8 +170,7 @@ impl RowBand {
         self.fill_rows(&Setup { edges, steps, first, per_pixel, number }, [left, right], [top, bottom]);
     }
 
-    /// Rasterises the pixels of an extent. It is separate from the set-up so that the compiler vectorises over the four
-    /// samples.
+    /// Rasterises the pixels of an extent. It is separate so that the compiler vectorises over the four samples.
     #[inline(never)]
     fn fill_rows<T: EdgeInteger>(&mut self, setup: &Setup<T>, [left, right]: [usize; 2], [top, bottom]: [usize; 2]) {
         let Setup { mut edges, steps, mut first, per_pixel, number } = *setup;
@@ -198,8 +193,7 @@ impl RowBand {
                 let mut new = here;
                 here.iter_mut().for_each(|inverse_depth| *inverse_depth += per_pixel[0]);
                 if outer[0] & outer[1] & outer[2] & outer[3] < 0 {
-                    // Thin triangles may pass between samples, so the row ends only where all samples are beyond one
-                    // edge.
+                    // Thin triangles may pass between samples, so a row ends only where all samples are beyond an edge.
                     if is_entered
                         && (is_beyond_edge(&e0, steps[0][0])
                             || is_beyond_edge(&e1, steps[1][0])

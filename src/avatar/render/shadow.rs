@@ -20,8 +20,7 @@ const OCCLUSION_OFFSETS: [[f32; 2]; 12] = [
     [0.924, -0.383],
 ];
 const OCCLUSION_RADII_CM: [f32; 2] = [2.0, 4.5];
-/// Minimum and maximum distance of occluders, cm, and the fraction of ambient light that they block if they cover all
-/// samples.
+/// Minimum and maximum distance of occluders, cm, and the share of ambient light blocked if they cover all samples.
 const OCCLUSION_BIAS_CM: f32 = 0.8;
 const OCCLUSION_RANGE_CM: f32 = 22.0;
 const OCCLUSION_STRENGTH: f32 = 0.9;
@@ -63,8 +62,7 @@ impl ShadowMap {
     }
 
     /// Renders the casters, given as points in light axes and triangles. With `only_far_sides`, triangles that face the
-    /// light are skipped: closed meshes then cast the same shadow without shading themselves, and one-sided walls cast
-    /// none.
+    /// light are skipped: closed meshes then cast the same shadow without shading themselves, one-sided walls none.
     pub fn cast<'a>(
         &mut self,
         parts: impl Iterator<Item = (&'a [[f32; 3]], &'a [[u32; 3]])> + Clone,

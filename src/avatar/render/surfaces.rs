@@ -192,7 +192,6 @@ impl Surfaces {
         }
     }
 
-    /// Projection of a triangle.
     #[inline(always)]
     pub fn flat(&self, triangle: &SurfaceTriangle) -> FlatTriangle {
         let [a, b, c] = triangle.vertices;
@@ -289,8 +288,7 @@ impl Surfaces {
     }
 }
 
-/// Radiance as a linear function of the image position: the value `at` the point `from` (subpixels), and its gradient
-/// per pixel.
+/// Radiance, linear in the image position: the value `at` the point `from` (subpixels), and its gradient per pixel.
 #[derive(Clone, Copy, Debug)]
 pub struct RadiancePlane {
     from: [i32; 2],

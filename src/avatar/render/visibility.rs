@@ -3,7 +3,6 @@
 use super::samples::{BAND_ROWS, RowBand};
 use super::surfaces::{SurfaceTriangle, Surfaces};
 
-/// Buffers of the visibility search.
 #[derive(Clone, Debug)]
 pub struct VisibleTriangles {
     size: [usize; 2],
@@ -22,8 +21,7 @@ impl VisibleTriangles {
         Self { size, band: RowBand::new(size[0]), numbers: Vec::new(), ends, columns }
     }
 
-    /// Calls `each` with every band that has triangles, its rows and its columns; `background` is the inverse depth of
-    /// the background.
+    /// Calls `each` with every band that has triangles, its rows and its columns; `background`: its inverse depth.
     pub fn visit(
         &mut self,
         surfaces: &Surfaces,

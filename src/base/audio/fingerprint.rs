@@ -1,8 +1,7 @@
 //! Audio fingerprints: 32 bits every 32 ms that identify a recording after cutting, re-encoding and a change of level
 //! (Haitsma and Kalker, "A Highly Robust Audio Fingerprinting System", ISMIR 2002). `dataset` finds videos that share
-//! sound. A window of 256 ms is divided into 33 bands from 300 to 3000 Hz of equal width in pitch. Bit m of a code is
-//! set if the difference between the energies of bands m and m + 1 has grown since the window before. Silence has the
-//! code 0.
+//! sound. A window of 256 ms has 33 bands from 300 to 3000 Hz of equal width in pitch. Bit m of a code is set if the
+//! difference between the energies of bands m and m + 1 has grown since the window before. Silence has the code 0.
 
 use super::spectrum::StreamedSpectra;
 use realfft::num_complex::Complex;

@@ -1,8 +1,7 @@
 //! Audio onsets as detected by librosa 0.11 with `onset_detect(y, sr=16000, hop_length=512, units="time")`, on which
-//! the beat metrics of the field are based: spectral flux of 128 mel bands in decibels (Boeck and Widmer 2013), then
-//! peaks above their surroundings. Decibels are clipped at 80 below the maximum of the complete sound, so a sound
-//! needs two passes: `Loudest`, then `Onsets`. Both process it in chunks and store only the strength per hop, 4 bytes
-//! per 32 ms.
+//! the field's beat metrics are based: spectral flux of 128 mel bands in decibels (Boeck and Widmer 2013), then peaks
+//! above their surroundings. Decibels are clipped at 80 below the maximum of the complete sound, so a sound needs two
+//! passes: `Loudest`, then `Onsets`. Both process it in chunks and store only the strength per hop, 4 bytes per 32 ms.
 
 use super::mel::Band;
 use super::spectrum::{StreamedSpectra, hann};
@@ -22,8 +21,7 @@ const N_BEFORE: usize = 1 + WINDOW / (2 * HOP);
 const DELTA: f64 = 0.07;
 const AROUND: usize = 3;
 
-/// Returns the onset times in seconds of mono sound at 16 kHz, samples in -1..1 (non-finite ones count as 0). Empty
-/// for a constant sound.
+/// Onset times in seconds of mono sound at 16 kHz, samples in -1..1 (non-finite ones count as 0). Empty if constant.
 pub fn onsets(samples: &[f32]) -> Vec<f64> {
     let mut loudest = Loudest::default();
     loudest.push(samples);
@@ -45,7 +43,6 @@ impl Default for Loudest {
 }
 
 impl Loudest {
-    /// Processes the next samples.
     pub fn push(&mut self, samples: &[f32]) {
         let max = &mut self.max;
         self.spectra.push(samples, |bands| *max = bands.iter().fold(*max, |max, db| max.max(*db)));
@@ -78,7 +75,6 @@ impl Onsets {
         Self { spectra: Spectra::new(), flux }
     }
 
-    /// Processes the next samples.
     pub fn push(&mut self, samples: &[f32]) {
         let flux = &mut self.flux;
         self.spectra.push(samples, |bands| flux.push(bands));

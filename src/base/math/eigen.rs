@@ -8,8 +8,7 @@ const ROUNDING: f64 = 1e-14;
 /// Maximum number of QR steps per eigenvalue; two or three are usual.
 const MAX_STEPS: usize = 60;
 
-/// Returns `f` [d, rank] with `f fᵀ` equal to the positive semi-definite `matrix` [d, d], by pivoted Cholesky
-/// decomposition.
+/// `f` [d, rank] with `f fᵀ` equal to the positive semi-definite `matrix` [d, d], by pivoted Cholesky decomposition.
 pub fn factor(matrix: &Array2<f64>) -> Array2<f64> {
     let mut rest = matrix.clone();
     let floor = ROUNDING * rest.diag().iter().fold(0.0, |max: f64, v| max.max(*v));

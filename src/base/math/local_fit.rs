@@ -1,7 +1,6 @@
 //! Smoothing that adapts to the measured noise. A parabola is fitted around every frame under Gaussian windows of
 //! increasing width, and the widest window is chosen whose result differs from those of all narrower ones by no more
-//! than noise and a tolerance explain (Lepski 1990): a static limb is smoothed over a long time, a stroke is left
-//! unchanged. There is no delay.
+//! than noise and a tolerance explain (Lepski 1990): a static limb is smoothed long, a stroke is unchanged. No delay.
 
 use super::order::{Ordered, lower_quantile};
 use super::vec3::{Vec3, add, dot, norm, scale, sub};
@@ -35,13 +34,11 @@ const NOISE_SECS: f64 = 2.5;
 const SMOOTH_SECS: f64 = 0.14;
 /// Quantile of the windows chosen in nearby frames that is used for a frame.
 const NARROW_QUANTILE: f64 = 0.25;
-/// Difference of two fits from which it is not explained by noise, in standard deviations of the noise in that
-/// difference.
+/// Difference of two fits that noise no longer explains, in standard deviations of the noise in that difference.
 const BIAS: f64 = 2.5;
 
 /// Windows around a frame, first the frame alone: the weights of the nearby frames in each window's fit, and for every
-/// pair (wide, narrow) the root mean square of the difference of their fits for white noise of unit standard
-/// deviation.
+/// pair (wide, narrow) the root mean square of the difference of their fits for white noise of unit standard deviation.
 struct Windows {
     weights: Vec<Vec<f64>>,
     differences: Vec<Vec<f64>>,
@@ -58,8 +55,7 @@ impl LocalFit {
         Self { sigmas, noise_half: frames(NOISE_SECS), smooth_half: frames(SMOOTH_SECS), strength, tolerance }
     }
 
-    /// Smooths a run of values. `known` holds known standard deviations of the noise per frame; it may be shorter than
-    /// the run.
+    /// Smooths a run of values. `known`: standard deviations of the noise per frame; it may be shorter than the run.
     pub fn run(&self, values: &[Vec3], known: &[f64]) -> Vec<Vec3> {
         let mut noise = noise_around(values, self.noise_half);
         for (t, noise) in noise.iter_mut().enumerate() {
@@ -148,21 +144,18 @@ fn triangular_mean(values: &[f64], t: usize, half: usize) -> f64 {
 // Estimation of the white noise in a moving track: differences of high order contain far more noise than motion, and
 // the ratio of two orders, which is lower for motion than for noise, shows how much of them is motion.
 
-/// Mean squares of the third and fourth differences of white noise of unit variance (sums of squared binomial
-/// coefficients).
+/// Mean squares of the third and fourth differences of unit white noise (sums of squared binomial coefficients).
 const THIRD: f64 = 20.0;
 const FOURTH: f64 = 70.0;
 /// Ratio of the two for motion: 1.4 to 1.7 for captured arms at 15 frames per second, less at 30.
 const MOTION_RATIO: f64 = 1.7;
 /// Number of frames over which the differences are averaged.
 const MEAN_FRAMES: usize = 9;
-/// Quantile of those means, which strokes do not affect, and its ratio to the mean for white noise in three
-/// coordinates.
+/// Quantile of those means, unaffected by strokes, and its ratio to the mean for white noise in three coordinates.
 const QUIET_QUANTILE: f64 = 0.3;
 const QUIET_SHARE: f64 = 0.8;
 
-/// Standard deviation of the noise of one coordinate per frame, measured over `half` frames before and after it; 0 if
-/// the run is too short.
+/// Standard deviation of the noise of one coordinate per frame, over `half` frames on either side; 0 for a short run.
 fn noise_around(values: &[Vec3], half: usize) -> Vec<f64> {
     let n = values.len();
     if n < MEAN_FRAMES + 4 {

@@ -1,5 +1,4 @@
-//! Vectors, rotations, Procrustes alignment, eigenvalues, filters, medians and quantiles. Independent of bodies and
-//! files.
+//! Vectors, rotations, Procrustes alignment, eigenvalues, filters, medians, quantiles. Independent of bodies and files.
 
 pub mod cholesky;
 pub mod eigen;

@@ -11,7 +11,6 @@ pub struct Similarity {
 }
 
 impl Similarity {
-    /// Transforms a point.
     pub fn apply(&self, p: [f64; 3]) -> [f64; 3] {
         std::array::from_fn(|i| self.scale * (0..3).map(|k| self.rotation[i][k] * p[k]).sum::<f64>() + self.shift[i])
     }

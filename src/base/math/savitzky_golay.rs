@@ -13,8 +13,7 @@ pub struct SavitzkyGolay {
 }
 
 impl SavitzkyGolay {
-    /// Creates a filter with a window of `2 * half + 1` frames and a polynomial of `order`, reduced to `2 * half` if
-    /// it is larger.
+    /// Creates a filter with a window of `2 * half + 1` frames and a polynomial of `order`, at most `2 * half`.
     pub fn new(half: usize, order: usize) -> Self {
         let window = 2 * half + 1;
         let basis = orthonormal_powers(window, order);

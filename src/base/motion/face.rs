@@ -141,8 +141,7 @@ impl FacePoints {
         weights
     }
 
-    /// Residuals of the rigid face against the keypoints, both relative to their weighted mean, in units of
-    /// `POINT_METRES`.
+    /// Residuals of the rigid face and the keypoints, both relative to their weighted mean, in units of `POINT_METRES`.
     fn errors(&self, [yaw, pitch, roll, log_scale]: [f64; 4], weights: &[f64; 5]) -> [[f64; 2]; 5] {
         let (turned, scale) = (rotation([yaw, pitch, roll]), log_scale.exp());
         let offsets: [[f64; 2]; 5] = std::array::from_fn(|n| {

@@ -3,7 +3,6 @@
 use crate::math::rotation::Rotation;
 use crate::math::vec3::{Vec3, add};
 
-/// A joint of a skeleton.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Joint {
     pub name: String,
@@ -47,8 +46,7 @@ impl Skeleton {
         world
     }
 
-    /// Computes the positions of all joints from one local rotation per joint (those of ends are ignored), with the
-    /// root at `root`.
+    /// Positions of all joints from one local rotation per joint (those of ends are ignored), with the root at `root`.
     pub fn positions(&self, root: Vec3, local: &[Rotation]) -> Vec<Vec3> {
         let world = self.world(local);
         let mut positions: Vec<Vec3> = Vec::with_capacity(local.len());

@@ -1,5 +1,4 @@
-//! Body motion: bone lengths, forward kinematics, head and trunk angles, resampling, unit checks, and the lifters'
-//! inputs.
+//! Body motion: bone lengths, forward kinematics, head and trunk angles, resampling, unit checks, lifters' inputs.
 
 pub mod bones;
 pub mod exponential_map;

@@ -11,9 +11,8 @@ use ndarray::{Array2, Array3};
 const HALF_WIDTH: f64 = 8.0;
 /// Shape parameter of the Kaiser window: side lobes of -60 dB.
 const BETA: f64 = 6.0;
-/// Frequency of half amplitude, as a fraction of half the slower rate: with this kernel width, everything from half
-/// the rate on, which would alias, is below -60 dB, and frequencies below 0.62 of it (4.6 Hz at 15 frames per second)
-/// are unchanged.
+/// Frequency of half amplitude, as a fraction of half the slower rate: everything from half the rate on, which would
+/// alias, is below -60 dB, and frequencies below 0.62 of it (4.6 Hz at 15 frames per second) are unchanged.
 const CUTOFF: f64 = 0.81;
 
 /// Resamples the motion to `fps`. A joint is missing where the source's joint is missing at that time, and masked if
@@ -87,8 +86,7 @@ impl ResamplingKernel {
             sinc * bessel_0(BETA * (1.0 - (d / half).powi(2)).max(0.0).sqrt())
         };
         let mut weights: Vec<f64> = (first..=last).map(weight).collect();
-        // A linear correction of the weights, so that linear motion is reproduced exactly at any time between two
-        // frames.
+        // A linear correction of the weights: linear motion is reproduced exactly at any time between two frames.
         let moment = |weights: &[f64], power: i32| -> f64 {
             weights.iter().zip(first..).map(|(w, frame)| w * (frame as f64 - time).powi(power)).sum()
         };
@@ -127,79 +125,4 @@ fn bessel_0(x: f64) -> f64 {
         k += 1.0;
     }
     sum
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use std::f64::consts::TAU;
-
-    /// Joint 1 oscillates along x at `hz` for `secs` seconds.
-    fn swing(fps: FrameRate, secs: f64, hz: f64) -> Motion {
-        let n = (secs * fps.per_sec()).round() as usize;
-        let joints = Array3::from_shape_fn((n, N_JOINTS, 3), |(t, j, k)| {
-            if j == 1 && k == 0 { (TAU * hz * fps.secs(t)).sin() as f32 } else { 0.0 }
-        });
-        Motion::from_joints(fps, joints)
-    }
-
-    /// Maximum amplitude in the middle of the resampled motion, and maximum deviation from the original oscillation.
-    fn measured(from: (u32, u32), to: u32, hz: f64) -> (f64, f64) {
-        let motion = at_rate(&swing(FrameRate::new(from.0, from.1), 8.0, hz), FrameRate::new(to, 1));
-        let middle = motion.n_frames() / 4..motion.n_frames() * 3 / 4;
-        let value = |t: usize| f64::from(motion.joints[[t, 1, 0]]);
-        let truth = |t: usize| (TAU * hz * motion.fps.secs(t)).sin();
-        let largest = |of: &dyn Fn(usize) -> f64| middle.clone().map(of).fold(0.0, f64::max);
-        (largest(&|t| value(t).abs()), largest(&|t| (value(t) - truth(t)).abs()))
-    }
-
-    #[test]
-    fn slow_motion_is_exact_and_fast_motion_does_not_alias() {
-        for from in [(20, 1), (30, 1), (60, 1), (120, 1), (30_000, 1001)] {
-            for hz in [0.5, 2.0, 4.0] {
-                let (_, off) = measured(from, 15, hz);
-                assert!(off < 3e-3, "{from:?} {hz} Hz: off by {off}");
-            }
-        }
-        for (from, hz) in
-            [((20, 1), 9.5), ((30, 1), 10.0), ((60, 1), 8.5), ((60, 1), 12.0), ((60, 1), 14.9), ((120, 1), 30.0)]
-        {
-            let (left, _) = measured(from, 15, hz);
-            assert!(left < 3e-3, "{from:?} {hz} Hz: {left} is left");
-        }
-        let (_, off) = measured((10, 1), 15, 2.0);
-        assert!(off < 3e-3, "upwards: {off}");
-    }
-
-    #[test]
-    fn linear_motion_is_exact_up_to_its_ends_and_of_equal_duration() {
-        for (from, n, to, expected) in
-            [(60, 241, 15, 61), (30, 60, 15, 30), (20, 40, 15, 30), (15, 33, 15, 33), (30, 1, 15, 1)]
-        {
-            let fps = FrameRate::new(from, 1);
-            let joints =
-                Array3::from_shape_fn((n, N_JOINTS, 3), |(t, j, k)| (fps.secs(t) * j as f64 + k as f64) as f32);
-            let moved = at_rate(&Motion::from_joints(fps, joints), FrameRate::new(to, 1));
-            assert_eq!(moved.n_frames(), expected, "{from} to {to}");
-            for ((t, j, k), &v) in moved.joints.indexed_iter() {
-                let truth = moved.fps.secs(t) * j as f64 + k as f64;
-                assert!((f64::from(v) - truth).abs() < 1e-6 * truth.max(1.0), "{from} to {to}, frame {t}: {v} {truth}");
-            }
-        }
-    }
-
-    #[test]
-    fn a_gap_remains_a_gap_and_does_not_affect_other_frames() {
-        let mut motion = swing(FrameRate::new(60, 1), 4.0, 1.0);
-        motion.joints.slice_mut(ndarray::s![100..140, 2, ..]).fill(f32::NAN);
-        motion.mask.slice_mut(ndarray::s![100..140, 2]).fill(false);
-        motion.mask.slice_mut(ndarray::s![8..13, 3]).fill(false);
-        let moved = at_rate(&motion, FrameRate::new(15, 1));
-        for t in 0..moved.n_frames() {
-            assert_eq!(moved.joints[[t, 2, 0]].is_nan(), (25..35).contains(&t), "frame {t}");
-            assert_eq!(moved.mask[[t, 2]], !(25..35).contains(&t));
-            assert_eq!(moved.mask[[t, 3]], !(2..4).contains(&t), "frame {t}");
-            assert!(moved.joints[[t, 1, 0]].is_finite() && moved.mask[[t, 1]]);
-        }
-    }
 }

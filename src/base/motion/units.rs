@@ -1,5 +1,4 @@
-//! Detection of the unit and the vertical direction of joints from the arms: upper arm and forearm of a person are 0.1
-//! to 0.6 m long.
+//! Unit and vertical direction of joints from the arms: upper arm and forearm of a person are 0.1 to 0.6 m long.
 
 use crate::math::order;
 use crate::types::pose3d::Motion;
@@ -23,8 +22,7 @@ const UNITS: [(&str, f32); 8] = [
 const ADULT: f32 = 0.27;
 const PLAUSIBLE: RangeInclusive<f32> = 0.1..=0.6;
 const ACCEPTED: RangeInclusive<f32> = 0.05..=0.8;
-/// Fraction of the frames with the arms above the neck from which y is assumed to point up, and the minimum number of
-/// frames.
+/// Fraction of the frames with the arms above the neck at which y seems to point up, and the minimum number of frames.
 const UPSIDE_DOWN: f64 = 0.98;
 const MIN_FRAMES: usize = 15;
 
@@ -66,60 +64,4 @@ pub fn is_upside_down(motion: &Motion) -> bool {
         }
     }
     n[0] >= MIN_FRAMES && n[1] as f64 >= UPSIDE_DOWN * n[0] as f64
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::types::skeleton::{L_SHOULDER, N_JOINTS, R_SHOULDER};
-    use crate::types::time::FrameRate;
-    use ndarray::Array3;
-
-    /// Arms hanging down, upper arm 0.29, forearm 0.25.
-    fn standing(n_frames: usize) -> Motion {
-        let mut joints = Array3::zeros((n_frames, N_JOINTS, 3));
-        for (side, [shoulder, elbow, wrist]) in
-            [(1.0, [L_SHOULDER, L_ELBOW, L_WRIST]), (-1.0, [R_SHOULDER, R_ELBOW, R_WRIST])]
-        {
-            for (joint, y) in [(shoulder, 0.02), (elbow, 0.31), (wrist, 0.56)] {
-                joints.slice_mut(ndarray::s![.., joint, 0]).fill(0.18f32 * side);
-                joints.slice_mut(ndarray::s![.., joint, 1]).fill(y);
-            }
-        }
-        Motion::from_joints(FrameRate::new(15, 1), joints)
-    }
-
-    #[test]
-    fn an_implausible_unit_is_named_with_its_factor() {
-        let motion = standing(20);
-        let times = |by: f32| Motion { joints: &motion.joints * by, ..motion.clone() };
-        for by in [0.5, 1.0, 1.6] {
-            check(&times(by)).unwrap();
-        }
-        for (by, unit, metres) in [
-            (1000.0, "millimetres", "0.001"),
-            (100.0, "centimetres", "0.01"),
-            (10.0, "decimetres", "0.1"),
-            (39.37, "inches", "0.0254"),
-            (3.2808, "feet", "0.3048"),
-            (0.1, "metres divided by 10", "10"),
-            (0.001, "metres divided by 1000", "1000"),
-        ] {
-            let text = check(&times(by)).unwrap_err().to_string();
-            let advice = format!("seems to be in {unit}; multiply every coordinate by {metres}");
-            assert!(text.ends_with(&advice), "{by}: {text}");
-        }
-        assert!(check(&times(1e6)).unwrap_err().to_string().contains("every known unit"));
-        check(&Motion { joints: &motion.joints * f32::NAN, ..motion }).unwrap();
-    }
-
-    #[test]
-    fn only_arms_above_the_neck_throughout_are_upside_down() {
-        let turned = |motion: Motion| Motion { joints: &motion.joints * -1.0, ..motion };
-        assert!(is_upside_down(&turned(standing(20))));
-        assert!(!is_upside_down(&standing(20)) && !is_upside_down(&turned(standing(10))));
-        let mut raised = turned(standing(100));
-        raised.joints.slice_mut(ndarray::s![..3, R_WRIST, 1]).fill(0.1);
-        assert!(!is_upside_down(&raised));
-    }
 }

@@ -41,8 +41,7 @@ pub type BodyPoints = [Option<[f32; 2]>; N_POINTS];
 /// vectors in camera axes; `None`: not known.
 pub type HandDirections = [Option<[f32; 3]>; 2];
 
-/// Size in metres, in the sense of `size`, to which every body is scaled, because a picture does not show a person's
-/// size.
+/// Size in metres, in the sense of `size`, to which every body is scaled: a picture does not show a person's size.
 pub const REFERENCE_SIZE: f64 = 0.90;
 
 /// Sum of the shoulder width, the mean upper arm length and the mean forearm length.

@@ -1,4 +1,4 @@
-//! Names of the five stages and of every file that they write. No other file of the crate contains these names.
+//! Names of the six stages and of every file that they write. No other file of the crate contains these names.
 
 use super::Unit;
 use anyhow::bail;
@@ -19,15 +19,18 @@ pub enum StageName {
     Segment,
     /// 2D keypoints to 3D joints.
     Lift,
+    /// Audio to words with times, for speakers with `transcripts = "auto"`.
+    Transcribe,
     /// All videos of a speaker to one dataset.
     Dataset,
 }
 
 impl StageName {
     /// All stages, in order.
-    pub const ALL: [Self; 5] = [Self::Extract, Self::Pose2d, Self::Segment, Self::Lift, Self::Dataset];
+    pub const ALL: [Self; 6] =
+        [Self::Extract, Self::Pose2d, Self::Segment, Self::Lift, Self::Transcribe, Self::Dataset];
     /// Stages that process one video at a time, in order.
-    pub const OF_VIDEOS: [Self; 4] = [Self::Extract, Self::Pose2d, Self::Segment, Self::Lift];
+    pub const OF_VIDEOS: [Self; 5] = [Self::Extract, Self::Pose2d, Self::Segment, Self::Lift, Self::Transcribe];
 
     /// Stage name: an argument of `--from`, and the stage's folder in the work folder.
     pub const fn as_str(self) -> &'static str {
@@ -36,6 +39,7 @@ impl StageName {
             Self::Pose2d => "pose2d",
             Self::Segment => "segment",
             Self::Lift => "lift",
+            Self::Transcribe => "transcribe",
             Self::Dataset => "dataset",
         }
     }
@@ -44,7 +48,7 @@ impl StageName {
     pub const fn former(self) -> Option<&'static str> {
         match self {
             Self::Dataset => Some("shard"),
-            Self::Extract | Self::Pose2d | Self::Segment | Self::Lift => None,
+            Self::Extract | Self::Pose2d | Self::Segment | Self::Lift | Self::Transcribe => None,
         }
     }
 }
@@ -94,10 +98,11 @@ pub enum Artifact {
     BoneChange,
     LiftIntervals,
     LiftLedger,
+    /// Recognised words, a transcript on the clock of the video file.
+    Words,
 }
 
 impl Artifact {
-    /// Stage that writes the file.
     pub const fn stage(self) -> StageName {
         match self {
             Self::Sound | Self::Timeline | Self::MediaInfo | Self::Frames => StageName::Extract,
@@ -106,6 +111,7 @@ impl Artifact {
             Self::Joints | Self::Bones | Self::Camera | Self::BoneChange | Self::LiftIntervals | Self::LiftLedger => {
                 StageName::Lift
             }
+            Self::Words => StageName::Transcribe,
         }
     }
 
@@ -128,6 +134,7 @@ impl Artifact {
             Self::Bones => "bones.json",
             Self::Camera => "camera.json",
             Self::BoneChange => "bone_change.npz",
+            Self::Words => "words.json",
         }
     }
 
@@ -177,8 +184,6 @@ mod tests {
             assert_eq!(stage.as_str().parse::<StageName>().unwrap(), stage);
         }
         assert_eq!("shard".parse::<StageName>().unwrap(), StageName::Dataset);
-        assert!(
-            "lit".parse::<StageName>().unwrap_err().to_string().contains("extract, pose2d, segment, lift, dataset")
-        );
+        assert!("lit".parse::<StageName>().unwrap_err().to_string().contains("segment, lift, transcribe, dataset"));
     }
 }

@@ -29,8 +29,7 @@ pub fn attempt(
     let finish = || -> Result<Report> {
         let report = work(&attempt).map_err(workdir::full_disk)?;
         let outputs = Output::list(&attempt)?;
-        // Removed first: if the program is killed before it writes the new record, the old one must not describe new
-        // files.
+        // Removed first: if the program dies before it writes the new record, the old one must not describe new files.
         Record::forget(folder)?;
         match common {
             Some(common) => workdir::move_files(&attempt, common, outputs.iter().map(|output| output.file.as_str()))?,

@@ -154,8 +154,7 @@ fn files_in(folder: &Path) -> Result<Vec<PathBuf>> {
     Ok(files)
 }
 
-/// Returns the BLAKE3 of a file's content in hex, read in chunks; for a folder, the hash of its file names and file
-/// hashes.
+/// BLAKE3 of a file's content in hex, read in chunks; for a folder, the hash of its file names and file hashes.
 pub fn hash_file(path: &Path) -> Result<String> {
     if path.is_dir() {
         let mut hasher = blake3::Hasher::new();

@@ -1,6 +1,5 @@
-//! The ledger of a video's seconds: every second is either accepted, rejected (with a reason and a measured value), or
-//! belongs to a stage that failed. `segment` writes it and `lift` moves seconds from accepted to rejected; later stages
-//! only sum them.
+//! The ledger of a video's seconds: every second is accepted, rejected (with a reason and a measured value), or is of a
+//! failed stage. `segment` writes it and `lift` moves seconds from accepted to rejected; later stages only sum them.
 
 use super::rejection::{FrameRejection, Rejection};
 use crate::input;
@@ -138,7 +137,6 @@ impl Ledger {
         Ok(ledger)
     }
 
-    /// Accepted seconds.
     pub fn accepted_secs(&self) -> f64 {
         self.accepted.iter().map(|accepted| accepted.end_secs - accepted.start_secs).sum()
     }
@@ -159,7 +157,6 @@ impl Ledger {
         self
     }
 
-    /// Rejected seconds by reason.
     pub fn rejected_secs(&self) -> BTreeMap<String, f64> {
         let mut secs = BTreeMap::new();
         for rejected in &self.rejected {
@@ -168,7 +165,6 @@ impl Ledger {
         secs
     }
 
-    /// Seconds of stages that failed.
     pub fn failed_secs(&self) -> f64 {
         self.failed.iter().map(|failed| failed.end_secs - failed.start_secs).sum()
     }

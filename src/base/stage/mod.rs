@@ -1,5 +1,5 @@
 //! How stages run, are recorded, and resume: a step is a `Stage`, its work item is a `Unit`, and finished work is
-//! documented by a `record::Record`, which is written last. `artifacts` names the five stages and their files.
+//! documented by a `record::Record`, which is written last. `artifacts` names the six stages and their files.
 
 pub mod artifacts;
 pub mod attempt;

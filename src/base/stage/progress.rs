@@ -3,15 +3,12 @@
 /// Number of steps of a task that reports fractions of its total: 100 steps are 0.01 %.
 pub const PARTS: u64 = 1_000_000;
 
-/// Receiver of progress reports.
 pub trait Progress: Send + Sync {
-    /// Begins a task of `total` steps (0: unknown length; `PARTS`: the task reports fractions). Dropping the task ends
-    /// it.
+    /// Begins a task of `total` steps (0: unknown; `PARTS`: the task reports fractions). Dropping the task ends it.
     fn begin(&self, label: &str, total: u64) -> Box<dyn Task + '_>;
     /// Shows a line during the work (a warning, a milestone).
     fn say(&self, line: &str);
-    /// Returns whether the user has requested a stop; work that can resume later then ends at the next resumable
-    /// point.
+    /// Returns whether the user has requested a stop; work that can resume later then ends at the next resumable point.
     fn is_to_stop(&self) -> bool {
         false
     }
@@ -57,7 +54,6 @@ impl Event<'_> {
     }
 }
 
-/// A task in progress.
 pub trait Task: Send + Sync {
     /// Counts `steps` more steps as done.
     fn advance(&self, steps: u64);

@@ -103,8 +103,7 @@ impl Record {
         workdir::remove_file(&record_path(folder))
     }
 
-    /// Returns why the unit in `folder` is not up to date for the fingerprint `now`; `None`: it is. Outputs are
-    /// compared by size only.
+    /// Why the unit in `folder` is not up to date for fingerprint `now`; `None`: it is. Outputs are compared by size.
     pub fn dirty(&self, now: &Fingerprint, folder: &Path) -> Option<DirtyReason> {
         difference(&self.fingerprint, now).or_else(|| self.outputs.iter().find_map(|output| output.missing(folder)))
     }

@@ -104,8 +104,7 @@ impl Rejection {
         Self::ALL.iter().find(|known| known.reason() == reason).map_or(reason, |known| known.texts()[1])
     }
 
-    /// Unit of the measured value and the threshold. Empty for scores and fractions (0 to 1) and for correlations (-1
-    /// to 1).
+    /// Unit of measured value and threshold. Empty for scores and fractions (0 to 1) and for correlations (-1 to 1).
     pub const fn unit(self) -> &'static str {
         self.texts()[2]
     }

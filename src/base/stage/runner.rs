@@ -70,9 +70,8 @@ pub fn run(
 }
 
 /// Runs `stages` in sequence for every unit on `jobs` workers (at least one). No stage waits until all units have
-/// finished the stage before it, and the largest units start first, so that the workers finish at about the same time.
-/// Stages after a failure are not run for that unit: its outcomes, one per stage, end with the failure. The units are
-/// in the order of `units`.
+/// finished the stage before it, and the largest units start first, so that all workers finish together. Stages after a
+/// failure are not run for that unit: its outcomes, one per stage, end with it. Units are in the order of `units`.
 pub fn run_stages(
     stages: &[&dyn Stage],
     units: &[Unit],
@@ -123,8 +122,7 @@ pub fn run_stages(
     answers.map(completed).collect()
 }
 
-/// Runs share `idx` of `of` of the unit's parts, except finished ones. Does nothing if the unit has no parts or is up
-/// to date.
+/// Runs share `idx` of `of` of the unit's unfinished parts. Does nothing if the unit has no parts or is up to date.
 ///
 /// # Errors
 /// An input cannot be read; the first error of a part.
@@ -221,8 +219,7 @@ fn run_unit<'a>(
 
 fn failed(folder: &Path, fingerprint: Option<Fingerprint>, error: anyhow::Error) -> StageOutcome {
     if !error.is::<ClaimLost>() {
-        // The failure is reported in any case; if even this file cannot be written, the work folder itself is
-        // unusable.
+        // The failure is reported in any case; if even this file cannot be written, the work folder itself is unusable.
         let _ = Failure { fingerprint, error: format!("{error:#}") }.write(folder);
     }
     StageOutcome::Failed(Arc::new(error))

@@ -66,15 +66,13 @@ pub trait Stage: Sync {
     fn common_folder(&self) -> Option<&Path> {
         None
     }
-    /// Whether other programs read the unit's folder for a long time, so that the stage must lock it before replacing
-    /// it.
+    /// Whether other programs read the unit's folder for a long time, so that it is locked before it is replaced.
     fn needs_folder_lock(&self) -> bool {
         false
     }
     /// Processes the unit: writes its files into the empty folder `out` and nowhere else.
     fn run(&self, unit: &Unit, out: &Path, progress: &dyn Progress) -> anyhow::Result<Report>;
-    /// Number of parts of the work on `unit`. Parts can run in any order and in any process; `join` then gives the
-    /// same bytes as `run`.
+    /// Number of parts of `unit`. Parts can run in any order and process; `join` then gives the same bytes as `run`.
     fn n_parts(&self, _unit: &Unit) -> anyhow::Result<usize> {
         Ok(1)
     }

@@ -20,7 +20,6 @@ pub struct FileName(String);
 pub struct FileNameError(String);
 
 impl FileName {
-    /// Checks a name.
     pub fn new(name: impl Into<String>) -> Result<Self, FileNameError> {
         let name = name.into();
         let is_plain = (1..=MAX_BYTES).contains(&name.len())

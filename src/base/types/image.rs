@@ -55,13 +55,11 @@ pub struct PixelArea {
     pub height: usize,
 }
 
-/// Options for reading the pictures of a video.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct PictureOptions {
     /// Deinterlace: one field of a frame is kept, the other is interpolated where the two fields differ.
     pub deinterlace: bool,
-    /// Flip the picture horizontally.
     pub mirrored: bool,
 }
 

@@ -4,13 +4,11 @@ use super::time::FrameRate;
 use ndarray::Array3;
 use serde::{Deserialize, Serialize};
 
-/// Number of body keypoints, COCO-17: nose, left/right eye, ear, shoulder, elbow, wrist, hip, knee, ankle (odd =
-/// left).
+/// Number of body keypoints, COCO-17: nose, left/right eye, ear, shoulder, elbow, wrist, hip, knee, ankle (odd = left).
 pub const N_BODY: usize = 17;
 /// Number of hand keypoints: wrist, then thumb, index, middle, ring, little finger, each from base to tip.
 pub const N_HAND: usize = 21;
 
-/// Minimum score of a visible keypoint.
 pub const VISIBLE_SCORE: f32 = 0.3;
 /// Minimum score of a visible hand keypoint for the hand lifter.
 pub const HAND_VISIBLE_SCORE: f32 = 0.2;
@@ -54,23 +52,18 @@ pub struct PersonBox {
 /// Tracked person and keypoints of one frame. Keypoints of a missing hand or body are all zeros.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Pose2d {
-    /// Bounding box of the tracked person.
     pub person: PersonBox,
-    /// Number of persons in the picture.
     pub n_persons: u8,
     /// Track id of the tracked person.
     pub identity: i64,
     /// Body keypoints, COCO-17.
     pub body: [Keypoint; N_BODY],
-    /// The speaker's left hand.
     pub left_hand: [Keypoint; N_HAND],
-    /// The speaker's right hand.
     pub right_hand: [Keypoint; N_HAND],
     /// Depth of the points of the [left, right] hand relative to the wrist, in px, away from the camera; `None` for a
     /// missing hand and for hand models without depth.
     pub hand_depth: [Option<[f32; N_HAND]>; 2],
-    /// Whether the detector found the opposite hand in the search regions of the [left, right] hand, which then counts
-    /// as missing.
+    /// Whether the opposite hand was found in the search regions of the [left, right] hand, which is then missing.
     pub other_hand: [bool; 2],
     /// The speaker's face, if it is large enough in the picture.
     pub face: Option<FaceMeasurement>,
@@ -104,7 +97,6 @@ impl Pose2d {
 /// Keypoints of a complete video at the dataset rate; last axis: x px, y px, score; score 0 means missing.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Keypoints {
-    /// The dataset rate.
     pub fps: FrameRate,
     /// Width and height of the upright picture in px.
     pub image_size: [u32; 2],
@@ -120,7 +112,6 @@ pub struct Keypoints {
 }
 
 impl Keypoints {
-    /// Number of frames T.
     pub fn n_frames(&self) -> usize {
         self.body.shape()[0]
     }

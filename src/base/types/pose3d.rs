@@ -8,7 +8,6 @@ use ndarray::{Array2, Array3};
 /// neck is the origin of every frame.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Motion {
-    /// Frame rate.
     pub fps: FrameRate,
     /// [T, 49, 3]; a missing joint is NaN.
     pub joints: Array3<f32>,
@@ -65,7 +64,6 @@ impl Motion {
         Ok(self)
     }
 
-    /// Number of frames T.
     pub fn n_frames(&self) -> usize {
         self.joints.shape()[0]
     }

@@ -19,9 +19,7 @@ pub struct Posture {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum PostureChannel {
-    /// Head angles.
     Head,
-    /// Trunk angles.
     Trunk,
 }
 

@@ -3,7 +3,6 @@
 //! OpenPose / MediaPipe order). The authors' text files list each finger from the tip; `swap_authors_order` converts
 //! between the two orders and is its own inverse.
 
-/// Number of joints of the skeleton.
 pub const N_JOINTS: usize = 49;
 /// Number of joints of a hand, including its root, which duplicates the wrist.
 pub const N_HAND_JOINTS: usize = 21;

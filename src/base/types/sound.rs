@@ -26,7 +26,6 @@ pub struct Sound {
 }
 
 impl Sound {
-    /// Length in seconds.
     pub fn secs(&self) -> f64 {
         self.samples.len() as f64 / f64::from(self.rate.max(1))
     }
@@ -82,8 +81,7 @@ impl fmt::Display for SoundOffset {
     }
 }
 
-/// Returns the first sample of frame `frame_idx`: `round(frame_idx / fps * rate)`, halves rounded up, in integer
-/// arithmetic.
+/// First sample of frame `frame_idx`: `round(frame_idx / fps * rate)`, halves rounded up, in integer arithmetic.
 pub fn sample_at(fps: FrameRate, rate: u32, frame_idx: usize) -> usize {
     let (num, den) = (u128::from(fps.num.max(1)), u128::from(fps.den));
     ((2 * frame_idx as u128 * den * u128::from(rate) + num) / (2 * num)) as usize

@@ -6,7 +6,6 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Split {
-    /// Training data.
     Train,
     /// Data that selects the best checkpoint.
     Validation,
@@ -15,7 +14,6 @@ pub enum Split {
 }
 
 impl Split {
-    /// All splits.
     pub const ALL: [Split; 3] = [Split::Train, Split::Validation, Split::Test];
 
     /// Name in file names, JSON and the configuration.
@@ -33,7 +31,6 @@ impl Split {
 pub struct TimeBlock {
     /// Split of the block; `None`: omitted, because another split contains the same sound.
     pub split: Option<Split>,
-    /// Start in seconds.
     pub start_secs: f64,
     /// End in seconds, exclusive.
     pub end_secs: f64,
@@ -45,7 +42,6 @@ impl TimeBlock {
         Self { split: Some(split), start_secs: 0.0, end_secs: f64::MAX }
     }
 
-    /// Duration in seconds.
     pub fn secs(&self) -> f64 {
         self.end_secs - self.start_secs
     }

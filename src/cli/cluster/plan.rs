@@ -127,9 +127,9 @@ fn prediction_lines(times: &StageTimes, lengths: &[f64]) -> Vec<String> {
     let total_secs: f64 = lengths.iter().sum();
     let stage = |stage: StageName| {
         let gib = times.cost(stage).bytes_per_sec * total_secs / f64::from(1 << 30);
-        format!("{stage:9}{:>10} of processing{gib:8.2} GiB of files", duration(times.stage_secs(stage, lengths)))
+        format!("{stage:10}{:>10} of processing{gib:8.2} GiB of files", duration(times.stage_secs(stage, lengths)))
     };
-    let mut lines: Vec<String> = StageName::ALL.map(stage).into();
+    let mut lines: Vec<String> = times.timed_stages().map(stage).collect();
     let StageTimes { excerpt_secs, jobs, processor, .. } = times;
     let excerpts = counted(times.n_excerpts, "excerpt");
     lines.push(format!("timed on {excerpts} of {excerpt_secs:.0} s in total, {jobs} in parallel, {processor}"));
@@ -143,7 +143,7 @@ fn stages(times: &StageTimes, lengths: &[f64]) -> Value {
         let bytes = times.cost(stage).bytes_per_sec * total_secs;
         (stage.to_string(), json!({ "work_secs": times.stage_secs(stage, lengths), "bytes": bytes }))
     };
-    StageName::ALL.map(stage).into_iter().collect::<serde_json::Map<String, Value>>().into()
+    times.timed_stages().map(stage).collect::<serde_json::Map<String, Value>>().into()
 }
 
 /// Prints the progress of the workers of a plan: `orator status --plan`.

@@ -1,6 +1,8 @@
-//! Verbs for datasets: `dataset`, `import`, `forget`, `align`.
+//! Verbs for datasets: `dataset`, `import`, `forget`, `transcribe`, `align`.
 
 pub mod align;
+mod aligned_text;
 pub mod forget;
 pub mod import;
+pub mod transcribe;
 pub mod verify;

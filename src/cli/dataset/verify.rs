@@ -114,6 +114,9 @@ fn info(dir: &std::path::Path, ui: &Ui) -> Result<Outcome> {
     }
     let footage = &stats.footage;
     lines.push(format!("accepted {} of {} of video", length(footage.accepted_secs), length(footage.secs)));
+    let words =
+        footage.words.map(|words| format!("{} of {} in samples", words.n_accepted, counted(words.n_words, "word")));
+    lines.extend(words);
     lines.extend(
         footage
             .rejected_secs

@@ -14,7 +14,7 @@ use orator_gesture::batch::speech::{SegmentFacts, SpeechSource};
 use orator_gesture::batch::{SpeechBatch, motion_files, sounds, transcripts};
 use orator_gesture::generate::model::GenerationChoice;
 use orator_gesture::generate::model::{checkpoint_file, model_lock};
-use orator_gesture::generate::seq2seq::metadata::is_sequence;
+use orator_gesture::generate::seq2seq::metadata::reads_transcript;
 use orator_gesture::generate::trained::TrainedSpeaker;
 use orator_nn::seq2seq::predict::StateAtSeams;
 use serde_json::json;
@@ -213,8 +213,8 @@ fn batch(args: Args) -> Result<SpeechBatch> {
         (None, None) => bail!("give --audio, --audio-folder or --batch"),
     };
     if let (Some(_), Some(checkpoint)) = (&args.transcript, &args.checkpoint) {
-        let is_sequence = is_sequence(&checkpoint_file(checkpoint)?)?;
-        ensure!(is_sequence, "{} does not use words; omit --transcript", checkpoint.display());
+        let is_used = reads_transcript(&checkpoint_file(checkpoint)?)?;
+        ensure!(is_used, "{} does not use words; omit --transcript", checkpoint.display());
     }
     transcripts::find(&mut sounds, args.transcript.as_deref())?;
     let figure = args.figure.options();

@@ -17,10 +17,11 @@ use orator_cluster::plan::ClusterPlan;
 use orator_pipeline::{Pipeline, Selection, UnitFailure};
 use serde_json::json;
 
-/// Run the pipeline: extract, pose2d, segment, lift, dataset.
+/// Run the pipeline: extract, pose2d, segment, lift, transcribe, dataset.
 ///
-/// Every stage runs for every video of every speaker. Stages that are up to date are skipped, so an interrupted run
-/// continues when the same command is given again. A failed video is reported, and the others are still processed.
+/// Every stage runs for every video of every speaker; `transcribe` only for speakers with `transcripts = "auto"`. Stages
+/// that are up to date are skipped, so an interrupted run continues when the same command is given again. A failed video
+/// is reported, and the others are still processed.
 ///
 /// With --train, a GAN is then trained for each speaker with the settings of `[gan]`, as by `orator train gan --all`,
 /// and evaluated on a held-out part: gan/SPEAKER/result.html in the work folder has a film of generated beside true

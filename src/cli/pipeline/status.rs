@@ -12,6 +12,7 @@ use orator_base::stage::ledger::longest_first;
 use orator_base::text::counted;
 use orator_pipeline::{ModelStatus, Pipeline, StagePlan, StaleResult, StatusReport, TimeBudget, UnitState, UnitStatus};
 use serde_json::json;
+use std::collections::BTreeSet;
 use std::path::PathBuf;
 
 /// Maximum number of reasons shown for a stage; `--json` lists all.
@@ -88,13 +89,16 @@ fn text(report: &StatusReport, why: bool) -> String {
     let rows: Vec<&[&UnitStatus]> = units.chunk_by(|a, b| a.unit == b.unit).collect();
     let names = units.iter().map(|unit| &unit.unit).chain(report.time_budget.iter().map(|account| &account.unit));
     let width = names.map(|name| name.chars().count()).max().unwrap_or(0).max("seconds".len());
-    let row = |name: &str, words: [String; StageName::ALL.len()]| {
-        format!("{name:width$} {}", words.map(|word| format!("{word:10}")).join(" ")).trim_end().to_owned()
+    let stages: BTreeSet<StageName> = units.iter().map(|unit| unit.stage).collect();
+    let row = |name: &str, word: &dyn Fn(&StageName) -> String| {
+        let words: Vec<String> = stages.iter().map(|stage| format!("{:10}", word(stage))).collect();
+        format!("{name:width$} {}", words.join(" ")).trim_end().to_owned()
     };
-    let mut lines = vec![row("", StageName::ALL.map(|stage| stage.to_string()))];
+    let mut lines = vec![row("", &StageName::to_string)];
     for of_unit in rows {
-        let word = |stage| of_unit.iter().find(|unit| unit.stage == stage).map(|unit| unit.state.to_string());
-        lines.push(row(&of_unit[0].unit, StageName::ALL.map(|stage| word(stage).unwrap_or_default())));
+        let state = |stage: &StageName| of_unit.iter().find(|unit| unit.stage == *stage).map(|unit| unit.state);
+        let word = |stage: &StageName| state(stage).map(|state| state.to_string()).unwrap_or_default();
+        lines.push(row(&of_unit[0].unit, &word));
     }
     let headings = ["accepted", "rejected", "failed", "waiting", "duration"].map(|name| format!("{name:>9}")).join("");
     lines.extend([String::new(), format!("{:width$}{headings}  rejected for", "seconds")]);

@@ -14,7 +14,7 @@ use orator_media::aligner::Aligner;
 use orator_onnx::{ModelStore, Runtime};
 use orator_pipeline::pose2d::models;
 use orator_pipeline::process::probe;
-use orator_pipeline::segment::speech_rule::SpeechDetector;
+use orator_pipeline::speech::speech_rule::SpeechDetector;
 use serde_json::json;
 use std::path::{Path, PathBuf};
 
@@ -51,6 +51,7 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
             checks.push(ok("configuration", config.file.display().to_string()));
             checks.extend(model_checks(&config.settings));
             checks.extend(word_checks(&config.settings.models.dir));
+            checks.extend(recogniser(&config.settings));
             checks.push(work(&config.settings.work.dir));
             checks.push(sandbox(config.settings.work.sandbox));
             checks.push(aligner());
@@ -149,6 +150,15 @@ fn model_checks(settings: &Settings) -> Vec<Check> {
         Err(error) => checks.push(missing("speech model", format!("{error:#}"), "orator models fetch")),
     }
     checks
+}
+
+/// The speech recogniser. Only `orator transcribe` needs it, so nothing counts as missing without it.
+fn recogniser(settings: &Settings) -> Option<Check> {
+    let store = ModelStore::open(&settings.models.dir).ok()?;
+    Some(match store.recogniser(settings.transcribe.model_id()) {
+        Ok(folder) => ok("speech recogniser", folder.display().to_string()),
+        Err(error) => Check { is_full: false, ..ok("speech recogniser", format!("none: {error:#}")) },
+    })
 }
 
 /// Tables of word vectors. Without a table, word embeddings are initialised randomly, so nothing counts as missing.

@@ -1,4 +1,4 @@
-//! `orator models`: lists, fetches, registers and checks ONNX models.
+//! `orator models`: lists, fetches, registers and checks models.
 
 use crate::cli::Outcome;
 use crate::cli::ui::Ui;
@@ -9,11 +9,12 @@ use orator_dataset::config::{self, Settings};
 use orator_onnx::{Fetched, MANIFEST_FILE, ModelEntry, ModelError, ModelOrigin, ModelRequest, ModelState, ModelStore};
 use orator_onnx::{Runtime, find_library};
 use orator_pipeline::pose2d::models;
-use orator_pipeline::segment::speech_rule::SpeechDetector;
+use orator_pipeline::speech::speech_rule::SpeechDetector;
+use orator_pipeline::transcribe::TranscribeStage;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 
-/// List, fetch, add and check ONNX models.
+/// List, fetch, add and check models: ONNX, and Whisper for `orator transcribe`.
 #[derive(clap::Args)]
 pub struct Args {
     #[command(subcommand)]
@@ -112,10 +113,14 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
             let runtime = runtime()?;
             let lines = store.entries(ids)?.into_iter().map(|entry| {
                 let required = !ids.is_empty() || chosen.contains(&entry.id);
-                match store.check(&runtime, entry) {
-                    Ok(_) => {
-                        ModelLine::new(entry, "valid", true, "valid: content hash, tensor names and shapes".to_owned())
-                    }
+                let (checked, valid) = if entry.files.is_empty() {
+                    let opened = store.check(&runtime, entry).map(drop);
+                    (opened, "valid: content hash, tensor names and shapes")
+                } else {
+                    (store.check_folder(entry), "valid: content hashes")
+                };
+                match checked {
+                    Ok(()) => ModelLine::new(entry, "valid", true, valid.to_owned()),
                     Err(ModelError::Missing { .. }) if !required => ModelLine {
                         is_failure: false,
                         ..ModelLine::new(entry, "valid", false, "missing (not selected)".to_owned())
@@ -130,7 +135,9 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
 
 /// Models that the settings require.
 fn required(settings: &Settings) -> Vec<ModelRequest> {
-    models::required_models(&settings.pose2d).into_iter().chain(SpeechDetector::required_models(settings)).collect()
+    let speech =
+        SpeechDetector::required_models(settings).into_iter().chain(TranscribeStage::required_models(settings));
+    models::required_models(&settings.pose2d).into_iter().chain(speech).collect()
 }
 
 /// Calls `work`; if a model is missing and the user accepts the licences, fetches the models and calls it again.
@@ -240,7 +247,7 @@ fn list(store: &ModelStore, chosen: &[String], ui: &Ui) -> Result<Outcome> {
         let ModelOrigin { repository, commit, path, licence, note } = &entry.origin;
         let role = format!("{:?}", entry.role).to_lowercase();
         text += &format!(
-            "\n{mark} {:<26} {role:<7} {state:<13} {:5.1} MB  {}\n",
+            "\n{mark} {:<26} {role:<10} {state:<13} {:5.1} MB  {}\n",
             entry.id,
             entry.bytes as f64 / 1e6,
             entry.file

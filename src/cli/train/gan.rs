@@ -8,6 +8,7 @@ use anyhow::Result;
 use orator_base::text::counted;
 use orator_dataset::Dataset;
 use orator_dataset::config::Config;
+use orator_formats::word_vectors::WordVectors;
 use orator_gesture::evaluate::baseline::predictor;
 use orator_gesture::evaluate::clips::held_out;
 use orator_gesture::evaluate::clips::held_out::HeldOutInterval;
@@ -49,6 +50,9 @@ pub struct Args {
     /// and skeleton are those of the new speaker. Ignored when a training resumes.
     #[arg(long, value_name = "FILE|DIR")]
     from: Option<PathBuf>,
+    /// Table of word vectors that initialise the word embeddings of `gan.words`.
+    #[arg(long, value_name = "FILE")]
+    words: Option<PathBuf>,
     /// Folder of the checkpoints; defaults to gan/SPEAKER in the work folder.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
@@ -69,7 +73,8 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
 /// Trains the model of a configured speaker on its dataset, in `gan/SPEAKER` of the work folder.
 pub fn train_speaker(config: &Config, speaker: &str, ui: &Ui) -> Result<TrainedModel> {
     let none = ConfigArgs { config: config.file.clone(), set: Vec::new() };
-    let args = Args { config: none, speaker: None, all: true, steps: None, from: None, out: None, dataset: Vec::new() };
+    let (from, words, out, dataset) = (None, None, None, Vec::new());
+    let args = Args { config: none, speaker: None, all: true, steps: None, from, words, out, dataset };
     train_one(&args, Some(&speaker.to_owned()), config, ui)
 }
 
@@ -104,7 +109,8 @@ fn train_one(args: &Args, speaker: Option<&String>, config: &Config, ui: &Ui) ->
     };
     let mut page = TrainingPage::new(&out, names.clone(), Box::new(poses), ui);
     let validated = &mut |at| page.update(at);
-    let outcome = train::train_with_callback(&datasets, &settings, args.from.as_deref(), &out, ui, validated)?;
+    let (from, vectors) = (args.from.as_deref(), args.words.as_deref().map(WordVectors::open).transpose()?);
+    let outcome = train::train_with_callback(&datasets, &settings, from, vectors.as_ref(), &out, ui, validated)?;
     let (speed, steps_per_sec) = speed(outcome.began_at, outcome.steps, start.elapsed().as_secs_f64());
     let page = page.finish(ValidatedStep { step: outcome.steps, best_step: outcome.best_step });
     let text = format!(
@@ -183,8 +189,8 @@ fn pairs(dataset: &Dataset, speaker: &GestureGenerator, n_speakers: usize) -> Re
     let intervals = held_out::read(dataset, &samples, &speaker.metadata.normalisation)?;
     let pair = |interval: HeldOutInterval| {
         let frames = middle(interval.ground_truth.n_frames(), speaker.fps());
-        let HeldOutInterval { key, ground_truth, sound, .. } = interval.cut(frames.clone());
-        let (predicted, _) = predictor::motion(speaker, &sound, frames.len())?;
+        let HeldOutInterval { key, ground_truth, sound, words, .. } = interval.cut(frames.clone());
+        let (predicted, _) = predictor::motion(speaker, &sound, &words, frames.len())?;
         let (name, start_secs) = (format!("{split} {key}"), speaker.fps().secs(frames.start));
         Ok(HeldOutPair { name, start_secs, ground_truth, predicted })
     };

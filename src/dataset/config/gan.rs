@@ -16,6 +16,7 @@ auto_section! {
         preset: NetworkPreset = NetworkPreset::Auto,
         representation: MotionRepresentation = MotionRepresentation::Auto,
         channels: Vec<PostureChannel> = Vec::new(),
+        words: bool = false,
         window_frames: usize = 64 => (32.0, 4096.0, "frames"),
         stride_frames: usize = 5 => (1.0, 4096.0, "frames"),
         batch: C = count => (2.0, 4096.0, "windows"),

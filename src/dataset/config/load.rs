@@ -87,6 +87,7 @@ fn resolve(text: &str, sets: &[String], file: PathBuf) -> Result<Config> {
 mod tests {
     use super::*;
     use crate::config::GanRecipe;
+    use orator_base::stage::artifacts::StageName;
     use std::collections::BTreeSet;
 
     fn resolved(text: &str, sets: &[&str]) -> Result<Config> {
@@ -263,6 +264,28 @@ mod tests {
         let found = problems(text, &[]);
         assert!(found[0].starts_with("line 2: gan.representation") && found[0].ends_with("(did you mean positions?)"));
         assert_eq!(found[1], "line 3: gan.preset: expected a string, found integer");
+    }
+
+    #[test]
+    fn words_are_recognised_for_the_speakers_that_ask_for_it() {
+        let speaker = |name: &str, transcripts: &str| {
+            format!("[[speaker]]\nname = \"{name}\"\nvideos = [\"a.mp4\"]\ntranscripts = {transcripts}\n")
+        };
+        let text = speaker("a", "\"auto\"") + &speaker("b", "[\"auto.srt\"]");
+        let settings = resolved(&text, &["transcribe.language=en"]).unwrap().settings;
+        let has_stage = ["a", "b"].map(|name| settings.stages_of(name).contains(&StageName::Transcribe));
+        assert_eq!((has_stage, settings.transcribe.model_id()), ([true, false], "whisper-tiny-en"));
+        assert_eq!(Settings::default().transcribe.model_id(), "whisper-base");
+        let expected = [
+            "line 4: speaker[0].transcripts: \"auto\" cannot be combined with files: keep one of them",
+            "line 6: transcribe.language: invalid language \"English\": expected a code like \"en\", or \"\" to detect it",
+            "--set: transcribe.model: no model: expected \"auto\" or a folder in models.dir",
+        ];
+        let text = speaker("a", "[\"auto\", \"a.srt\"]") + "[transcribe]\nlanguage = \"English\"\n";
+        assert_eq!(problems(&text, &["transcribe.model="]), expected);
+        let message = "whisper-tiny-en recognises English only: use whisper-base";
+        let text = "[transcribe]\nmodel = \"whisper-tiny-en\"\nlanguage = \"de\"\n";
+        assert_eq!(problems(text, &[]), [format!("line 3: transcribe.language: {message}")]);
     }
 
     #[test]

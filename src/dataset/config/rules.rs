@@ -2,9 +2,9 @@
 
 use super::auto::AUTO;
 use super::file::{Problem, SourceLocation};
-use super::sections::KeyRanges;
+use super::sections::{ENGLISH_MODEL, KeyRanges, MULTILINGUAL_MODEL};
 use super::{DatasetConfig, ExtractConfig, GanConfig, LiftConfig, ModelsConfig, Pose2dConfig, SegmentConfig};
-use super::{Seq2seqConfig, Settings, WorkConfig};
+use super::{Seq2seqConfig, Settings, TranscribeConfig, WorkConfig};
 use orator_base::stage::artifacts::StageName;
 use std::collections::{BTreeMap, BTreeSet};
 use toml::{Table, Value};
@@ -18,6 +18,7 @@ pub(super) fn ranges() -> impl Iterator<Item = (String, (f64, f64, &'static str)
         (StageName::Pose2d.as_str(), Pose2dConfig::RANGES),
         (StageName::Segment.as_str(), SegmentConfig::RANGES),
         (StageName::Lift.as_str(), LiftConfig::RANGES),
+        (StageName::Transcribe.as_str(), TranscribeConfig::RANGES),
         ("dataset", DatasetConfig::RANGES),
         ("gan", GanConfig::RANGES),
         ("seq2seq", Seq2seqConfig::RANGES),
@@ -50,6 +51,7 @@ pub fn check(settings: &Settings, locations: &BTreeMap<String, SourceLocation>) 
     if settings.dataset.validation + settings.dataset.test > 0.95 {
         rules.problem("dataset.test", "validation and test leave less than 5 % for training".to_owned());
     }
+    rules.transcription(settings);
     rules.speakers(settings);
     rules.problems
 }
@@ -63,6 +65,27 @@ impl Rules<'_> {
     fn problem(&mut self, key: &str, message: String) {
         let location = self.locations.get(key).copied().unwrap_or(SourceLocation::Line(1));
         self.problems.push(Problem { key: key.to_owned(), location, message });
+    }
+
+    fn transcription(&mut self, settings: &Settings) {
+        let TranscribeConfig { model, language } = &settings.transcribe;
+        let is_code = |code: &str| (2..=3).contains(&code.len()) && code.chars().all(|c| c.is_ascii_lowercase());
+        if !language.is_empty() && !is_code(language) {
+            let message = format!("invalid language {language:?}: expected a code like \"en\", or \"\" to detect it");
+            self.problem("transcribe.language", message);
+        } else if model == ENGLISH_MODEL && !["", "en"].contains(&language.as_str()) {
+            let message = format!("{model} recognises English only: use {MULTILINGUAL_MODEL}");
+            self.problem("transcribe.language", message);
+        }
+        if model.is_empty() {
+            self.problem("transcribe.model", format!("no model: expected {AUTO:?} or a folder in models.dir"));
+        }
+        for (at, speaker) in settings.speaker.iter().enumerate() {
+            if speaker.transcripts.len() > 1 && speaker.transcripts.iter().any(|entry| entry == AUTO) {
+                let message = format!("{AUTO:?} cannot be combined with files: keep one of them");
+                self.problem(&format!("speaker[{at}].transcripts"), message);
+            }
+        }
     }
 
     fn speakers(&mut self, settings: &Settings) {

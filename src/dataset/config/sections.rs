@@ -1,9 +1,11 @@
 //! Sections of `pipeline.toml` with the type, default and range of each key. `pipeline.toml` and the guide
 //! (`configuration`) document the meaning and unit of each key.
 
+use super::auto::AUTO;
 use super::choices::{FollowRule, SpeechRule, SplitUnit};
 use super::gan::GanConfig;
 use super::seq2seq::Seq2seqConfig;
+use orator_base::stage::artifacts::StageName;
 use orator_base::types::time::FrameRate;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
@@ -11,6 +13,10 @@ use std::path::PathBuf;
 /// Keys whose values are paths; an empty value means that no path is set.
 pub(super) const PATHS: [&str; 6] =
     ["work.dir", "models.dir", "models.onnxruntime", "lift.body_weights", "lift.hand_weights", "speaker.reference"];
+
+/// Published speech recognisers, of English only and of many languages.
+pub(super) const ENGLISH_MODEL: &str = "whisper-tiny-en";
+pub(super) const MULTILINGUAL_MODEL: &str = "whisper-base";
 
 /// Numeric keys of a section with (minimum, maximum, unit).
 pub(super) type KeyRanges = &'static [(&'static str, (f64, f64, &'static str))];
@@ -75,10 +81,29 @@ pub struct Settings {
     pub pose2d: Pose2dConfig,
     pub segment: SegmentConfig,
     pub lift: LiftConfig,
+    pub transcribe: TranscribeConfig,
     pub dataset: DatasetConfig,
     pub gan: GanConfig,
     pub seq2seq: Seq2seqConfig,
     pub speaker: Vec<SpeakerConfig>,
+}
+
+impl Settings {
+    /// Whether the words of any speaker are recognised.
+    pub fn transcribes_any(&self) -> bool {
+        self.speaker.iter().any(SpeakerConfig::transcribes)
+    }
+
+    /// Whether the words of this speaker are recognised.
+    pub fn transcribes(&self, speaker: &str) -> bool {
+        self.speaker.iter().any(|configured| configured.name == speaker && configured.transcribes())
+    }
+
+    /// Stages that process each video of this speaker, in order.
+    pub fn stages_of(&self, speaker: &str) -> Vec<StageName> {
+        let transcribes = self.transcribes(speaker);
+        StageName::OF_VIDEOS.into_iter().filter(|stage| transcribes || *stage != StageName::Transcribe).collect()
+    }
 }
 
 /// `[[speaker]]`: one person, with videos of them or keypoints of such videos.
@@ -105,6 +130,11 @@ pub struct SpeakerConfig {
 }
 
 impl SpeakerConfig {
+    /// Whether `transcripts = "auto"`: the words are recognised by the stage `transcribe`.
+    pub fn transcribes(&self) -> bool {
+        self.transcripts == [AUTO]
+    }
+
     /// Width and height in `size`, px; `None` if it is empty or invalid.
     pub fn image_size(&self) -> Option<[u32; 2]> {
         image_size(&self.size)
@@ -208,6 +238,30 @@ section! {
         smooth_hands: f64 = 1.5 => (0.0, 30.0, "frames"),
         level: bool = false,
         max_bone_change: f64 = 0.4 => (0.01, 100.0, "bone lengths"),
+    }
+}
+
+section! {
+    /// `[transcribe]`: recognition of the words of speakers with `transcripts = "auto"`.
+    TranscribeConfig {
+        model: String = AUTO.into(),
+        language: String = String::new(),
+    }
+}
+
+impl TranscribeConfig {
+    /// Folder name of the model: the configured one, or the published one for the language.
+    pub fn model_id(&self) -> &str {
+        match (self.model.as_str(), self.language.as_str()) {
+            (AUTO, "en") => ENGLISH_MODEL,
+            (AUTO, _) => MULTILINGUAL_MODEL,
+            (model, _) => model,
+        }
+    }
+
+    /// Whether `orator models fetch` knows the model.
+    pub fn is_published(&self) -> bool {
+        [ENGLISH_MODEL, MULTILINGUAL_MODEL].contains(&self.model_id())
     }
 }
 

@@ -1,5 +1,5 @@
 //! Matching of a speaker's `transcripts` to videos by file name: the name of the video, optionally followed by a dot
-//! and more (`talk.srt`, `talk.en.vtt`).
+//! and more (`talk.srt`, `talk.en.vtt`). With `"auto"` there are none to match: the stage `transcribe` writes them.
 
 use super::SpeakerConfig;
 use super::patterns::{self, SearchRoot, TRANSCRIPT_EXTENSIONS};
@@ -18,7 +18,7 @@ pub fn of_speaker(
     missing: &mut Vec<String>,
 ) -> BTreeMap<String, Vec<PathBuf>> {
     let mut paths = BTreeSet::new();
-    for entry in &speaker.transcripts {
+    for entry in speaker.transcripts.iter().filter(|_| !speaker.transcribes()) {
         match patterns::expand(entry, root, ("transcript", &TRANSCRIPT_EXTENSIONS), missing) {
             Ok(found) => paths.extend(found),
             Err(message) => missing.push(format!("transcripts: {message}")),

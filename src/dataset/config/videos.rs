@@ -7,6 +7,7 @@ use super::patterns::{self, ANY_CASE, SearchRoot};
 use super::{Config, SpeakerConfig, transcripts};
 use crate::file_name;
 use orator_base::stage::Unit;
+use orator_base::stage::artifacts::Artifact;
 use orator_base::text::composed;
 use orator_base::types::split::Split;
 use orator_formats::search;
@@ -43,7 +44,15 @@ pub fn all(config: &Config) -> Vec<Videos> {
     let settings = &config.settings;
     let folder = config.file.parent().unwrap_or(Path::new("."));
     let root = SearchRoot::new(folder, &[&settings.work.dir, &settings.models.dir]);
-    settings.speaker.iter().map(|speaker| of_speaker(speaker, &root)).collect()
+    let with_words = |speaker: &SpeakerConfig| {
+        let mut videos = of_speaker(speaker, &root);
+        if speaker.transcribes() {
+            let words = |unit: &Unit| (unit.video.clone(), vec![Artifact::Words.path(&settings.work.dir, unit)]);
+            videos.transcripts = videos.units.iter().map(words).collect();
+        }
+        videos
+    };
+    settings.speaker.iter().map(with_words).collect()
 }
 
 fn of_speaker(speaker: &SpeakerConfig, root: &SearchRoot) -> Videos {

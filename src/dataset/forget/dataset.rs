@@ -1,6 +1,5 @@
 //! Removal of videos from a dataset: the files of the remaining videos are hard-linked into a new folder, references to
-//! the forgotten videos are removed from their entries, the common files are assembled again, and the new folder
-//! replaces the old one.
+//! the forgotten are removed from their entries, the common files are rebuilt, and the new folder replaces the old.
 
 use crate::info::DatasetInfo;
 use crate::leakage::Leakage;
@@ -83,8 +82,7 @@ pub fn without(dir: &Path, names: &BTreeSet<String>) -> Result<()> {
     result
 }
 
-/// Removes a dataset, the entries of its videos last: after a kill, a second `forget` reads from them what is left to
-/// remove.
+/// Removes a dataset, the entries of its videos last: after a kill, a second `forget` reads there what is left.
 fn remove_dataset(dir: &Path) -> std::io::Result<()> {
     let entries = dir.join(entry::FOLDER);
     for folder in [dir, &entries].into_iter().filter(|folder| folder.is_dir()) {

@@ -34,8 +34,7 @@ pub fn models_trained_on(work: &Path, videos: &[&KnownVideo]) -> Result<Vec<Path
         for folder in list_sorted(&work.join(kind))? {
             let mut checkpoints = list_sorted(&folder)?;
             checkpoints.retain(|path| path.extension().is_some_and(|ending| ending == "safetensors"));
-            // All checkpoints of a folder list the same videos. An unreadable checkpoint is skipped here; the final
-            // search covers it.
+            // All checkpoints of a folder list the same videos. An unreadable one is skipped: the search covers it.
             let facts = checkpoints.iter().find_map(|path| checkpoint::facts(path).ok()).unwrap_or_default();
             let listed = facts["speaker"]["videos"].as_array().into_iter().flatten();
             let mut hashes = listed.filter_map(|video| video["content"].as_str());
@@ -107,8 +106,7 @@ impl Removal {
         let left_over = workdir::left_over(&dir);
         if !names.is_empty() || (whole_speaker && dir.exists()) || dir.join(PENDING).exists() {
             removal.dataset = Some((dir.clone(), names));
-            // The record of the dataset stage lists the videos among its inputs; its results, or a failure, may name their
-            // files.
+            // The record of the dataset stage has the videos as inputs; results or a failure may name their files.
             removal
                 .paths
                 .extend([record::record_path(&dir), record::failure_path(&dir)].into_iter().filter(|p| p.exists()));
@@ -169,8 +167,7 @@ impl Removal {
     /// Carries out the removal, including trained models unless `keep_models`.
     ///
     /// # Errors
-    /// A damaged file of a remaining video (detected before anything is removed), or a file that cannot be removed or
-    /// written.
+    /// A damaged file of a remaining video (detected before any removal), or a file that cannot be removed or written.
     pub fn carry_out(&self, keep_models: bool) -> Result<()> {
         if let Some((dir, names)) = &self.dataset {
             dataset::ensure_intact_without(dir, names)?;
@@ -263,8 +260,7 @@ fn remove(path: &Path) -> Result<()> {
     workdir::remove(path).with_context(|| format!("cannot remove {}", path.display()))
 }
 
-/// Search terms for `videos`: work names, dataset names and paths, and file names and hashes that no other video
-/// shares.
+/// Search terms for `videos`: work names, dataset names and paths, file names and hashes that no other video shares.
 fn terms(videos: &[&KnownVideo], others: &[&KnownVideo]) -> Vec<SearchTerm> {
     let mut terms: Vec<SearchTerm> = Vec::new();
     for video in videos {

@@ -54,7 +54,6 @@ fn escaped(text: &str) -> [String; 4] {
     [json.replace('<', "\\u003c"), json, page, inside(format!("{text:?}"))]
 }
 
-/// Match of a term.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct SearchHit {
     /// Path of the file; for an archive, followed by `!` and the name of the entry.
@@ -64,7 +63,6 @@ pub struct SearchHit {
     pub term: String,
 }
 
-/// Result of a search.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct SearchReport {
     pub n_files: usize,

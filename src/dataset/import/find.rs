@@ -25,7 +25,6 @@ pub struct TakeFiles {
     pub transcripts: Vec<PathBuf>,
 }
 
-/// Files found in the sources.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct ImportSources {
     /// Takes in the order of their paths.
@@ -139,8 +138,7 @@ fn with_companions(kind: MotionKind, motion: PathBuf, named: &mut NamedFiles) ->
     TakeFiles { kind, motion, sound, transcripts }
 }
 
-/// Existing files `<stem>.<ending>` in the folder of `motion`, then in its sibling folders named in `folders`
-/// (separated by spaces).
+/// Existing files `<stem>.<ending>` in the folder of `motion`, then in its siblings in `folders` (separated by spaces).
 fn companions(motion: &Path, stems: &[&str], endings: &[&str], folders: &str, named: &mut NamedFiles) -> Vec<PathBuf> {
     let Some(own_folder) = motion.parent() else { return Vec::new() };
     let mut folders_to_search = vec![own_folder.to_owned()];

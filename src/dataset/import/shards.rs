@@ -20,7 +20,6 @@ use std::collections::BTreeMap;
 use std::io::{Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
-/// Location of a member in a tar file.
 #[derive(Clone, Debug, PartialEq, Eq)]
 struct MemberLocation {
     tar: PathBuf,
@@ -28,8 +27,7 @@ struct MemberLocation {
     bytes: u64,
 }
 
-/// Sample that has not been read yet; members are in the order of `EXTENSIONS`, optional ones in that of
-/// `OPTIONAL_EXTENSIONS`.
+/// Sample not yet read; members are in the order of `EXTENSIONS`, optional ones in that of `OPTIONAL_EXTENSIONS`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ShardSample {
     pub key: String,
@@ -45,7 +43,6 @@ pub struct ShardVideo {
     pub samples: Vec<ShardSample>,
 }
 
-/// Contents of the tar files.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct ShardTars {
     pub videos: Vec<ShardVideo>,
@@ -90,8 +87,7 @@ pub fn open(tars: &[PathBuf]) -> ShardTars {
     found
 }
 
-/// Adds the members of a tar file to `samples`, and counts files of other extensions in `unknown`. Returns the number
-/// of files in the tar.
+/// Adds a tar's members to `samples`, and counts files of other extensions in `unknown`. Returns the number of files.
 fn list(
     tar: &Path,
     samples: &mut BTreeMap<String, ShardSample>,

@@ -37,7 +37,6 @@ pub enum ImportItem {
     Unknown(PathBuf, String),
 }
 
-/// Result of inspecting an item.
 #[derive(Clone, Debug, Default)]
 pub struct InspectedItem {
     pub source: VideoSource,
@@ -369,7 +368,6 @@ impl InspectedItem {
         self.codes = None;
     }
 
-    /// Outcome of the item.
     pub fn line(&self, file: &str) -> ImportOutcome {
         let (outcome, reason, message) = match (&self.source.failure, self.source.ledger.rejected.first()) {
             (Some(error), _) => ("failed", "error".to_owned(), error.clone()),

@@ -38,7 +38,6 @@ pub struct TakeLimits {
     pub units: Option<LengthUnit>,
 }
 
-/// Take with its outcome.
 #[derive(Clone, Debug)]
 pub struct ImportedTake {
     /// `<slug of the file's name>-<8 hex of its content>`.
@@ -73,7 +72,6 @@ pub struct AcceptedTake {
     pub sound_note: Option<String>,
 }
 
-/// Reason for rejecting a take.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TakeRejection {
     pub why: FrameRejection,

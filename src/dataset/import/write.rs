@@ -22,7 +22,6 @@ use serde::Serialize;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
-/// Result of an import.
 #[derive(Clone, Debug)]
 pub struct Imported {
     pub lines: Vec<ImportOutcome>,
@@ -233,7 +232,6 @@ fn first_reasons(items: &[ImportItem], inspected: &[InspectedItem]) -> String {
     messages.join("; ") + &others
 }
 
-/// Request of an import.
 #[derive(Clone, Debug)]
 pub struct ImportPlan {
     pub sources: Vec<PathBuf>,
@@ -246,13 +244,11 @@ pub struct ImportPlan {
     pub dataset: config::DatasetConfig,
 }
 
-/// Outcome of an imported item.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ImportOutcome {
     pub file: String,
     /// One of `accepted`, `rejected`, `failed`.
     pub outcome: &'static str,
-    /// Seconds in the dataset.
     pub accepted_secs: f64,
     pub reason: String,
     pub message: String,

@@ -11,7 +11,6 @@ use orator_base::types::split::{Split, TimeBlock};
 use std::cmp::Ordering;
 use std::collections::BTreeMap;
 
-/// Parameters of the division into splits.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SplitPlan {
     /// Unit of the division: whole videos, or time blocks.
@@ -39,7 +38,6 @@ pub struct Unassigned<'a> {
     pub recorded: Option<&'a RecordedSplit>,
 }
 
-/// Assignment of a video.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Assignment {
     In(Split, SplitBy),
@@ -191,8 +189,7 @@ impl<'a> Assigner<'a> {
         groups
     }
 
-    /// Divides each video that is long enough into time blocks; a shorter one is assigned as a whole, unless that would
-    /// leave a split empty.
+    /// Divides each long enough video into time blocks; a shorter one is assigned whole, unless a split would be empty.
     fn by_time(&mut self, new: &[usize]) {
         let SplitPlan { guard_secs, min_block_secs, .. } = *self.plan;
         for (n, &at) in new.iter().enumerate() {
@@ -263,12 +260,10 @@ impl SplitFill {
         Self { splits: splits.collect(), total_secs }
     }
 
-    /// Adds seconds to a split.
     pub(crate) fn add(&mut self, split: Split, secs: f64) {
         self.splits.iter_mut().filter(|(other, ..)| *other == split).for_each(|(_, _, filled)| *filled += secs);
     }
 
-    /// Splits with their shares.
     pub(crate) fn shares(&self) -> Vec<(Split, f64)> {
         self.splits.iter().map(|(split, share, _)| (*split, *share)).collect()
     }

@@ -31,7 +31,6 @@ pub enum SplitBy {
     Time,
 }
 
-/// Rule by which a dataset is divided into splits.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SplitRule {
     /// Unit of the division: whole videos, or time blocks.
@@ -42,7 +41,6 @@ pub struct SplitRule {
     pub guard_secs: f64,
 }
 
-/// Recorded split of a video.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RecordedSplit {
     /// Name in the dataset, `<slug of the file's name>-<8 hex of its content>`.

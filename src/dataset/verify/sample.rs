@@ -1,5 +1,4 @@
-//! Consistency checks of a sample: matching shapes, joints present where the mask is set, constant bone lengths, values
-//! in range.
+//! Checks of a sample: matching shapes, joints present where the mask is set, constant bone lengths, values in range.
 
 use crate::sample::Sample;
 use anyhow::{Result, ensure};

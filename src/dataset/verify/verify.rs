@@ -2,8 +2,7 @@
 //! every second of every video is accounted for. Deep: the hashes of all files, and the shapes, values and bones of all
 //! arrays.
 //!
-//! The files that are assembled from the entries of the videos are assembled again and compared, which detects wrong
-//! numbers in any of them.
+//! Files assembled from the videos' entries are assembled again and compared, which detects wrong numbers in any.
 
 use super::blocks;
 use super::sample::check_sample;
@@ -26,7 +25,6 @@ use std::io::Write;
 use std::path::Path;
 use std::rc::Rc;
 
-/// Problem found in a dataset.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct DatasetProblem {
     /// Path in the dataset folder.
@@ -34,7 +32,6 @@ pub struct DatasetProblem {
     pub message: String,
 }
 
-/// Result of a verification.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Verified {
     pub problems: Vec<DatasetProblem>,
@@ -127,8 +124,7 @@ fn assemble_again(
     Ok(expected)
 }
 
-/// Line of the dataset card in the stored checksums: the text of the card differs between program versions, so its
-/// stored hash is accepted.
+/// Line of the dataset card in the stored checksums: the text differs between versions, so its stored hash is accepted.
 fn card_line(dir: &Path) -> Option<String> {
     let stated = input::read_text(dir.join(CHECKSUMS), input::MAX_TEXT).ok()?;
     let line = stated.lines().find(|line| is_card(line))?;
@@ -207,8 +203,7 @@ fn check_videos(dir: &Path, found: &mut Verified) -> Result<()> {
     Ok(())
 }
 
-/// Checks that the ledger of a video covers every second, and that its samples cover the accepted seconds, to within a
-/// frame per sample.
+/// Checks that a video's ledger covers every second and its samples the accepted seconds, to within a frame per sample.
 fn check_ledger(entry: &VideoEntry, fps: FrameRate) -> Result<()> {
     let ledger = &entry.ledger;
     let unknown = ledger.duration_secs == 0.0 && entry.failure.is_some();

@@ -23,13 +23,11 @@ use std::path::{Path, PathBuf};
 /// Folder of the entries in the dataset folder.
 pub const FOLDER: &str = "videos";
 
-/// Video of a dataset.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct VideoEntry {
     pub schema: u32,
     /// Name `<slug of the file's name>-<8 hex of its content>`, the prefix of its samples' keys.
     pub name: FileName,
-    /// File name of the video.
     pub file: String,
     /// BLAKE3 of the video file; empty if it could not be read.
     pub content: String,
@@ -38,7 +36,6 @@ pub struct VideoEntry {
     pub inputs_hash: String,
     /// Split; `None`: no samples, or samples in several splits (`blocks`).
     pub split: Option<Split>,
-    /// Reason for the split.
     pub split_by: SplitBy,
     /// Time blocks with their splits; empty for a video that is in one split.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -46,7 +43,6 @@ pub struct VideoEntry {
     pub ledger: Ledger,
     /// Stage that failed, and its error; `None`: no failure.
     pub failure: Option<String>,
-    /// Bone lengths of the samples.
     pub bones: VideoBones,
     /// BLAKE3 of the sound codes; `None`: no sound.
     pub sound: Option<String>,
@@ -74,7 +70,6 @@ pub struct VideoSource {
     pub failure: Option<String>,
 }
 
-/// Writer of one video's entry.
 pub struct EntryWriter {
     dir: PathBuf,
     entry: VideoEntry,
@@ -251,8 +246,7 @@ impl VideoEntry {
         shards.chain(sound).collect()
     }
 
-    /// Links this video's files from the dataset in `from` into the one in `to`, or copies them where hard links fail;
-    /// existing files are kept.
+    /// Links this video's files from the dataset `from` into `to`, or copies them where links fail; existing ones stay.
     pub fn link_into(&self, from: &Path, to: &Path) -> Result<()> {
         fs::create_dir_all(to.join(FOLDER)).with_context(|| format!("cannot create {}", to.join(FOLDER).display()))?;
         let json = format!("{FOLDER}/{}.json", self.name);

@@ -12,8 +12,7 @@ use std::path::{Path, PathBuf};
 
 const BLOCK: usize = 512;
 
-/// Writer of one video's samples into the shards `<split>-<video>-0000.tar`, `<split>-<video>-0001.tar`, ... of a
-/// folder.
+/// Writer of a video's samples into the shards `<split>-<video>-0000.tar`, `<split>-<video>-0001.tar`, ... of a folder.
 pub struct ShardWriter {
     dir: PathBuf,
     video: String,

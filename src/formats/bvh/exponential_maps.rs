@@ -31,7 +31,6 @@ pub const JOINTS: [&str; 15] = [
     "LeftForeArm",
     "LeftHand",
 ];
-/// Frame rate of the features.
 pub const FPS: FrameRate = FrameRate::new(20, 1);
 /// Columns with a smaller standard deviation in the first file are dropped.
 const MIN_STD: f64 = 1e-6;
@@ -92,10 +91,8 @@ pub struct ExponentialMaps {
     pub skeleton: BvhSkeleton,
     /// Channel values outside the features: the first frame of the first file, with the root channels at 0.
     rest: Vec<f64>,
-    /// Indices of the feature joints.
     joints: Vec<usize>,
-    /// Columns used as features, out of three for each of `joints`, with the mean and the largest absolute value of
-    /// each.
+    /// Columns used as features, out of three for each of `joints`, with mean and largest absolute value of each.
     columns: Vec<usize>,
     mean: Vec<f64>,
     largest: Vec<f64>,
@@ -107,8 +104,7 @@ impl ExponentialMaps {
     ///
     /// # Errors
     ///
-    /// No file; or, with the file name, a skeleton that differs from the first file's, no frame, non-finite numbers,
-    /// or missing joints.
+    /// No file; or, with the file name, another skeleton than the first, no frame, non-finite numbers, missing joints.
     pub fn of(files: impl IntoIterator<Item = Result<(String, Bvh)>>, mapping: &JointMapping) -> Result<Self> {
         let mut files = files.into_iter();
         let (name, first) = files.next().context("no training motion was given")??;
@@ -167,8 +163,7 @@ impl ExponentialMaps {
         Ok(())
     }
 
-    /// Features of a file [T, columns] at 20 frames per second: the mean subtracted, divided by the largest absolute
-    /// value.
+    /// Features of a file [T, columns] at 20 frames per second: less the mean, divided by the largest absolute value.
     pub fn features(&self, bvh: &Bvh) -> Result<Array2<f32>> {
         let all = self.exponential_maps(bvh)?;
         Ok(Array2::from_shape_fn((all.nrows(), self.columns.len()), |(t, i)| {
@@ -176,8 +171,7 @@ impl ExponentialMaps {
         }))
     }
 
-    /// Channel values of each frame for features [T, columns]; all other channels have the values of the first frame
-    /// of the first file.
+    /// Channel values of each frame for features [T, columns]; all others have those of the first file's first frame.
     pub fn channels(&self, features: ArrayView2<f32>) -> Vec<Vec<f64>> {
         let first_channels = self.skeleton.first_channels();
         let at_rest: Vec<Vec3> =

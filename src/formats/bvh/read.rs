@@ -79,7 +79,6 @@ impl Bvh {
         Ok(bvh)
     }
 
-    /// Parses the text of a file.
     pub fn parse(text: &str) -> Result<Self> {
         let mut words = Words::new(text);
         let parsed = Self::from_words(&mut words);
@@ -255,8 +254,7 @@ mod tests {
 
     #[test]
     fn rotations_apply_in_channel_order() {
-        // The root is at (1, 5 + 2, 3), rotated 90 about z; the elbow is rotated 90 about y, then, in its own axes,
-        // 90 about x.
+        // The root is at (1, 5 + 2, 3), rotated 90 about z; the elbow 90 about y, then, in its own axes, 90 about x.
         let bvh = Bvh::parse(&arm("3 Yrotation Xrotation Zrotation", "1 2 3 90 0 0 90 90 90")).unwrap();
         assert_eq!((bvh.n_frames, bvh.frame_secs, bvh.joints[2].name.as_str()), (1, 0.04, "Elbow_end"));
         let pose = &bvh.positions(Positions::Auto)[0];

@@ -58,7 +58,6 @@ pub struct BvhSkeleton {
 }
 
 impl BvhSkeleton {
-    /// Skeleton of a BVH file.
     pub fn of(bvh: &Bvh) -> Self {
         Self { joints: bvh.joints.clone() }
     }
@@ -80,8 +79,7 @@ impl BvhSkeleton {
             .collect()
     }
 
-    /// Checks that the joints form a tree with parents before children, finite offsets and valid channels, as every
-    /// BVH file has.
+    /// Checks that the joints form a tree with parents before children, finite offsets and valid channels, as in BVH.
     pub fn check(&self) -> Result<()> {
         for (at, joint) in self.joints.iter().enumerate() {
             ensure!(
@@ -104,8 +102,7 @@ impl BvhSkeleton {
         Ok(())
     }
 
-    /// Joint positions for the channel values of a frame, in the file's unit; position channels are added to the
-    /// offset.
+    /// Joint positions for a frame's channel values, in the file's unit; position channels are added to the offset.
     pub fn positions(&self, frame: &[f64]) -> Vec<Vec3> {
         joint_positions(&self.joints, frame, Positions::Add)
     }

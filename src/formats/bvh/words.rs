@@ -53,7 +53,6 @@ fn is_blank_or_comment(line: &str) -> bool {
     line.is_empty() || line.starts_with('#') || line.starts_with("//")
 }
 
-/// Parses a number.
 pub(super) fn number(word: &str) -> Result<f64> {
     word.parse().map_err(|_| anyhow!("found `{word}`, expected a number"))
 }

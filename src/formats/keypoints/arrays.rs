@@ -1,5 +1,4 @@
-//! Keypoint arrays in `.npy` and `.npz` files, identified by their shapes: MediaPipe landmarks, PATS, COCO, and
-//! `keypoints.npz`.
+//! Keypoint arrays in `.npy` and `.npz`, identified by shape: MediaPipe landmarks, PATS, COCO, and `keypoints.npz`.
 
 use super::entry::point;
 use super::found::{FoundKeypoints, FoundPerson, NamedArrays};
@@ -20,8 +19,7 @@ pub fn read_npy(path: &Path, bytes: &[u8]) -> Result<FoundKeypoints> {
     from_arrays(path, vec![(String::new(), array.mapv(|v| v as f32))])
 }
 
-/// Reads a `.npz` file. `fps` (one number, or numerator and denominator) and `image_size` (width, height) are read
-/// for every format.
+/// Reads a `.npz`. `fps` (one number, or numerator and denominator) and `image_size` (width, height) are always read.
 pub fn read_npz(path: &Path) -> Result<FoundKeypoints> {
     let mut npz = Npz::open(path)?;
     let fps = if npz.has("fps") { Some(npz.frame_rate("fps")?) } else { None };

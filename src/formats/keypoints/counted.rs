@@ -47,7 +47,6 @@ impl CountedPerson {
     }
 }
 
-/// Converts numbered frames of persons to keypoints.
 pub fn of_persons(program: &str, numbered: BTreeMap<u64, Vec<CountedPerson>>) -> Result<FoundKeypoints> {
     let counts: BTreeSet<usize> = numbered.values().flatten().map(|person| person.n_points).collect();
     let offsets = numbered.values().flatten().filter_map(|person| person.body_25b.as_ref()?.1);

@@ -23,7 +23,6 @@ struct KeypointDocument {
     images: Vec<AnnotatedImage>,
 }
 
-/// Image of an annotation file.
 #[derive(Debug, Deserialize)]
 struct AnnotatedImage {
     id: ImageName,
@@ -35,7 +34,6 @@ struct AnnotatedImage {
     height: u32,
 }
 
-/// Persons found in a file.
 pub struct JsonPersons {
     /// Name of the program: `OpenPose`.
     pub program: &'static str,
@@ -51,8 +49,7 @@ pub enum FramePersons {
     Frames(BTreeMap<u64, Vec<JsonEntry>>),
 }
 
-/// Parses the keypoints of a complete video from the bytes of a JSON file. Errors name line and column, or frame and
-/// person.
+/// Parses the keypoints of a video from the bytes of a JSON file. Errors name line and column, or frame and person.
 pub fn parse(bytes: &[u8]) -> Result<FoundKeypoints> {
     let JsonPersons { program, image_size, persons } = read_persons(bytes)?;
     let frames = match persons {
@@ -64,7 +61,6 @@ pub fn parse(bytes: &[u8]) -> Result<FoundKeypoints> {
     Ok(found)
 }
 
-/// Converts numbered frames of entries to keypoints.
 fn from_frames(program: &str, frames: BTreeMap<u64, Vec<JsonEntry>>) -> Result<FoundKeypoints> {
     let numbered = frames.into_iter().map(|(number, entries)| Ok((number, persons(number, &entries)?)));
     counted::of_persons(program, numbered.collect::<Result<_>>()?)

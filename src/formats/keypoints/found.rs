@@ -1,5 +1,4 @@
-//! Keypoints detected by another program: all persons in every frame, at the program's own frame rate and in its own
-//! unit.
+//! Keypoints detected by another program: all persons in every frame, at its own frame rate and in its own unit.
 
 use super::range::{MAX_EXAMINED_POINTS, UPPER_BODY, are_fractions};
 use ndarray::ArrayD;
@@ -14,9 +13,7 @@ pub type NamedArrays = Vec<(String, ArrayD<f32>)>;
 pub struct FoundPerson {
     /// COCO-17.
     pub body: [Keypoint; N_BODY],
-    /// The person's left hand.
     pub left_hand: [Keypoint; N_HAND],
-    /// The person's right hand.
     pub right_hand: [Keypoint; N_HAND],
 }
 
@@ -49,7 +46,6 @@ pub enum CoordinateUnit {
     FromNeck,
 }
 
-/// Keypoints of a video.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FoundKeypoints {
     /// Display name of the format: `OpenPose, 25 points`.
@@ -61,7 +57,6 @@ pub struct FoundKeypoints {
     pub unit: CoordinateUnit,
     /// Point order that was identified by the number of points alone: `BODY_25`; empty if the file states the order.
     pub layout: String,
-    /// All persons in each frame.
     pub frames: Vec<Vec<FoundPerson>>,
     /// One sentence for each missing item, naming its substitute.
     pub notes: Vec<String>,

@@ -28,7 +28,6 @@ const EYES: [usize; 2] = [1, 2];
 const EARS: [usize; 2] = [3, 4];
 const SHOULDERS: [usize; 2] = [5, 6];
 const HIPS: [usize; 2] = [11, 12];
-/// Limbs of the arms.
 const LIMBS: [(&str, [usize; 2]); 4] =
     [("left upper arm", [5, 7]), ("right upper arm", [6, 8]), ("left forearm", [7, 9]), ("right forearm", [8, 10])];
 /// Pairs of limbs of similar length, with the maximum ratio of their lengths. Forearms often point at the camera.

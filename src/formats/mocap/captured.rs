@@ -22,7 +22,6 @@ pub struct CapturedMotion {
     pub facts: Map<String, Value>,
 }
 
-/// Kind of a captured motion file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum MotionKind {
     /// Text clips of Rebol et al. 2021: 147 numbers per line.
@@ -55,8 +54,7 @@ pub fn read(kind: MotionKind, path: &Path) -> Result<CapturedMotion> {
 ///
 /// # Errors
 ///
-/// The file is unreadable, is not of that kind, or holds samples; its frame rate, unit or coordinates are
-/// implausible.
+/// The file is unreadable, is not of that kind, or holds samples; its frame rate, unit or coordinates are implausible.
 pub fn read_in(kind: MotionKind, path: &Path, units: Option<LengthUnit>) -> Result<CapturedMotion> {
     let captured = match kind {
         MotionKind::Authors => {

@@ -1,7 +1,6 @@
 //! Conversion from the axes and unit of a captured skeleton to those of `types::skeleton`: metres, x image right, y
-//! down, z away, neck at the origin, and the speaker rotated about the vertical so that they face the camera on
-//! average over the take. Files state neither unit nor axes: the arm length defines the unit, the spine the vertical,
-//! the shoulders the front.
+//! down, z away, neck at the origin, and the speaker turned to face the camera on average over the take. Files state
+//! neither unit nor axes: the arm length defines the unit, the spine the vertical, the shoulders the front.
 
 use anyhow::{Context, Result, ensure};
 use orator_base::math::order::upper_median;
@@ -65,8 +64,7 @@ pub struct AxisAlignment {
     pub unit: &'static str,
     /// The source axis that points up, such as `+y`.
     pub up: &'static str,
-    /// Rotation of the take about the vertical, degrees, relative to facing along the depth axis of the source (z, or
-    /// -y for a z-up source).
+    /// Rotation of the take about the vertical, degrees, from facing along the source's depth axis (z; -y if z is up).
     pub turned_degrees: f64,
 }
 

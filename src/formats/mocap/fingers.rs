@@ -1,5 +1,4 @@
-//! Hand joints of a BVH skeleton: the joints of each finger are found by name, in any naming convention, and ordered
-//! by the hierarchy.
+//! Hand joints of a BVH skeleton: each finger's joints are found by name, in any convention, and ordered by hierarchy.
 
 use crate::bvh::read::Bvh;
 use crate::skeleton::joint_names::FINGERS;
@@ -54,7 +53,6 @@ fn chain(bvh: &Bvh, side: Side, finger: usize) -> Vec<usize> {
     if chain.len() > 1 { chain } else { Vec::new() }
 }
 
-/// Side and finger that a joint name denotes.
 fn parse_name(name: &str) -> Option<(Side, usize)> {
     let words = words(name.rsplit(':').next().unwrap_or(name));
     let all = words.concat();

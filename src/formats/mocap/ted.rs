@@ -1,6 +1,5 @@
 //! TED Expressive: `human_joints` [T, 43, 3] in camera axes (y down), metres, estimated by a regressor; `fps`;
-//! `sentence`. Joint 1 is the neck, joint 0 the spine below it; left arm 2 4 6, right arm 3 5 7; three joints per
-//! finger, no tips.
+//! `sentence`. Joint 1 is the neck, 0 the spine below it; left arm 2 4 6, right arm 3 5 7; three per finger, no tips.
 
 use super::captured::CapturedMotion;
 use crate::npz::Npz;

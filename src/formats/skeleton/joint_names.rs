@@ -67,7 +67,6 @@ pub(crate) const FINGERS: [(&str, &[&str]); 5] = [
     ("Pinky", &["pinky", "little", "pinkie", "pink"]),
 ];
 const PHALANGES: [&str; 3] = ["proximal", "intermediate", "distal"];
-/// Sides, each with the words that name it.
 const SIDES: [(&str, [&str; 2]); 2] = [("Left", ["left", "l"]), ("Right", ["right", "r"])];
 /// Names within which the prefix and the suffix of a skeleton are searched.
 const TRUNK_ANCHORS: [&str; 4] = ["hips", "pelvis", "neck", "head"];

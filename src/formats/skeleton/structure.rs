@@ -34,7 +34,6 @@ struct LimbPair {
     limbs: [Limb; 2],
 }
 
-/// Joints with their children.
 struct JointTree<'a> {
     joints: &'a [MatchJoint<'a>],
     children: Vec<Vec<usize>>,

@@ -36,6 +36,10 @@ pub fn read(content: &str, speaker: &str) -> Result<JsonTranscript> {
         Ok(words) if !words.is_empty() => Ok(JsonTranscript::Words(words)),
         found => match text {
             Some(text) => Ok(JsonTranscript::Text(text.to_owned())),
+            // A recogniser that found no speech.
+            None if value.get("segments").and_then(Value::as_array).is_some_and(Vec::is_empty) => {
+                Ok(JsonTranscript::Words(Vec::new()))
+            }
             None => Err(found.err().unwrap_or_else(|| anyhow!("expected `words` with times, or a `text`"))),
         },
     }

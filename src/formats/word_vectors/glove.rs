@@ -1,5 +1,4 @@
-//! Text format of GloVe and word2vec: a word and its vector per line; the first line of word2vec states the number of
-//! words and of dimensions.
+//! Text format of GloVe and word2vec: a word and its vector per line; word2vec begins with their number and dimension.
 
 use super::writer::TableWriter;
 use anyhow::{Context, Result, bail, ensure};

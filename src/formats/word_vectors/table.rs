@@ -1,6 +1,5 @@
-//! Look-up in a table of word vectors, by the rules of FineMotion's entry to GENEA 2020: lower case, a final full
-//! stop removed; index 0 is padding, a vector of zeros, index 1 an unknown word, a vector of ones. Only the words are
-//! held in memory.
+//! Look-up in a table of word vectors, by the rules of FineMotion (GENEA 2020): lower case, a final full stop removed;
+//! index 0 is padding, a vector of zeros, index 1 an unknown word, a vector of ones. Only the words are held in memory.
 
 use super::writer::{VECTORS, WORDS};
 use anyhow::{Context, Result, ensure};
@@ -29,7 +28,6 @@ pub struct WordVectors {
     /// File offset of the first vector, bytes.
     at: u64,
     dim: usize,
-    /// Row of each word.
     rows: HashMap<String, u32>,
 }
 
@@ -76,12 +74,10 @@ impl WordVectors {
         Ok(Self { path: path.to_owned(), file, at, dim, rows })
     }
 
-    /// File of the table.
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// Dimension of the vectors.
     pub fn dim(&self) -> usize {
         self.dim
     }

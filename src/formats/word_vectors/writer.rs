@@ -30,7 +30,6 @@ impl TableWriter {
         Ok(Self { file, dim, words: String::new(), known: BTreeSet::new() })
     }
 
-    /// Dimension of the vectors.
     pub fn dim(&self) -> usize {
         self.dim
     }

@@ -1,12 +1,12 @@
 //! Generates the motion for one sound, with its transcript for some networks, and writes it to files. The sound is
-//! streamed, so that apart from the motion, memory does not grow with its length; only a film, which contains the
-//! sound, reads it completely.
+//! streamed, so that apart from the motion, memory does not grow with its length; only a film reads it completely.
 
 use super::speech::{MotionReport, SegmentFacts, SpeechSource};
 use crate::generate::GestureGenerator;
 use crate::generate::generator::CHUNK;
 use crate::generate::seq2seq::SequenceGenerator;
 use crate::generate::trained::TrainedSpeaker;
+use crate::generate::word_input::KnownWords;
 use anyhow::{Context as _, Result, bail, ensure};
 use orator_avatar::animate::export::file::{ExportContent, ExportFormat, FigureOptions};
 use orator_avatar::animate::{AnimationOptions, perform};
@@ -37,6 +37,7 @@ pub fn write_motion(
     let task = progress.begin("speech to motion", 0);
     task.detail("reading the audio");
     let (n_samples, note) = measure(audio)?;
+    let transcript = transcript(speech)?;
     let secs = n_samples as f64 / f64::from(SAMPLE_RATE);
     let no_motion = || format!("cannot generate motion for {}", audio.display());
     let n_frames = speaker.n_frames(n_samples).with_context(no_motion)?;
@@ -44,16 +45,28 @@ pub fn write_motion(
     let task = progress.begin("speech to motion", n_frames as u64);
     task.detail(&format!("{secs:.1} s of audio"));
     let pieces = SoundStream::open(audio, SAMPLE_RATE);
+    let words = transcript.as_ref().map_or(&[][..], |transcript| &transcript.words);
     let (motion, posture) = speaker
-        .motion_from_stream(pieces, n_samples, CHUNK, &mut |n| task.advance(n as u64))
+        .motion_from_stream(pieces, n_samples, words, CHUNK, &mut |n| task.advance(n as u64))
         .with_context(no_motion)?;
     drop(task);
     let motion_secs = started.elapsed().as_secs_f64();
     write_outputs((motion, posture), speech, outputs, progress)?;
+    let words = speaker.known_words().map(|known_words| word_notes(known_words, transcript.as_ref(), secs));
+    let notes: Vec<String> = note.into_iter().chain(words.into_iter().flatten()).collect();
+    let note = (!notes.is_empty()).then(|| notes.join("; "));
     Ok(MotionReport { secs, n_frames, motion_secs, note, segments: None })
 }
 
-/// Writes motion to files of all formats.
+/// Transcript of the speech, if there is one, with times from the start of the sound.
+fn transcript(speech: &SpeechSource) -> Result<Option<Transcript>> {
+    let mut parsed = speech.transcript.map(Transcript::read).transpose()?;
+    if let Some(parsed) = &mut parsed {
+        words::from_secs(&mut parsed.words, origin::start_secs(speech.audio)?);
+    }
+    Ok(parsed)
+}
+
 pub(super) fn write_outputs(
     (motion, posture): (Motion, Option<Posture>),
     &SpeechSource { audio, figure, .. }: &SpeechSource,
@@ -124,8 +137,7 @@ fn narrow_band_note(rate: u32) -> Option<String> {
     ))
 }
 
-/// Generates motion for a sound and writes it to `outputs`. Errors name the sound, or the option that this kind of
-/// network does not support.
+/// Generates motion for a sound and writes it to `outputs`. Errors name the sound or the unsupported option.
 pub fn write(
     speaker: &TrainedSpeaker,
     speech: &SpeechSource,
@@ -139,8 +151,11 @@ pub fn write(
     );
     match speaker {
         TrainedSpeaker::Gan(speaker) => {
-            let name = speaker.name();
-            ensure!(speech.transcript.is_none(), "the model of {name} does not use words: omit --transcript");
+            let (name, reads_words) = (speaker.name(), speaker.known_words().is_some());
+            ensure!(
+                speech.transcript.is_none() || reads_words,
+                "the model of {name} does not use words: omit --transcript"
+            );
             write_motion(speaker, speech, outputs, progress)
         }
         TrainedSpeaker::Sequence(speaker) => write_sequence(speaker, speech, outputs, progress),
@@ -158,7 +173,7 @@ pub fn write_sequence(
     outputs: &[(PathBuf, ExportFormat)],
     progress: &dyn Progress,
 ) -> Result<MotionReport> {
-    let &SpeechSource { audio, transcript, carry_state, figure } = speech;
+    let &SpeechSource { audio, carry_state, figure, .. } = speech;
     let started = Instant::now();
     let is_captured = speaker.is_captured();
     if let Some((path, _)) = outputs.iter().find(|(_, format)| is_captured && *format != ExportFormat::Bvh) {
@@ -169,14 +184,11 @@ pub fn write_sequence(
         "this network animates the BVH skeleton it was trained on, with its bone names and frame rate: omit \
          --names and --fps"
     );
-    let mut parsed = transcript.map(Transcript::read).transpose()?;
     let task = progress.begin("speech to motion", 0);
     measure(audio)?;
+    let parsed = transcript(speech)?;
     let sound = audio::read_mono_with_note(audio, speaker.metadata.rate)?;
     let (sound, phase_note) = sound.with_context(|| format!("{} has no audio", audio.display()))?;
-    if let Some(parsed) = &mut parsed {
-        words::from_secs(&mut parsed.words, origin::start_secs(audio)?);
-    }
     let words = parsed.as_ref().map_or(&[][..], |parsed| &parsed.words);
     let no_motion = || format!("cannot generate motion for {}", audio.display());
     let seams = speaker.seams(carry_state);
@@ -196,9 +208,14 @@ pub fn write_sequence(
         write_outputs((speaker.motion(&poses)?, None), speech, outputs, progress)?;
     }
     let known = parsed.as_ref().map(|parsed| [parsed.words.len(), speaker.metadata.vocabulary.n_known(&parsed.words)]);
-    let words_from_table = parsed.as_ref().and_then(|parsed| speaker.n_from_table(&parsed.words));
-    let notes = transcript.zip(parsed).map(|(path, parsed)| notes(speaker, path, &parsed, sound.secs()));
-    let notes: Vec<String> = phase_note.into_iter().chain(notes.into_iter().flatten()).collect();
+    let known_words = speaker.known_words();
+    let words_from_table = parsed.as_ref().and_then(|parsed| known_words.n_from_table(&parsed.words));
+    let notes = match (speaker.reads_words(), speech.transcript) {
+        (true, Some(_)) => word_notes(known_words, parsed.as_ref(), sound.secs()),
+        (false, Some(path)) => vec![format!("the network does not use words: {} was ignored", path.display())],
+        (_, None) => Vec::new(),
+    };
+    let notes: Vec<String> = phase_note.into_iter().chain(notes).collect();
     Ok(MotionReport {
         secs: sound.secs(),
         n_frames: poses.features.nrows(),
@@ -214,17 +231,18 @@ pub fn write_sequence(
     })
 }
 
-fn notes(speaker: &SequenceGenerator, path: &Path, parsed: &Transcript, sound_secs: f64) -> Vec<String> {
-    if !speaker.reads_words() {
-        return vec![format!("the network does not use words: {} was ignored", path.display())];
-    }
-    let n_read = speaker.metadata.vocabulary.n_known(&parsed.words) + speaker.n_from_table(&parsed.words).unwrap_or(0);
-    let is_unknown = !parsed.words.is_empty() && n_read == 0;
+/// Notes on the words of a speech of `sound_secs` for a network that reads words.
+fn word_notes(known_words: KnownWords, transcript: Option<&Transcript>, sound_secs: f64) -> Vec<String> {
+    let Some(Transcript { words, notes, .. }) = transcript else {
+        return vec!["no words were given (--transcript): the motion depends on the audio only".to_owned()];
+    };
+    let n_read = known_words.vocabulary.n_known(words) + known_words.n_from_table(words).unwrap_or(0);
+    let is_unknown = !words.is_empty() && n_read == 0;
     let unknown = is_unknown.then(|| {
         format!(
             "no word of the transcript ({}) is in the network's vocabulary: is it in the language of the training?",
-            counted(parsed.words.len(), "word")
+            counted(words.len(), "word")
         )
     });
-    parsed.notes.iter().cloned().chain(after_end(&parsed.words, sound_secs)).chain(unknown).collect()
+    notes.iter().cloned().chain(after_end(words, sound_secs)).chain(unknown).collect()
 }

@@ -5,7 +5,7 @@ use super::motion_files;
 use super::sounds::BatchSound;
 use super::speech::SpeechSource;
 use crate::generate::model::{checkpoint_file, model_lock};
-use crate::generate::seq2seq::metadata::is_sequence;
+use crate::generate::seq2seq::metadata::reads_transcript;
 use crate::generate::trained::TrainedSpeaker;
 use anyhow::{Context, Result, bail, ensure};
 use orator_avatar::animate::AnimationOptions;
@@ -68,10 +68,10 @@ impl<'a> BatchStage<'a> {
             .with_context(|| format!("{unit} is not an audio file of this batch"))
     }
 
-    /// Transcript of a sound, if its checkpoint is a sequence-to-sequence network; others do not read it.
+    /// Transcript of a sound, if its checkpoint uses it.
     fn transcript_of(&self, unit: &Unit) -> Result<Option<&Path>> {
         let transcript = self.sound(unit)?.transcript.as_deref();
-        Ok(transcript.filter(|_| self.checkpoint_of(unit).and_then(|path| is_sequence(&path)).unwrap_or(false)))
+        Ok(transcript.filter(|_| self.checkpoint_of(unit).and_then(|path| reads_transcript(&path)).unwrap_or(false)))
     }
 
     fn checkpoint_of(&self, unit: &Unit) -> Result<PathBuf> {
@@ -214,8 +214,7 @@ pub struct BatchOutcome {
     pub ended: BatchState,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub error: Option<String>,
-    /// `secs` of sound, `n_frames` of motion, `speaker`, `note`, and `segments` of a sequence-to-sequence network;
-    /// empty if the sound failed.
+    /// `secs` of sound, `n_frames` of motion, `speaker`, `note`, and `segments` of a sequence network; empty if failed.
     #[serde(flatten)]
     pub facts: Map<String, Value>,
 }
@@ -235,8 +234,7 @@ impl SpeechBatch {
     /// Generates motions that are missing or out of date.
     ///
     /// # Errors
-    /// Errors that affect all sounds: an unknown format, a common checkpoint that cannot be read, another batch running
-    /// in the same folder.
+    /// Errors that affect all sounds: an unknown format, an unreadable common checkpoint, another batch in the folder.
     pub fn run(&self, progress: &dyn Progress) -> Result<BatchReport> {
         let stage = BatchStage::new(self)?;
         let records = self.folder.join(RECORDS);

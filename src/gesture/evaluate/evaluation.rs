@@ -23,8 +23,7 @@ pub struct Evaluation {
 
 impl Evaluation {
     /// Reads motion files: `truth` and `prediction` are two files, or two folders whose files have the same names;
-    /// `audio` is a sound or a folder of sounds. `fps` is the frame rate of files that do not state one. The motions
-    /// are saved in `store`.
+    /// `audio` is a sound or a folder of sounds. `fps`: rate of files that state none. Motions are saved in `store`.
     pub fn from_files(
         truth: &Path,
         prediction: &Path,
@@ -50,8 +49,7 @@ impl Evaluation {
 
     /// Generates motion with each checkpoint for the sounds and words of a split of the dataset, whose motion is the
     /// ground truth: joints [T, 49, 3] in metres at the dataset's frame rate. If a checkpoint animates a captured
-    /// skeleton, all predictors are measured on the joints that it has, which a note lists. The motions are saved in
-    /// `store`.
+    /// skeleton, all predictors are measured on its joints, which a note lists. The motions are saved in `store`.
     ///
     /// # Errors
     /// No checkpoint; a split without samples; a dataset of another frame rate than a checkpoint (motion of a captured

@@ -1,6 +1,5 @@
-//! Evaluation of generated gestures: `clips` (from pairs of files, or from a dataset and checkpoints), `baseline`
-//! (predictors to compare with), `table` (metrics in blocks, bootstrap intervals, results, comparison) and `conclusion`
-//! (conclusions as text).
+//! Evaluation of generated gestures: `clips` (from files, or a dataset and checkpoints), `baseline` (predictors),
+//! `table` (metrics in blocks, bootstrap intervals, results, comparison) and `conclusion` (conclusions as text).
 
 pub mod baseline;
 pub mod clips;

@@ -3,7 +3,8 @@
 //! its end the sound is extended by its mirror image, for which the tail is kept.
 
 use super::model::{self, GenerationChoice, SpeakerMetadata, checkpoint_file};
-use anyhow::{Result, ensure};
+use super::word_input::{KnownWords, TrainedWords, WordFrameList, check_vectors};
+use anyhow::{Context, Result, ensure};
 use candle_core::{Device, Tensor};
 use ndarray::{Array2, Array3, s};
 use orator_base::audio::mel;
@@ -12,10 +13,14 @@ use orator_base::types::posture::{Posture, PostureChannel};
 use orator_base::types::skeleton::N_JOINTS;
 use orator_base::types::sound::{SAMPLE_RATE, Sound, sample_at};
 use orator_base::types::time::FrameRate;
+use orator_formats::transcript::Word;
+use orator_formats::word_vectors::WordVectors;
 use orator_nn::gan::generator::{FRAMES_MULTIPLE, Generator};
 use orator_nn::gan::streaming::StreamingGenerator;
+use orator_nn::gan::words::WordFrames;
 use std::ops::Range;
 use std::path::Path;
+use std::sync::Arc;
 
 /// Frames generated at once, many more than the 256 context frames that are computed in addition and dropped.
 pub const CHUNK: usize = 2048;
@@ -24,6 +29,7 @@ pub const CHUNK: usize = 2048;
 pub struct GestureGenerator {
     pub metadata: SpeakerMetadata,
     pub generator: Generator,
+    vectors: Option<Arc<WordVectors>>,
 }
 
 impl GestureGenerator {
@@ -36,7 +42,31 @@ impl GestureGenerator {
     /// for variants of a network that was trained without dropout.
     pub fn open_as(path: &Path, choice: &GenerationChoice) -> Result<Self> {
         let (metadata, generator) = model::load(&checkpoint_file(path)?, choice)?;
-        Ok(Self { metadata, generator })
+        Ok(Self::new(metadata, generator))
+    }
+
+    /// Generator of a network with this metadata.
+    pub fn new(metadata: SpeakerMetadata, generator: Generator) -> Self {
+        Self { metadata, generator, vectors: None }
+    }
+
+    /// Words that are not in the vocabulary take their vectors from this table. Without a table, or without a vector in
+    /// it, all have the vector of the unknown word.
+    ///
+    /// # Errors
+    /// A network that does not read words or was trained without a table, or whose word vectors have another dimension.
+    pub fn set_word_vectors(&mut self, vectors: Arc<WordVectors>) -> Result<()> {
+        let SpeakerMetadata { name, words, network, .. } = &self.metadata;
+        let words = words.as_ref().with_context(|| format!("the model of {name} does not read words: omit --words"))?;
+        check_vectors(name, words.has_word_vectors, network.word, &vectors)?;
+        self.vectors = Some(vectors);
+        Ok(())
+    }
+
+    /// Vocabulary and table of word vectors; `None` if the network does not read words.
+    pub fn known_words(&self) -> Option<KnownWords<'_>> {
+        let TrainedWords { vocabulary, .. } = self.metadata.words.as_ref()?;
+        Some(KnownWords { vocabulary, vectors: self.vectors.as_deref() })
     }
 
     pub fn name(&self) -> &str {
@@ -47,26 +77,26 @@ impl GestureGenerator {
         self.metadata.fps
     }
 
-    /// Motion for `sound` (16 kHz) with the speaker's bone lengths, as many complete frames as fit into the sound.
-    /// Fails for another sample rate, and for sound shorter than a frame.
-    pub fn motion(&self, sound: &Sound) -> Result<Motion> {
-        Ok(self.motion_and_posture(sound)?.0)
+    /// Motion for `sound` (16 kHz) and its words with the speaker's bone lengths, as many complete frames as fit into the
+    /// sound. Networks without word input ignore the words. Fails for another sample rate, and for sound shorter than a
+    /// frame.
+    pub fn motion(&self, sound: &Sound, words: &[Word]) -> Result<Motion> {
+        Ok(self.motion_and_posture(sound, words)?.0)
     }
 
     /// Like `motion`, with the angles of head and trunk if the network was trained on them.
-    pub fn motion_and_posture(&self, sound: &Sound) -> Result<(Motion, Option<Posture>)> {
+    pub fn motion_and_posture(&self, sound: &Sound, words: &[Word]) -> Result<(Motion, Option<Posture>)> {
         ensure!(
             sound.rate == SAMPLE_RATE,
             "the audio has a sample rate of {} Hz, expected {SAMPLE_RATE} Hz",
             sound.rate
         );
         let pieces = sound.samples.chunks(SAMPLE_RATE as usize).map(|piece| Ok(piece.to_vec()));
-        self.motion_from_stream(pieces, sound.samples.len(), CHUNK, &mut |_| ())
+        self.motion_from_stream(pieces, sound.samples.len(), words, CHUNK, &mut |_| ())
     }
 
-    /// Motion and posture for a stream of sound pieces (16 kHz, `n_samples` in total), generated in chunks of `chunk`
-    /// frames. Apart from the motion, memory does not grow with the sound. `on_chunk` is called with the number of
-    /// frames of each chunk.
+    /// Motion and posture for sound pieces (16 kHz, `n_samples` in total), generated in chunks of `chunk` frames. Apart
+    /// from the motion, memory does not grow with the sound. `on_chunk` gets the number of frames of each chunk.
     ///
     /// # Errors
     /// Errors of `motion`; fewer samples than `n_samples`; a `chunk` that is not a multiple of 32.
@@ -74,6 +104,7 @@ impl GestureGenerator {
         &self,
         pieces: impl Iterator<Item = Result<Vec<f32>>>,
         n_samples: usize,
+        words: &[Word],
         chunk: usize,
         on_chunk: &mut dyn FnMut(usize),
     ) -> Result<(Motion, Option<Posture>)> {
@@ -82,7 +113,7 @@ impl GestureGenerator {
         let normal = &self.metadata.normalisation;
         let mut posture = (!normal.channels.is_empty()).then(|| Posture::missing(n_frames));
         let mut first = 0;
-        for poses in self.features(pieces, n_samples, chunk)? {
+        for poses in self.features(pieces, n_samples, words, chunk)? {
             let poses = poses?;
             let part = self.metadata.motion(poses.view());
             joints.slice_mut(s![first..first + poses.ncols(), .., ..]).assign(&part.joints);
@@ -105,6 +136,7 @@ impl GestureGenerator {
         &self,
         pieces: impl Iterator<Item = Result<Vec<f32>>>,
         n_samples: usize,
+        words: &[Word],
         chunk: usize,
     ) -> Result<impl Iterator<Item = Result<Array2<f32>>>> {
         let n_frames = self.n_frames(n_samples)?;
@@ -113,7 +145,8 @@ impl GestureGenerator {
         let mut stream = MelStream::new(pieces, n_samples, n_mel_frames);
         let mels = move |frames| stream.log_mels(frames).map_err(|error| candle_core::Error::Msg(format!("{error:#}")));
         let preset = self.metadata.network.preset;
-        let chunks = StreamingGenerator::new(&self.generator, preset, n_mel_frames, padded, chunk, mels)?;
+        let chunks = StreamingGenerator::new(&self.generator, preset, n_mel_frames, padded, chunk, mels)?
+            .with_words(self.word_frames(words, padded)?);
         Ok(chunks.zip((0..n_frames).step_by(chunk)).map(move |(poses, first)| {
             let n = chunk.min(n_frames - first);
             let poses: Vec<f32> = poses?.narrow(2, 0, n)?.flatten_all()?.to_vec1()?;
@@ -123,6 +156,15 @@ impl GestureGenerator {
             );
             Ok(Array2::from_shape_vec((self.metadata.network.n_out, n), poses)?)
         }))
+    }
+
+    /// The words at `n_frames` pose frames; `None` if the network does not read words.
+    fn word_frames(&self, words: &[Word], n_frames: usize) -> Result<Option<WordFrames>> {
+        let Some(known_words) = self.known_words() else { return Ok(None) };
+        let (spoken, added) = known_words.numbered(words)?;
+        let mut frames = WordFrameList::default();
+        frames.push(&spoken, self.fps(), (0..n_frames).map(|t| self.fps().secs(t)));
+        frames.frames(added).map(Some)
     }
 
     /// Number of complete frames of motion for `n_samples` samples at 16 kHz. Fails if there is none.
@@ -154,8 +196,7 @@ impl<I: Iterator<Item = Result<Vec<f32>>>> MelStream<I> {
         Self { pieces, n_samples, samples: Vec::new(), first: 0, tail }
     }
 
-    /// Log-mels [1, 64, T] of these spectrogram frames. Successive ranges may overlap, but their starts must not
-    /// decrease.
+    /// Log-mels [1, 64, T] of these spectrogram frames. Successive ranges may overlap, but starts must not decrease.
     pub fn log_mels(&mut self, frames: Range<usize>) -> Result<Tensor> {
         let first = frames.start * mel::HOP;
         let mels = mel::log_mel(&self.mirrored(first..first + mel::n_samples(frames.len()))?);

@@ -6,5 +6,6 @@ pub mod normalisation;
 pub mod representation;
 pub mod seq2seq;
 pub mod trained;
+pub mod word_input;
 
 pub use generator::GestureGenerator;

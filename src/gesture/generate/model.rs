@@ -4,6 +4,7 @@ use super::normalisation::Normalisation;
 use super::representation::Representation;
 use super::seq2seq::metadata::is_sequence_kind;
 use super::trained;
+use super::word_input::TrainedWords;
 use anyhow::{Context, Result, bail, ensure};
 use ndarray::ArrayView2;
 use orator_base::audio::mel;
@@ -27,6 +28,8 @@ const KIND: &str = "orator speaker 2";
 const SKELETON: &str = "49 joints, house order";
 /// Largest accepted number of channels; the published network has 256.
 const MAX_WIDTH: usize = 1024;
+/// Largest accepted dimension of word embeddings.
+const MAX_WORD: usize = 4096;
 
 /// Everything that generation needs besides the tensors. Stored under `speaker` in the metadata of a checkpoint.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -44,6 +47,9 @@ pub struct SpeakerMetadata {
     /// Training videos, including those of the models that this one was initialised from.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub videos: Vec<TrainedVideo>,
+    /// Vocabulary of a network with word input.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub words: Option<TrainedWords>,
 }
 
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
@@ -101,6 +107,7 @@ impl SpeakerMetadata {
             representation,
             dataset: dataset.to_owned(),
             videos: Vec::new(),
+            words: None,
         }
     }
 
@@ -109,6 +116,13 @@ impl SpeakerMetadata {
         self.videos.extend(videos);
         self.videos.sort();
         self.videos.dedup();
+    }
+
+    /// Adds the words of a training and the sizes of its word embeddings, of dimension `dim`; none for `None`.
+    pub fn with_words(mut self, words: Option<TrainedWords>, dim: usize) -> Self {
+        let sizes = words.as_ref().map_or([0, 0], |words| [words.vocabulary.n_indices(), dim]);
+        [self.network.vocabulary, self.network.word] = sizes;
+        Self { words, ..self }
     }
 
     /// Converts network output [144 or more, T] to motion with the speaker's bone lengths in every frame.
@@ -197,7 +211,16 @@ fn build(contents: &Contents) -> Result<(SpeakerMetadata, Generator)> {
         network.width
     );
     ensure!(network.n_speakers <= 1, "the network has {} speakers, expected 1", network.n_speakers);
-    contents.expect_numbers(network.width * network.width)?;
+    let n_indices = metadata.words.as_ref().map_or(0, |words| words.vocabulary.n_indices());
+    ensure!(
+        network.vocabulary == n_indices && (n_indices == 0 || (1..=MAX_WORD).contains(&network.word)),
+        "the network has {} word vectors of {} dimensions, its vocabulary {n_indices} indices; expected as many, of 1 to \
+         {MAX_WORD} dimensions",
+        network.vocabulary,
+        network.word
+    );
+    ensure!(metadata.words.iter().all(|words| words.vocabulary.is_sorted()), "the vocabulary is not sorted");
+    contents.expect_numbers((network.width * network.width).max(network.vocabulary * network.word))?;
     ensure!(fps.is_plausible(), "the frame rate is {fps}, expected 1 to 1000 fps");
     metadata.normalisation.check()?;
     metadata.representation.check()?;
@@ -230,8 +253,7 @@ pub fn checkpoint_file(path: &Path) -> Result<PathBuf> {
     })
 }
 
-/// Shared lock on the model of a checkpoint (a file, or the folder of a training), so that `forget` cannot remove it
-/// while it is in use.
+/// Shared lock on the model of a checkpoint (a file, or the folder of a training), so that `forget` does not remove it.
 pub fn model_lock(checkpoint: &Path) -> Result<FolderLock> {
     FolderLock::shared(if checkpoint.is_dir() { checkpoint } else { checkpoint.parent().unwrap_or(checkpoint) })
 }
@@ -261,6 +283,7 @@ mod tests {
             ("/speaker/network/width", 1_000_000),
             ("/speaker/network/width", 0),
             ("/speaker/network/n_mels", 1_000_000),
+            ("/speaker/network/vocabulary", 3),
             ("/speaker/fps/num", 4_000_000_000u32),
             ("/speaker/representation", 7),
             ("/speaker/fps/den", 0),

@@ -91,8 +91,7 @@ impl Representation {
     }
 
     /// Converts raw features [144, T] to joints [T, 49, 3] in metres, with the neck at 0 and the hand roots at the
-    /// wrists.
-    /// `Bones` gives every bone its length of `normal` in every frame.
+    /// wrists. `Bones` gives every bone its length of `normal` in every frame.
     pub fn joints(&self, raw: ArrayView2<f32>, normal: &Normalisation) -> Array3<f32> {
         let Self::Bones { mean, std } = self else { return normal.joints(raw) };
         let mut joints = Array3::<f32>::zeros((raw.ncols(), N_JOINTS, 3));
@@ -113,9 +112,8 @@ impl Representation {
         joints
     }
 
-    /// Bone directions of motion as raw features [T, 144], and a mask of the known ones, for which both ends of the
-    /// bone are visible. Unknown features are 0; those of the hand roots are 0 and known. For `Positions` all are
-    /// unknown.
+    /// Bone directions of motion as raw features [T, 144], and a mask of the known ones, with both ends of the bone
+    /// visible. Unknown features are 0; those of the hand roots are 0 and known. For `Positions` all are unknown.
     pub fn directions(&self, motion: &Motion) -> (Array2<f32>, Array2<bool>) {
         let shape = (motion.n_frames(), N_FEATURES);
         let (mut features, mut known) = (Array2::zeros(shape), Array2::from_elem(shape, false));

@@ -7,8 +7,9 @@ use super::GestureGenerator;
 use super::model::{GenerationChoice, checkpoint_file};
 use super::normalisation::Normalisation;
 use super::seq2seq::SequenceGenerator;
-use super::seq2seq::architecture::{self, Architecture};
+use super::seq2seq::architecture::Architecture;
 use super::seq2seq::metadata::is_sequence_kind;
+use super::word_input::KnownWords;
 use anyhow::{Result, bail, ensure};
 use candle_core::{DType, Tensor};
 use orator_base::types::pose3d::Motion;
@@ -35,8 +36,7 @@ impl TrainedSpeaker {
         Self::open_as(path, &GenerationChoice::default())
     }
 
-    /// Like `open`, for the chosen speaker and variant. Also fails if the network does not have the speaker, or has no
-    /// variants.
+    /// Like `open`, for the chosen speaker and variant. Also fails if the network lacks the speaker or has no variants.
     pub fn open_as(path: &Path, choice: &GenerationChoice) -> Result<Self> {
         let file = checkpoint_file(path)?;
         let kind = &checkpoint::facts(&file)?["speaker"]["kind"];
@@ -98,8 +98,16 @@ impl TrainedSpeaker {
     /// Size of the vocabulary; 0 if the model does not read words.
     pub fn n_words(&self) -> usize {
         match self {
-            Self::Gan(_) => 0,
+            Self::Gan(speaker) => speaker.known_words().map_or(0, |known_words| known_words.vocabulary.words().len()),
             Self::Sequence(speaker) => speaker.metadata.vocabulary.words().len(),
+        }
+    }
+
+    /// Vocabulary and table of word vectors; `None` if the model does not read words.
+    pub fn known_words(&self) -> Option<KnownWords<'_>> {
+        match self {
+            Self::Gan(speaker) => speaker.known_words(),
+            Self::Sequence(speaker) => Some(speaker.known_words()).filter(|_| speaker.reads_words()),
         }
     }
 
@@ -125,14 +133,14 @@ impl TrainedSpeaker {
     }
 
     pub fn reads_words(&self) -> bool {
-        self.architecture().is_some_and(|of| architecture::word_encoder(of).is_some())
+        self.known_words().is_some()
     }
 
     /// Words that are not in the vocabulary take their vectors from this table. Fails if the model does not read words,
     /// or if its word vectors have another dimension.
     pub fn set_word_vectors(&mut self, vectors: Arc<WordVectors>) -> Result<()> {
         match self {
-            Self::Gan(speaker) => bail!("the model of {} does not read words: omit --words", speaker.name()),
+            Self::Gan(speaker) => speaker.set_word_vectors(vectors),
             Self::Sequence(speaker) => speaker.set_word_vectors(vectors),
         }
     }
@@ -143,7 +151,7 @@ impl TrainedSpeaker {
     /// Sound that is too short or of another rate; a model of a captured skeleton.
     pub fn motion(&self, sound: &Sound, words: &[Word]) -> Result<Motion> {
         match self {
-            Self::Gan(speaker) => speaker.motion(sound),
+            Self::Gan(speaker) => speaker.motion(sound, words),
             Self::Sequence(speaker) => speaker.motion(&speaker.poses(sound, words)?),
         }
     }

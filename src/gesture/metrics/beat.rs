@@ -49,7 +49,6 @@ fn track(pair: &PairedFrames, poses: &[[Vec3; N_JOINTS]], joint: usize) -> Vec<V
 }
 
 const OF_REAL: &str = "beat_consistency_of_real";
-/// Joints whose beats are measured.
 const JOINTS: [usize; 4] = [R_ELBOW, R_WRIST, L_ELBOW, L_WRIST];
 /// Width of the Gaussian kernel of the time between beat and onset, seconds.
 const SIGMA: f64 = 0.1;
@@ -154,8 +153,7 @@ pub(crate) fn emage(fps: f64) -> MetricFamily {
     })
 }
 
-/// Absolute deviations from the mean by coordinate. The original code computes L1div in place, and searches the
-/// modified array for beats.
+/// Absolute deviations from the mean by coordinate. The original code computes L1div in place, and finds beats in it.
 fn abs_deviations(positions: &[Vec3]) -> Vec<Vec3> {
     let visible: Vec<&Vec3> = positions.iter().filter(|p| p.iter().all(|v| v.is_finite())).collect();
     let mean: Vec3 = std::array::from_fn(|k| visible.iter().map(|p| p[k]).sum::<f64>() / visible.len() as f64);
@@ -205,8 +203,7 @@ pub(crate) fn aist(fps: f64) -> MetricFamily {
     })
 }
 
-/// Sum of the distances that joints 1-6 moved since the previous frame, 0 in the first frame; NaN where one is not
-/// visible.
+/// Sum of the distances joints 1-6 moved since the previous frame, 0 in the first frame; NaN where one is not visible.
 fn envelope(pair: &PairedFrames, poses: &[[Vec3; N_JOINTS]]) -> Vec<f64> {
     let joints = BodyPart::Body.joints();
     let at = |t: usize| match t {
@@ -219,8 +216,7 @@ fn envelope(pair: &PairedFrames, poses: &[[Vec3; N_JOINTS]]) -> Vec<f64> {
     (0..pair.n_frames()).map(at).collect()
 }
 
-/// Three joints of two neighbouring bones, and the mean change of their angle in the original dataset, half turns per
-/// frame.
+/// Three joints of two neighbouring bones, and their angle's mean change in the original dataset, half turns per frame.
 const TRIMODAL_ANGLES: [([usize; 3], f64); 4] = [
     ([NECK, R_SHOULDER, R_ELBOW], 0.003_454_075_893_387_198_4),
     ([R_SHOULDER, R_ELBOW, R_WRIST], 0.007_043_459_918_349_981),

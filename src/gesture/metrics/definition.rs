@@ -24,8 +24,7 @@ pub struct Definition {
     /// Name such as `pck_3d`, `mpjpe`, `frechet_pose`.
     pub name: &'static str,
     /// Part of the body. `all`: the 48 joints without the neck, including the two hand roots, which duplicate the
-    /// wrists.
-    /// `body`: shoulders, elbows, wrists. `hands`: the 40 finger joints. All parts: [`BodyPart`].
+    /// wrists. `body`: shoulders, elbows, wrists. `hands`: the 40 finger joints. All parts: [`BodyPart`].
     pub part: &'static str,
     /// Unit; `1` for a share or a ratio.
     pub unit: &'static str,

@@ -1,6 +1,5 @@
 //! One interval of predicted motion with its ground truth; no metric extends across its borders. Windows of a few
-//! consecutive frames in which a point is visible, from which most metrics compute a value, and the mean of these
-//! values over all windows.
+//! frames in which a point is visible, from which most metrics compute a value, and their mean over all windows.
 
 use super::definition::{BodyPart, Definition, MeasuredPoint, MetricFamily};
 use super::sums::BlockSums;

@@ -14,7 +14,6 @@ use serde::{Deserialize, Serialize};
 
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct MetricSettings {
-    /// Convention whose definitions apply.
     pub convention: Convention,
     /// Tolerances of PCK as shares of the largest extent of the pose, each > 0.
     pub alphas: Vec<f64>,

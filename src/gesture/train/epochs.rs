@@ -37,8 +37,7 @@ pub trait ValidatedTraining {
     /// Name of the speaker, and section of the configuration.
     fn names(&self) -> (&str, &'static str);
     fn schedule(&self) -> EpochSchedule;
-    /// Whether the weights come from another training; `run` then validates them before the first step, which may make
-    /// them worse.
+    /// Whether the weights come from another training; `run` then validates them first, since a step may worsen them.
     fn is_pretrained(&self) -> bool {
         false
     }
@@ -213,8 +212,7 @@ pub struct StoppedTraining {
     pub steps: usize,
     /// Checkpoint of this step; `None` if no step was completed.
     pub newest: Option<PathBuf>,
-    /// Step and path of the best checkpoint so far; `None` before the first validation, or if the training selects
-    /// none.
+    /// Step and path of the best checkpoint so far; `None` before the first validation or if none is selected.
     pub best: Option<(usize, PathBuf)>,
 }
 

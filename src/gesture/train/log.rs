@@ -1,7 +1,6 @@
 //! Log of a training: `metrics.jsonl`, one JSON object with a `step` per line, and the same values as an event file for
-//! TensorBoard. A resumed training drops the lines after its checkpoint's step, so both files are identical to those of
-//! an uninterrupted training. Progress lines are printed at least twice a minute and after every twentieth of the
-//! steps.
+//! TensorBoard. A resumed training drops the lines after its checkpoint's step, so both files equal those of an
+//! uninterrupted training. Progress lines are printed at least twice a minute and after every twentieth of the steps.
 
 use anyhow::{Context, Result};
 use orator_base::stage::workdir;

@@ -11,3 +11,4 @@ pub mod no_window;
 pub mod optim;
 pub mod resume;
 pub mod seq2seq;
+pub mod word_vectors;

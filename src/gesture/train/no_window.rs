@@ -1,5 +1,4 @@
-//! Explains why a split of a dataset has no window to train or validate on, or too little motion, and suggests a
-//! remedy.
+//! Explains why a split has no window to train or validate on, or too little motion, and suggests a remedy.
 
 use anyhow::{Result, bail};
 use orator_base::text::{counted, length};

@@ -1,7 +1,6 @@
 //! Audio of a file as mono at one rate, on the clock of its images: sample k is at k / rate seconds after the first
 //! image. Earlier audio is cut; a late start and gaps in the container become silence. A file without images starts
-//! with its first sample. Audio more than ten minutes after the preceding audio, or beyond a day, is dropped as
-//! damaged.
+//! with its first sample. Audio more than ten minutes after the previous audio, or beyond a day, is dropped as damaged.
 
 use super::decode::StreamDecoder;
 use super::downmix::Downmix;
@@ -26,8 +25,7 @@ const CORRECTION_SECS: f64 = 1.0;
 /// Number of samples resampled at once.
 const CHUNK: usize = 65_536;
 
-/// All audio of `path` (wav, flac, mp3, a video, ...) as mono at `rate` samples per second; `None` if it has no
-/// audio.
+/// All audio of `path` (wav, flac, mp3, a video, ...) as mono at `rate` samples per second; `None` if it has no audio.
 pub fn read_mono(path: &Path, rate: u32) -> Result<Option<Sound>> {
     Ok(read_mono_with_note(path, rate)?.map(|(sound, _)| sound))
 }
@@ -90,8 +88,7 @@ pub struct StreamedSound {
     pub opposite_phase_secs: f64,
 }
 
-/// Decodes the audio track `track` of `path` (from 1; 0: automatic choice) and passes it to `sink` in chunks; `None`
-/// without audio.
+/// Decodes track `track` of `path` (from 1; 0: automatic) and passes it to `sink` in chunks; `None` without audio.
 ///
 /// # Errors
 ///
@@ -157,8 +154,7 @@ struct ClockDrift {
 }
 
 impl ClockDrift {
-    /// Adds a frame of `secs` whose timestamp is `drift` seconds late; returns the mean difference after each
-    /// `MEAN_SECS`.
+    /// Adds a frame of `secs` whose timestamp is `drift` seconds late; returns the mean after each `MEAN_SECS`.
     fn mean(&mut self, drift: f64, secs: f64) -> Option<f64> {
         self.sum += drift * secs;
         self.secs += secs;

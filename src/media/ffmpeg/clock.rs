@@ -33,7 +33,6 @@ pub(crate) struct StreamClock {
     joins: Vec<i64>,
 }
 
-/// Correction of a run.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct RunShift {
     /// Number of the first packet in its stream.

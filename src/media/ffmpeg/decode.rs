@@ -25,8 +25,7 @@ pub(crate) struct StreamDecoder {
 }
 
 impl StreamDecoder {
-    /// Creates a decoder of stream `stream_idx` with `threads` threads (0: one per core). The other streams are not
-    /// read.
+    /// Creates a decoder of stream `stream_idx` with `threads` threads (0: one per core). Other streams are not read.
     pub(crate) fn new(
         path: &Path,
         mut input: format::context::Input,

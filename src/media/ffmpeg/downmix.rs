@@ -1,6 +1,5 @@
-//! Mix of the channels of a continuous run to mono. Where the two channels of stereo have opposite phase, their mean
-//! would be near silence, so the louder channel is used there: decided for blocks of half a second, with hysteresis;
-//! changes are cross-faded.
+//! Mix of a run's channels to mono. Where the two channels of stereo have opposite phase, their mean would be near
+//! silence, so the louder one is used: decided for blocks of half a second, with hysteresis; changes are cross-faded.
 
 use super::resample::{Resampler, SoundFormat};
 use anyhow::{Result, ensure};
@@ -159,8 +158,7 @@ mod tests {
 
     const RATE: u32 = 16_000;
 
-    /// Passes a signal of some seconds through the choice, in pieces; `right` returns the right channel of the left
-    /// one at a time in seconds.
+    /// Passes a signal through the choice, in pieces; `right` returns the right channel of the left one at a time.
     fn chosen(secs: f64, amplitude: f32, right: impl Fn(f64, f32) -> f32) -> (Vec<f32>, Vec<f32>, u64) {
         let mut choice = ChannelChoice::new(RATE);
         let (mut out, mut all_left) = (Vec::new(), Vec::new());

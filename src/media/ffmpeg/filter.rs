@@ -37,8 +37,7 @@ impl FilterGraph {
     /// Passes a frame to the chain; `None` marks the end.
     fn push(&mut self, frame: Option<&frame::Video>) -> Result<()> {
         let mut source = self.0.get("in").context("the filter graph has no source")?;
-        // SAFETY: the source belongs to the live graph and takes its own reference to a live frame; null marks the
-        // end.
+        // SAFETY: the source belongs to the live graph and takes its own reference to a live frame; null marks the end.
         let code = unsafe {
             let frame = frame.map_or(std::ptr::null(), |frame| frame.as_ptr());
             ffi::av_buffersrc_write_frame(source.as_mut_ptr(), frame)
@@ -80,7 +79,6 @@ pub(crate) fn deinterlaced(
     graph.pull()
 }
 
-/// Transfer function of an HDR image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum HdrTransfer {
     Pq,

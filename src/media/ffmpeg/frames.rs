@@ -18,8 +18,7 @@ use std::path::{Path, PathBuf};
 
 /// Maximum number of cached converters, one per image size.
 const MAX_CONVERTERS: usize = 8;
-/// Decoding starts at least this long before a seek position, seconds: images at a seek point may refer to earlier
-/// ones.
+/// Decoding starts at least this long before a seek position, seconds: images there may refer to earlier ones.
 const LEAD_SECS: f64 = 1.0;
 /// Relative difference below which two aspect ratios are equal.
 const ASPECT_TOLERANCE: f64 = 0.01;
@@ -203,7 +202,6 @@ impl FrameReader {
         self.shown.frame.is_interlaced()
     }
 
-    /// Header information.
     pub fn info(&self) -> &ProbedMedia {
         &self.info
     }
@@ -296,8 +294,7 @@ impl FrameReader {
         Ok(if fitted_size == size { picture } else { picture.framed(size) })
     }
 
-    /// Size of the shown frame within an image of `size`: smaller if its aspect ratio differs from that of the first
-    /// frame.
+    /// Size of the shown frame within an image of `size`: smaller if its aspect ratio differs from the first frame's.
     fn fitted_size(&self, size: [usize; 2]) -> [usize; 2] {
         let shown = upright_size(&self.shown.frame, self.orientation);
         if has_same_aspect(shown, self.image_size) {

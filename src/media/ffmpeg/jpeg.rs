@@ -11,7 +11,6 @@ use orator_base::types::image::Image;
 /// ffmpeg's quality scale, 1 (best) to 31; about what cameras write at quality 85.
 const QUALITY: i32 = 4;
 
-/// Encodes an image as a JPEG file.
 pub fn encode(image: &Image) -> Result<Vec<u8>> {
     super::source::init();
     let [width, height] = [u32::try_from(image.width)?, u32::try_from(image.height)?];

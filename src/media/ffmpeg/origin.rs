@@ -24,8 +24,7 @@ pub fn start_secs(path: &Path) -> Result<f64> {
     Ok((secs * 1e4).round().max(0.0) / 1e4)
 }
 
-/// Presentation time of the first image of `path` that decodes, seconds on the container's clock; `None` without
-/// images.
+/// Presentation time of the first decodable image of `path`, seconds on the container's clock; `None` without images.
 pub(crate) fn first_picture_secs(path: &Path) -> Result<Option<f64>> {
     let input = source::open(path)?;
     let has_edits = input.format().name().contains("mp4");

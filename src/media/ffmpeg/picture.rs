@@ -1,5 +1,4 @@
-//! Converts decoded frames to upright RGB images: colour conversion and scaling with swscale, tone mapping of HDR,
-//! rotation.
+//! Converts decoded frames to upright RGB: colour conversion and scaling with swscale, tone mapping of HDR, rotation.
 
 use super::filter::{HdrTransfer, ToneMapper};
 use super::orientation::Orientation;

@@ -1,5 +1,4 @@
-//! Reads the headers of a media file without decoding. Missing values are `None`; a file with neither video nor audio
-//! is an error.
+//! Reads the headers of a file without decoding. Missing values are `None`; a file without video and audio is an error.
 
 use super::orientation::Orientation;
 use super::source;
@@ -10,7 +9,6 @@ use ffmpeg_next::format::stream::Stream;
 use orator_base::types::time::FrameRate;
 use std::path::Path;
 
-/// Streams of a file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ProbedMedia {
     /// Stated length, seconds: of the video stream, or else of the audio stream; `None` if no header states it.
@@ -19,7 +17,6 @@ pub struct ProbedMedia {
     pub audio: Option<AudioInfo>,
 }
 
-/// Properties of a video stream.
 #[derive(Clone, Debug, PartialEq)]
 pub struct VideoInfo {
     /// Codec name used by ffmpeg: `h264`, `hevc`, `vp9`.
@@ -34,7 +31,6 @@ pub struct VideoInfo {
     pub fps: Option<FrameRate>,
 }
 
-/// Properties of an audio stream.
 #[derive(Clone, Debug, PartialEq)]
 pub struct AudioInfo {
     /// Codec name used by ffmpeg: `aac`, `opus`, `pcm_s16le`.

@@ -1,5 +1,4 @@
-//! Conversion of decoded audio to mono f32 at one rate with swresample. A `Resampler` handles one continuous run of
-//! one format.
+//! Conversion of decoded audio to mono f32 at one rate with swresample. A `Resampler` handles one run of one format.
 
 use anyhow::{Context, Result, ensure};
 use ffmpeg_next as ffmpeg;
@@ -7,7 +6,6 @@ use ffmpeg_next::format::{Sample, sample};
 use ffmpeg_next::software::resampling;
 use ffmpeg_next::{ChannelLayout, Dictionary, frame};
 
-/// Format of an audio frame.
 #[derive(Clone, Copy, PartialEq)]
 pub(crate) struct SoundFormat {
     pub sample: Sample,
@@ -35,8 +33,7 @@ pub(crate) fn first_not_finite(frame: &frame::Audio) -> Option<usize> {
     let n_values = n_samples * n_each;
     #[allow(clippy::cast_ptr_alignment)] // ffmpeg aligns its planes
     let first = |plane: usize| {
-        // SAFETY: the extended_data of a decoded frame holds a pointer for each of its planes, each to `n_values`
-        // values of its format.
+        // SAFETY: the extended_data of a frame holds a pointer per plane, each to `n_values` values of its format.
         let value = unsafe {
             let values = *(*frame.as_ptr()).extended_data.add(plane);
             if is_double {
@@ -57,8 +54,7 @@ pub(crate) struct Resampler {
     rate: u32,
     n_in: u64,
     n_out: u64,
-    /// Number of samples added (or, if negative, removed) to compensate drift, and the input count at which
-    /// the last compensation ends.
+    /// Number of samples added (negative: removed) to compensate drift, and the input count at which the last ends.
     n_compensated: i64,
     compensation_end: u64,
 }

@@ -10,8 +10,7 @@ use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 const CHUNK: usize = 16_384;
 const N_AHEAD: usize = 8;
 
-/// Number of samples of the audio of `path` as mono at `rate`, found by decoding it, and a note on the mix, if any;
-/// `None` without audio.
+/// Number of samples of `path` as mono at `rate`, by decoding it, and a note on the mix, if any; `None` without audio.
 pub fn n_samples(path: &Path, rate: u32) -> Result<Option<(usize, Option<String>)>> {
     let mut n = 0;
     let streamed = stream_mono(path, 0, rate, &mut |chunk| {

@@ -11,9 +11,8 @@ pub struct Normaliser {
 }
 
 impl Normaliser {
-    /// Creates the conversion `(byte * scale - mean) / std`, with `mean` and `std` in the channel order of the
-    /// tensor. `bgr`: that order is blue, green, red. `planar`: one plane per channel (NCHW), otherwise interleaved
-    /// channels (NHWC).
+    /// Creates the conversion `(byte * scale - mean) / std`, with `mean` and `std` in the channel order of the tensor.
+    /// `bgr`: that order is blue, green, red. `planar`: one plane per channel (NCHW), otherwise interleaved (NHWC).
     pub fn new(bgr: bool, planar: bool, scale: f64, mean: [f64; 3], std: [f64; 3]) -> Self {
         let channel = |c: usize| {
             let table = std::array::from_fn(|byte| ((byte as f64 * scale - mean[c]) / std[c]) as f32);
@@ -22,8 +21,7 @@ impl Normaliser {
         Self { channels: [channel(0), channel(1), channel(2)], planar }
     }
 
-    /// Writes the image into `tensor` of 3 * width * height numbers; excess elements of a larger tensor are
-    /// unchanged.
+    /// Writes the image into `tensor` of 3 * width * height numbers; excess elements of a larger tensor are unchanged.
     pub fn fill(&self, image: &Image, tensor: &mut [f32]) {
         let [(i0, t0), (i1, t1), (i2, t2)] = &self.channels;
         let pixels = image.data.chunks_exact(3);

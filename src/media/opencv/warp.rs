@@ -40,8 +40,7 @@ pub struct Region {
 }
 
 impl Region {
-    /// Transform for a crop of `size` x `size` pixels; `None` for an implausible square (not finite, smaller than a
-    /// pixel, or far outside).
+    /// Transform for a `size` x `size` crop; `None` for an implausible square (not finite, below a pixel, far outside).
     pub fn src_from_dst(&self, size: usize) -> Option<SrcFromDst> {
         let (sin, cos) = self.rotation.sin_cos();
         let scale = self.side / size as f64;
@@ -110,8 +109,7 @@ pub fn resize(src: &Image, dst: &mut Image) -> Result<()> {
     Ok(())
 }
 
-/// Fits all of `src` into the top left of `dst` with its aspect ratio preserved, and fills the rest with grey level
-/// `pad`.
+/// Fits `src` into the top left of `dst` with its aspect ratio preserved, and fills the rest with grey level `pad`.
 pub fn letterbox_top_left(src: &Image, dst: &mut Image, pad: u8) -> Result<SrcFromDst> {
     let (source, canvas) = ([side(src.width)?, side(src.height)?], [side(dst.width)?, side(dst.height)?]);
     let scale = (f64::from(canvas[0]) / f64::from(source[0])).min(f64::from(canvas[1]) / f64::from(source[1]));
@@ -124,8 +122,7 @@ pub fn letterbox_top_left(src: &Image, dst: &mut Image, pad: u8) -> Result<SrcFr
     Ok(SrcFromDst([[1.0 / scale, 0.0, 0.0], [0.0, 1.0 / scale, 0.0]]))
 }
 
-/// Fits all of `src` into the centre of `dst` with its aspect ratio preserved, and fills the rest with grey level
-/// `pad`.
+/// Fits `src` into the centre of `dst` with its aspect ratio preserved, and fills the rest with grey level `pad`.
 pub fn letterbox_centre(src: &Image, dst: &mut Image, pad: u8) -> Result<SrcFromDst> {
     let (source, canvas) = ([side(src.width)?, side(src.height)?], [side(dst.width)?, side(dst.height)?]);
     let step = (f64::from(source[0]) / f64::from(canvas[0])).max(f64::from(source[1]) / f64::from(canvas[1]));
@@ -139,8 +136,7 @@ pub fn letterbox_centre(src: &Image, dst: &mut Image, pad: u8) -> Result<SrcFrom
     Ok(transform)
 }
 
-/// Image as an OpenCV matrix without copying. Also disables OpenCV's own threads, since workers already run in
-/// parallel.
+/// Image as an OpenCV matrix without copying. Disables OpenCV's own threads, since workers already run in parallel.
 fn borrow(image: &Image) -> Result<BoxedRef<'_, Mat>> {
     static ONE_THREAD: Once = Once::new();
     ONE_THREAD.call_once(|| {

@@ -34,14 +34,12 @@ const DENIED: &[c_long] = calls![
     SYS_add_key SYS_request_key SYS_keyctl SYS_init_module SYS_finit_module SYS_delete_module SYS_kexec_load SYS_reboot
 ];
 
-/// Calls of newer kernels, whose numbers are the same on all architectures: fchmodat2, setxattrat, removexattrat,
-/// file_setattr.
+/// Calls of newer kernels, numbered equally on all architectures: fchmodat2, setxattrat, removexattrat, file_setattr.
 const DENIED_NEWER: &[c_long] = &[452, 463, 466, 469];
 
-/// Calls whose first argument is a process id: rejected unless it is 0, the caller itself. A filter cannot
-/// distinguish the ids of the process's own threads from other ids, so these are rejected too. Queries of scheduling,
-/// priority, affinity and process groups (`sched_get*`, `getpriority`, `ioprio_get`, `getpgid`, `getsid`) change
-/// nothing and are allowed.
+/// Calls whose first argument is a process id: rejected unless it is 0, the caller itself. A filter cannot distinguish
+/// ids of the process's threads from others, so these are rejected too. Queries of scheduling, priority, affinity and
+/// process groups (`sched_get*`, `getpriority`, `ioprio_get`, `getpgid`, `getsid`) change nothing and are allowed.
 const DENIED_FOR_OTHER_PROCESSES: &[c_long] = calls![
     SYS_prlimit64 SYS_sched_setaffinity SYS_sched_setscheduler SYS_sched_setparam SYS_sched_setattr SYS_setpgid
     SYS_get_robust_list
@@ -101,8 +99,7 @@ pub(crate) fn restrict() -> Result<(), Error> {
     // The foreground process group of the terminal.
     deny(libc::SYS_ioctl, 1, SeccompCmpOp::Eq, libc::TIOCSPGRP)?;
     install(rules, libc::EPERM)?;
-    // The flags of `clone3` are behind a pointer, which a filter cannot read: with ENOSYS, the C library falls back
-    // to `clone`.
+    // The flags of `clone3` are behind a pointer, which a filter cannot read: after ENOSYS, the C library uses `clone`.
     install([(libc::SYS_clone3, Vec::new())].into(), libc::ENOSYS)?;
     apply_filter(&X32_FILTER)
 }
@@ -117,8 +114,7 @@ fn install(rules: BTreeMap<i64, Vec<SeccompRule>>, errno: i32) -> Result<(), Err
     apply_filter(&seccompiler::BpfProgram::try_from(filter)?)
 }
 
-/// Rejects call numbers from 2^30 up, under which x86-64 has all calls a second time (x32): load the number; compare;
-/// EPERM; allow.
+/// Rejects call numbers from 2^30 up, where x86-64 has all calls again (x32): load the number; compare; EPERM; allow.
 const X32_FILTER: [sock_filter; 4] = [
     sock_filter { code: (libc::BPF_LD | libc::BPF_W | libc::BPF_ABS) as u16, jt: 0, jf: 0, k: 0 },
     sock_filter { code: (libc::BPF_JMP | libc::BPF_JGE | libc::BPF_K) as u16, jt: 0, jf: 1, k: 1 << 30 },

@@ -1,5 +1,4 @@
-//! Landlock rules: files can be read and written only as `FileAccess` states; TCP and signals to other processes are
-//! blocked.
+//! Landlock rules: files can be read and written only as `FileAccess` states; TCP and signals to others are blocked.
 
 use super::FileAccess;
 use landlock::{

@@ -1,6 +1,5 @@
 //! Permanent restriction of the process before it starts threads: the `files` that it can read and write (Landlock),
-//! and the system `calls` that it can make (seccomp). Neither needs privileges. `stop_signals` is for parents of such
-//! processes.
+//! and its system `calls` (seccomp). Neither needs privileges. `stop_signals` is for parents of such processes.
 
 mod calls;
 mod files;

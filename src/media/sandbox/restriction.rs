@@ -52,8 +52,7 @@ pub fn restrict(access: &FileAccess) -> Restriction {
     restrict_thread(access)
 }
 
-/// Restricts this thread and the threads that it starts, as [`restrict`] does for a process; other threads are
-/// unaffected.
+/// Restricts this thread and those that it starts, as [`restrict`] does for a process; other threads are unaffected.
 pub fn restrict_thread(access: &FileAccess) -> Restriction {
     let calls = super::calls::restrict().map_err(|error| format!("seccomp: {error}"));
     Restriction { files: super::files::restrict(access), calls }

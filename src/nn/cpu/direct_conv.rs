@@ -1,8 +1,7 @@
-//! Direct convolution over two axes, channels last, on plain slices: forward and the gradient of the input, f32 or
-//! f64. Nothing is unfolded: the tiles of `kernel` read their left factors in place (from a padded copy of a few rows,
-//! which stays in the cache) and multiply them with weights that are packed once per pass. A convolution over time
-//! only has one axis of length 1. Every value is summed by one thread in a fixed order, so results do not depend on
-//! the number of threads.
+//! Direct convolution over two axes, channels last, on plain slices: forward and the gradient of the input, f32 or f64.
+//! Nothing is unfolded: the tiles of `kernel` read their left factors in place (from a padded copy of a few rows in the
+//! cache) and multiply them with weights that are packed once per pass. A convolution over time only has one axis of
+//! length 1. Every value is summed by one thread in a fixed order, so results do not depend on the number of threads.
 
 use super::axis::{AxisWindows, ConvAxis};
 use super::kernel::{MAX_ROWS, TileSteps};
@@ -197,8 +196,7 @@ impl ConvPass {
                             inner: TileSteps { n: part.len(), left: 1, right: panel.columns },
                         };
                         let begin = (row == 0 && part.start == 0).then_some(begin);
-                        // SAFETY: the positions lie inside the padded copy and `to`; the caller guarantees exclusive
-                        // access.
+                        // SAFETY: the positions lie inside the padded copy and `to`; the caller has exclusive access.
                         unsafe { panel.multiply(&panels.data, padded, &positions, to, begin, &at) };
                     }
                 }

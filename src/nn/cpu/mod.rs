@@ -1,5 +1,5 @@
 //! CPU kernels of the operators: direct convolution over packed weights, weight gradients, channel statistics,
-//! row-wise loops of recurrent layers, and their thread pools.
+//! row-wise loops of recurrent layers and transformers, and their thread pools.
 //!
 //! # Threads of the program
 //!
@@ -21,5 +21,6 @@ pub mod kernel;
 pub mod packed_matrix;
 pub mod spin_pool;
 pub mod tensor;
+pub mod transformer;
 pub mod vectorised;
 pub mod weight_gradient;

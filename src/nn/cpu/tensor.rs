@@ -72,14 +72,12 @@ pub fn is_f64(dtype: DType) -> Result<bool> {
     }
 }
 
-/// Number of values from `start` to the next cache line, less than [`LANES`]. Vectors that span two cache lines are
-/// loaded at half the speed.
+/// Values from `start` to the next cache line, below [`LANES`]. Vectors across two cache lines load at half the speed.
 pub fn aligned<T>(start: *const T) -> usize {
     start.align_offset(64).min(LANES - 1)
 }
 
-/// Calls `f` with a buffer of `len` values of arbitrary content, aligned to a cache line; the memory is reused by
-/// later calls.
+/// Calls `f` with a buffer of `len` values of arbitrary content, aligned to a cache line; later calls reuse the memory.
 pub fn scratch<T: Scalar, R>(len: usize, f: impl FnOnce(&mut [T]) -> R) -> R {
     let mut buffer = T::pool().with_borrow_mut(Vec::pop).unwrap_or_default();
     if buffer.len() < len + LANES {
@@ -150,8 +148,7 @@ pub fn add_product<T: Scalar>(sum: &mut [T], left: Matrix<T>, right: Matrix<T>, 
     unsafe { gemm_on_this_thread(sum.as_mut_ptr(), n, true, left, right, [m, n, depth]) };
 }
 
-/// Computes `left x right`, [m, depth] x [depth, n], into rows at `to` with distance `stride`: added to their values,
-/// or overwriting them.
+/// Computes `left x right`, [m, depth] x [depth, n], into rows at `to` with distance `stride`: added or overwriting.
 ///
 /// # Safety
 /// The factors have this many rows and columns, and `to` this many rows, which no other thread reads or writes.

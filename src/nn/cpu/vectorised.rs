@@ -177,7 +177,7 @@ fn attend_backward_body<T: Scalar>(of: Attended<'_, T>, of_state: &mut [T], of_k
 }
 
 #[inline(always)]
-fn inner_product<T: Scalar>(a: &[T], b: &[T]) -> T {
+pub(super) fn inner_product<T: Scalar>(a: &[T], b: &[T]) -> T {
     let mut lanes = [T::zero(); COLUMNS];
     for (a, b) in a.as_chunks::<COLUMNS>().0.iter().zip(b.as_chunks::<COLUMNS>().0) {
         for i in 0..COLUMNS {
@@ -188,7 +188,7 @@ fn inner_product<T: Scalar>(a: &[T], b: &[T]) -> T {
 }
 
 #[inline(always)]
-fn add_scaled<T: Scalar>(to: &mut [T], scale: T, row: &[T]) {
+pub(super) fn add_scaled<T: Scalar>(to: &mut [T], scale: T, row: &[T]) {
     to.iter_mut().zip(row).for_each(|(to, value)| *to += scale * *value);
 }
 
@@ -226,8 +226,7 @@ fn drop_body<T: Scalar>(values: &mut [T], first: usize, mask: DropMask) {
     }
 }
 
-/// e^x to 2 units in the last place (range reduction and polynomial of Cephes), without branches, so that loops are
-/// vectorised.
+/// e^x to 2 units in the last place (range reduction and polynomial of Cephes), branch-free, so loops are vectorised.
 #[inline(always)]
 pub fn exp_f32(x: f32) -> f32 {
     /// Adding it to a number of moderate size leaves the number's integer part in the lowest bits.

@@ -69,8 +69,7 @@ pub fn gradient_of_weight<T: Scalar>(s: &ConvSizes, x: &[T], grad: &[T]) -> Vec<
     }
 }
 
-/// Pads the channels with zeros to complete vectors (`None` if they are already complete); returns the number of
-/// channels.
+/// Pads the channels with zeros to complete vectors (`None` if they are already complete); returns their number.
 fn pad_channels<T: Scalar>(values: &[T], n: usize, lanes: usize) -> (Option<Vec<T>>, usize) {
     let padded = n.next_multiple_of(lanes);
     if padded == n {
@@ -100,8 +99,7 @@ fn sum_products<T: Scalar>(
     let mut sums = vec![T::zero(); columns.kernel * channels.len() * width];
     let start = sums.as_mut_ptr();
     let inside = rows.inside(row_offset);
-    // A block consists of rows of a sample or, if a sample has one row, of samples; a row longer than a block is
-    // divided.
+    // A block has rows of a sample or, if a sample has one row, of samples; a row longer than a block is divided.
     let n_positions = POSITIONS.min(columns.n_out);
     let n_lines = (POSITIONS / columns.n_out).max(1);
     let x_at =

@@ -4,6 +4,7 @@
 //! convolution blocks are also those of the discriminator.
 
 use super::speaker_layer::SpeakerLayer;
+use super::words::{WordFrames, WordLayer};
 use crate::ops::batch_norm::BatchNorm;
 use crate::ops::conv_norm::conv_norm;
 use crate::ops::conv2d::{self, Conv};
@@ -58,6 +59,11 @@ pub struct Config {
     /// Whether the speaker layers multiply by weights, or only add vectors, as in earlier versions.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub speaker_weights: bool,
+    /// Number of word indices, and dimension of the word embeddings (`WordLayer`); 0: a network without word input.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub vocabulary: usize,
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub word: usize,
 }
 
 fn is_zero(n: &usize) -> bool {
@@ -73,7 +79,8 @@ impl Config {
     /// which the running statistics lag behind in trainings of some hundred steps on a CPU, so `light` uses 0.1.
     pub fn from_preset(preset: Preset, n_out: usize) -> Self {
         let norm_momentum = if preset == Preset::Paper { 0.01 } else { 0.1 };
-        Self { preset, n_mels: 64, width: 256, n_out, norm_momentum, n_speakers: 0, speaker_weights: false }
+        let (n_speakers, speaker_weights, vocabulary, word) = (0, false, 0, 0);
+        Self { preset, n_mels: 64, width: 256, n_out, norm_momentum, n_speakers, speaker_weights, vocabulary, word }
     }
 }
 
@@ -83,6 +90,7 @@ pub struct Generator {
     preset: Preset,
     audio_encoder: Vec<ConvBlock>,
     speakers: Option<SpeakerLayer>,
+    words: Option<WordLayer>,
     enter: Vec<ConvBlock>,
     downs: Vec<ConvBlock>,
     ups: Vec<ConvBlock>,
@@ -103,6 +111,10 @@ impl Generator {
             0 => None,
             n_speakers => Some(SpeakerLayer::new(params, n_speakers, n, config.speaker_weights)?),
         };
+        let words = match config.vocabulary {
+            0 => None,
+            vocabulary => Some(WordLayer::new(params, [vocabulary, config.word, n])?),
+        };
         let mut row = |name: &str, n_blocks: usize, (kernel, stride): (usize, usize)| {
             let block = |i| ConvBlock::new(params, &format!("{name}.{i}"), &[n, n, kernel], stride, momentum);
             (0..n_blocks).map(block).collect::<Result<Vec<_>>>()
@@ -111,6 +123,7 @@ impl Generator {
             preset: config.preset,
             audio_encoder,
             speakers,
+            words,
             enter: row("enter", N_ENTER, PLAIN)?,
             downs: row("down", N_LEVELS, DOWN)?,
             ups: row("up", N_LEVELS, PLAIN)?,
@@ -120,12 +133,33 @@ impl Generator {
     }
 
     /// Maps `mels` [B, n_mels, T_mel] to poses [B, n_out, n_frames]; `n_frames` is at least 1 and covers the same time as
-    /// `mels`. `speakers` as in [`Self::encode`].
+    /// `mels`. `speakers` as in [`Self::encode`]. A network with word input runs without words.
     pub fn forward(&self, mels: &Tensor, speakers: &[u32], n_frames: usize, train: bool) -> Result<Tensor> {
+        self.decode(&self.frames(mels, speakers, None, n_frames, train)?, train)
+    }
+
+    /// Encodes `mels` and the words at the pose frames to the input of [`Self::decode`], [B, n_frames, width];
+    /// arguments as in [`Self::forward`]. Words are ignored by networks without word input.
+    pub fn frames(
+        &self,
+        mels: &Tensor,
+        speakers: &[u32],
+        words: Option<&WordFrames>,
+        n_frames: usize,
+        train: bool,
+    ) -> Result<Tensor> {
         if n_frames == 0 {
             candle_core::bail!("no frames: expected at least 1");
         }
-        self.decode(&resize::linear(&self.encode(mels, speakers, train)?, n_frames)?, train)
+        self.with_words(resize::linear(&self.encode(mels, speakers, train)?, n_frames)?, words)
+    }
+
+    /// Adds words to encoded audio at the pose frames, [B, T, width].
+    pub fn with_words(&self, encoded: Tensor, words: Option<&WordFrames>) -> Result<Tensor> {
+        match &self.words {
+            None => Ok(encoded),
+            Some(layer) => layer.forward(&encoded, words),
+        }
     }
 
     /// Encodes `mels` [B, n_mels, T_mel] to [B, about T_mel / 8, width]. `speakers` has the index of each sample's

@@ -4,6 +4,7 @@
 //! that of one pass.
 
 use super::generator::{FRAMES_MULTIPLE, Generator, Preset};
+use super::words::WordFrames;
 use crate::ops::resize;
 use candle_core::{Result, Tensor};
 use std::ops::Range;
@@ -44,6 +45,8 @@ pub struct StreamingGenerator<'a, M> {
     preset: Preset,
     /// Function that returns the log-mel spectrogram [1, n_mels, T_mel] of a range of frames.
     mels: M,
+    /// Words at all frames, for a network with word input.
+    words: Option<WordFrames>,
     n_mel_frames: usize,
     n_frames: usize,
     chunk: usize,
@@ -75,7 +78,13 @@ impl<'a, M: FnMut(Range<usize>) -> Result<Tensor>> StreamingGenerator<'a, M> {
         if n_encoded_frames(preset, n_mel_frames) == 0 {
             candle_core::bail!("the spectrogram is too short for this network: {n_mel_frames} frames");
         }
-        Ok(Self { generator, preset, mels, n_mel_frames, n_frames, chunk, next: 0, encoded: None, first_encoded: 0 })
+        let (words, encoded) = (None, None);
+        Ok(Self { generator, preset, mels, words, n_mel_frames, n_frames, chunk, next: 0, encoded, first_encoded: 0 })
+    }
+
+    /// Sets the words at all `n_frames` frames, for a network with word input.
+    pub fn with_words(self, words: Option<WordFrames>) -> Self {
+        Self { words, ..self }
     }
 
     fn chunk(&mut self, frames: Range<usize>) -> Result<Tensor> {
@@ -86,7 +95,9 @@ impl<'a, M: FnMut(Range<usize>) -> Result<Tensor>> StreamingGenerator<'a, M> {
         self.encode_until(needed.clone(), n_encoded)?;
         let Some(encoded) = &self.encoded else { candle_core::bail!("no encoded audio frames are buffered") };
         let encoded = encoded.narrow(1, needed.start - self.first_encoded, needed.len())?;
-        let poses = self.generator.decode(&resize::linear_part(&encoded, &part)?, false)?;
+        let words = self.words.as_ref().map(|words| words.part(first..end)).transpose()?;
+        let encoded = self.generator.with_words(resize::linear_part(&encoded, &part)?, words.as_ref())?;
+        let poses = self.generator.decode(&encoded, false)?;
         poses.narrow(2, frames.start - first, frames.len())
     }
 

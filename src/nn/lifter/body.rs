@@ -1,5 +1,4 @@
-//! The body lifter: the temporal-convolution network with its input normalisation, from keypoints over time to poses
-//! over time.
+//! The body lifter: a temporal-convolution network with its normalisation, from keypoints over time to poses over time.
 
 use super::temporal::{Config, TemporalLifter};
 use crate::Mode;
@@ -19,8 +18,7 @@ pub struct BodyLifter {
 }
 
 impl BodyLifter {
-    /// Configuration for this number of channels and these kernel widths, whose product is the number of frames of a
-    /// window.
+    /// Configuration for this number of channels and kernel widths, whose product is the number of frames of a window.
     pub fn config(channels: usize, widths: &[usize]) -> Config {
         Config { n_in: N_IN, n_out: N_OUT, channels, widths: widths.to_vec(), dropout: 0.0 }
     }

@@ -58,8 +58,7 @@ impl HandLifter {
         last.forward(&x)
     }
 
-    /// Lifts hands of the given side to px in the axes of the picture, with the wrist at 0; `None` where too few
-    /// points are visible.
+    /// Lifts hands of the given side to px in picture axes, wrist at 0; `None` where too few points are visible.
     pub fn lift(&self, seen: &[HandPoints], side: Side) -> Result<Vec<Option<HandJoints>>> {
         let views: Vec<Option<HandView>> = seen.iter().map(|s| HandView::new(s, side)).collect();
         let x: Vec<f32> = views.iter().flatten().flat_map(|view| view.numbers).collect();

@@ -17,7 +17,6 @@ use orator_base::types::skeleton::Side;
 /// Prefix of the network's tensors in a weights file.
 pub const NAME: &str = hand::NAME;
 pub const KIND: &str = "hand-heatmap-lifter";
-/// Number of parameters of both networks.
 pub const N_PARAMETERS: usize = 1_637_279 + 2_238_403;
 const MAPS: usize = 21;
 /// Batch size when lifting.
@@ -123,8 +122,7 @@ pub fn right_sides(n: usize, like: &Tensor) -> Result<Tensor> {
     Tensor::new(&[[0f32, 1.0]], &Device::Cpu)?.to_dtype(like.dtype())?.repeat((n, 1))
 }
 
-/// Axis-angle vectors [B, 3] to rotation matrices [B, 9], row by row: Rodrigues' formula with the angle sqrt(|v|^2 +
-/// 1e-8).
+/// Axis-angle vectors [B, 3] to rotation matrices [B, 9], by row: Rodrigues' formula with the angle sqrt(|v|^2 + 1e-8).
 pub fn rotation(vectors: &Tensor) -> Result<Tensor> {
     let angle = (vectors.sqr()?.sum_keepdim(D::Minus1)? + 1e-8)?.sqrt()?;
     let axis = vectors.broadcast_div(&angle)?;
@@ -175,8 +173,7 @@ impl Conv3x3 {
     }
 }
 
-/// Indices of the 3 x 3 input pixels of each output pixel, row by row; `u32::MAX`, which selects zeros, outside the
-/// image.
+/// Indices of the 3 x 3 input pixels of each output pixel, row by row; `u32::MAX` (zeros) outside the image.
 fn input_indices(batch: usize, down: ConvAxis, across: ConvAxis) -> Vec<u32> {
     let at = |axis: ConvAxis, out: usize, offset: usize| {
         (out * axis.stride + offset).checked_sub(axis.pad).filter(|at| *at < axis.n_in)

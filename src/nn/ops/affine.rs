@@ -14,8 +14,7 @@ const ROWS: usize = 48;
 const MAX_CHUNKS: usize = 8;
 const MIN_CHUNK_ROWS: usize = 128;
 
-/// Tensors `<name>.weight` [out, in] and `<name>.bias` [out], both initialised uniformly in +-1 / sqrt(in), as in
-/// PyTorch.
+/// Tensors `<name>.weight` [out, in] and `<name>.bias` [out], both initially uniform in +-1 / sqrt(in), as in PyTorch.
 pub struct Affine {
     weight: Tensor,
     bias: Tensor,
@@ -27,6 +26,11 @@ impl Affine {
         let init = Init::Uniform(1.0 / (n_in as f64).sqrt());
         let (weight, bias) = params.layer(name, &[n_out, n_in], init, init)?;
         Ok(Self { weight, bias, relu: false })
+    }
+
+    /// Layer of existing tensors, without ReLU.
+    pub fn of(weight: Tensor, bias: Tensor) -> Self {
+        Self { weight, bias, relu: false }
     }
 
     pub fn with_relu(self) -> Self {
@@ -77,8 +81,7 @@ fn chunk(n: usize) -> usize {
     n.div_ceil(MAX_CHUNKS).max(MIN_CHUNK_ROWS).next_multiple_of(ROWS)
 }
 
-/// Multiplies the rows of `x` with a matrix, some rows at a time; `store` receives the index of the first row and the
-/// products.
+/// Multiplies rows of `x` with a matrix, some at a time; `store` receives the index of the first row and the products.
 fn products<T: Scalar>(x: &[T], n_in: usize, by: &PackedMatrix<T>, mut store: impl FnMut(usize, &[T])) {
     let mut sums = vec![T::zero(); ROWS * by.width()];
     for (i, x) in x.chunks(ROWS * n_in).enumerate() {

@@ -1,6 +1,5 @@
 //! Batch normalisation followed by leaky ReLU as one operator, forward and backward, with a third of the memory passes
-//! of two separate operators. Training uses the batch's statistics and updates the running statistics; evaluation uses
-//! the running statistics.
+//! of two operators. Training uses the batch's statistics and updates the running ones; evaluation uses these.
 
 use super::fallback;
 use super::operator::{CpuOperator, CustomOperator, Gradients, Operand};
@@ -49,8 +48,7 @@ impl BatchNorm {
         self.forward_dropped(x, train, None)
     }
 
-    /// [`Self::forward`] with dropout after a ReLU (slope 0); the backward pass treats dropped values like those that
-    /// the ReLU has set to zero.
+    /// [`Self::forward`] with dropout after ReLU (slope 0); backward, dropped values are like those zeroed by the ReLU.
     pub fn forward_dropped(&self, x: &Tensor, train: bool, dropout: Option<DropMask>) -> Result<Tensor> {
         if dropout.is_some() && self.slope != 0.0 {
             candle_core::bail!("batch norm: dropout requires a ReLU (slope 0), found slope {}", self.slope);

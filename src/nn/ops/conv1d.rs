@@ -33,8 +33,7 @@ impl Conv1d {
     }
 
     /// Creates a layer with `n` = [input, output] channels and a bias, both initialised uniformly in +-1 / sqrt(fan
-    /// in), as in PyTorch; without padding, or with zero padding that preserves the number of frames if `stride` is
-    /// `None`.
+    /// in), as in PyTorch; without padding, or zero padding that preserves the number of frames if `stride` is `None`.
     pub fn with_bias(
         params: &mut Params,
         name: &str,
@@ -69,8 +68,7 @@ struct Conv1dOp {
     axis: ConvAxis,
 }
 
-/// Sizes of one pass: the `n` columns are the output frames of the complete batch, the `depth` rows are (channel,
-/// kernel offset).
+/// Sizes of a pass: the `n` columns are the output frames of the batch, the `depth` rows are (channel, kernel offset).
 struct Conv1dSizes {
     batch: usize,
     n_in: usize,

@@ -106,8 +106,7 @@ impl AudioBaseline {
         (self.autoencoder.forward(&(&poses + noise)?)? - poses)?.sqr()?.mean_all()
     }
 
-    /// Mean squared error between the codes predicted from the audio and those of the real poses [B, predicted, pose],
-    /// which pass no gradient.
+    /// Mean squared error between codes from the audio and those of real poses [B, predicted, pose], without gradient.
     pub fn speech_loss(&self, audio: &Tensor, poses: &Tensor, mode: &mut Mode) -> Result<Tensor> {
         let poses = poses.broadcast_div(self.scale.as_tensor())?;
         let codes = self.autoencoder.encode(&poses.flatten_to(1)?)?.detach();

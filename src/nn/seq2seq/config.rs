@@ -30,8 +30,7 @@ pub struct Config {
     /// Whether the encoder of `words` runs a GRU over the audio around a frame instead of using only that frame.
     #[serde(rename = "hears_context")]
     pub audio_context: bool,
-    /// Dropout rate between the layers of the encoder; below, the rate after its last layer and after each layer over
-    /// the context.
+    /// Dropout rate between the layers of the encoder; below, after its last layer and each layer over the context.
     pub dropout_between: f64,
     pub dropout: f64,
     /// Dropout rate of state and contexts before the output of `words`.
@@ -114,13 +113,11 @@ pub struct Segment {
     /// Poses before the first predicted one, [B, previous, pose].
     pub previous: Tensor,
     /// Word indices in the vocabulary (u32), padded to a common length of at least 1: those of the segment [B, W] for
-    /// `words`, those around each predicted pose [B, predicted, W] for `contextual`; `None` for networks without
-    /// words.
+    /// `words`, those around each predicted pose [B, predicted, W] for `contextual`; `None` for networks without words.
     pub words: Option<Tensor>,
 }
 
-/// Returns the windows of `width` frames around each frame with complete context: [B, T + width - 1, C] to [B, T,
-/// width, C].
+/// Windows of `width` frames around each frame with complete context: [B, T + width - 1, C] to [B, T, width, C].
 pub fn windows(audio: &Tensor, width: usize) -> Result<Tensor> {
     let n = (audio.dim(1)? + 1).saturating_sub(width);
     Tensor::stack(&(0..n).map(|t| audio.narrow(1, t, width)).collect::<Result<Vec<_>>>()?, 1)

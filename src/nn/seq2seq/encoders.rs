@@ -115,8 +115,7 @@ pub struct WordEncoder {
 }
 
 impl WordEncoder {
-    /// Creates an encoder; `n` has the number of words, the size of a word vector and the size of a state in one
-    /// direction.
+    /// Creates an encoder; `n` has the number of words, the sizes of a word vector and a state in one direction.
     pub fn new(params: &mut Params, name: &str, n: [usize; 3]) -> Result<Self> {
         let [vocabulary, word, hidden] = n;
         let table = params.trainable(&table_name(name), &[vocabulary, word], Init::Uniform(3f64.sqrt()))?;
@@ -128,8 +127,7 @@ impl WordEncoder {
         self.gru.forward(&self.vectors(words)?, 0.0, &mut Mode::Eval)
     }
 
-    /// Returns the output at the last word, [B, 2 hidden]. Earlier words affect only the forward direction; padding is
-    /// read like a word.
+    /// Output at the last word, [B, 2 hidden]. Earlier words affect only the forward direction; padding is read too.
     pub fn last(&self, words: &Tensor) -> Result<Tensor> {
         self.gru.last(&self.vectors(words)?)
     }
@@ -201,9 +199,8 @@ impl Decoder {
         self.decode(&segment.previous, &self.first_state(encoded)?, encoded, truth, mode)
     }
 
-    /// Predicts poses as `forward` does, without dropout, and returns the state [B, hidden] after reading all of them
-    /// except the last. `state` is the state of the previous segment; it replaces the initial state and all previous
-    /// poses except the last.
+    /// Predicts poses as `forward` does, without dropout, and returns the state [B, hidden] after reading all but the
+    /// last. `state`, that of the previous segment, replaces the initial one and all previous poses but the last.
     pub fn continue_from(
         &self,
         segment: &Segment,

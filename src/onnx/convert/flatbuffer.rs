@@ -16,7 +16,6 @@ pub(crate) struct FlatTable<'a> {
 }
 
 impl<'a> FlatTable<'a> {
-    /// The root table of the file.
     pub(crate) fn root(file: &'a [u8]) -> Result<Self> {
         Self::at(file, target(file, 0)?)
     }
@@ -53,7 +52,6 @@ impl<'a> FlatTable<'a> {
         Self::at(self.file, target(self.file, at)?).map(Some)
     }
 
-    /// Reads a list of tables.
     pub(crate) fn tables(&self, field: usize) -> Result<Vec<Self>> {
         let (n_tables, start, _) = self.list(field, 4)?;
         ensure!(n_tables <= MAX_TABLES, "a list has {n_tables} tables, expected at most {MAX_TABLES}");

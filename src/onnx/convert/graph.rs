@@ -24,7 +24,6 @@ impl ElementType {
     }
 }
 
-/// Value of an operator attribute.
 #[derive(Clone, Copy)]
 pub enum AttributeValue<'a> {
     Int(i64),
@@ -43,8 +42,7 @@ pub struct OnnxGraph {
 }
 
 impl OnnxGraph {
-    /// Creates an empty graph for a source of `n_bytes`, which limits the weights: no valid conversion more than
-    /// doubles their size.
+    /// Empty graph for a source of `n_bytes`, which limits the weights: no conversion more than doubles their size.
     pub fn new(n_bytes: usize) -> Self {
         let n_weight_bytes_left = n_bytes.saturating_mul(2).saturating_add(1 << 20);
         Self { nodes: Vec::new(), n_ops: 0, weights: Vec::new(), constants: BTreeMap::new(), n_weight_bytes_left }
@@ -128,7 +126,6 @@ impl OnnxGraph {
         self.constant(element, &order.map(|axis| shape[axis]), &raw)
     }
 
-    /// Adds a float constant.
     pub fn floats(&mut self, dims: &[usize], values: &[f32]) -> Result<String> {
         self.constant(ElementType::F32, dims, &values.iter().flat_map(|value| value.to_le_bytes()).collect::<Vec<_>>())
     }
@@ -138,7 +135,6 @@ impl OnnxGraph {
         self.ints(&sizes.iter().map(|size| *size as i64).collect::<Vec<_>>())
     }
 
-    /// Concatenates values along an axis.
     pub fn concat(&mut self, values: &[String], axis: i64) -> String {
         self.op("Concat", &as_strs(values), &[("axis", AttributeValue::Int(axis))])
     }

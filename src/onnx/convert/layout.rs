@@ -50,7 +50,6 @@ pub(crate) fn transposed(raw: &[u8], n_bytes: usize, dims: [usize; 4], order: [u
     Ok(out)
 }
 
-/// A sliding window over one axis.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct SlidingWindow {
     pub kernel: usize,
@@ -59,8 +58,7 @@ pub(crate) struct SlidingWindow {
 }
 
 impl SlidingWindow {
-    /// Numbers of zeros before and after an axis of `size` for TensorFlow's SAME padding, which yields `size /
-    /// stride` steps, rounded up.
+    /// Zeros before and after an axis of `size` for TensorFlow's SAME padding, for `size / stride` steps, rounded up.
     pub(crate) fn same_padding(self, size: usize) -> (usize, usize) {
         let extent = (size.div_ceil(self.stride) - 1) * self.stride + (self.kernel - 1) * self.dilation + 1;
         let total = extent.saturating_sub(size);

@@ -1,6 +1,5 @@
 //! Converts MoveNet (single pose) to one heat-map per keypoint, attenuated with the distance from the position
-//! predicted for the most central person: by a factor of 1/2 at a quarter of the image, so that a second person
-//! rarely wins.
+//! predicted for the most central person: by 1/2 at a quarter of the image, so that a second person rarely wins.
 
 use super::graph::AttributeValue::{Int, Ints, Text};
 use super::graph::{ElementType, OnnxGraph};

@@ -1,6 +1,5 @@
-//! Converts NanoDet to person bounding boxes. Each cell of three grids predicts the distances to the four sides of a
-//! box, each as a distribution over multiples of the stride of the grid, of which the mean is taken (Li et al. 2020,
-//! section 3).
+//! Converts NanoDet to person bounding boxes. Each cell of three grids predicts the distances to the sides of a box,
+//! each as a distribution over multiples of the grid's stride, of which the mean is taken (Li et al. 2020, section 3).
 
 use super::graph::AttributeValue::{Int, Ints};
 use super::graph::OnnxGraph;
@@ -20,8 +19,7 @@ pub(crate) fn is_nanodet(source: &TfGraph) -> bool {
     HEADS.iter().all(|(node, _)| source.nodes.contains_key(*node))
 }
 
-/// Converts the model to ONNX: image [1, 3, S, S] to rows [1, cells, 5] of x0, y0, x1, y1 in pixels of the input, and
-/// the person score, 0..1.
+/// Converts to ONNX: image [1, 3, S, S] to rows [1, cells, 5] of x0, y0, x1, y1 in input pixels, and the score, 0..1.
 pub(crate) fn convert(source: &TfGraph, graph: OnnxGraph, options: &ConversionOptions) -> Result<Vec<u8>> {
     let (shape, output) = (options.shape()?, options.only_output()?);
     let [1, 3, side, width] = shape[..] else { bail!("expected an input of shape [1, 3, S, S], not {shape:?}") };
@@ -76,7 +74,6 @@ pub(crate) fn convert(source: &TfGraph, graph: OnnxGraph, options: &ConversionOp
     Ok(source.graph.model(&[(&options.input.name, &shape)], &[(output, &[1, n_cells, 5])]))
 }
 
-/// Slices a value along an axis.
 fn slice(graph: &mut OnnxGraph, value: &str, axis: i64, [start, end]: [usize; 2]) -> Result<String> {
     let (start, end, axis) = (graph.sizes(&[start])?, graph.sizes(&[end])?, graph.ints(&[axis])?);
     Ok(graph.op("Slice", &[value, &start, &end, &axis], &[]))

@@ -19,7 +19,6 @@ struct NcnnBlob {
     shape: [usize; 3],
 }
 
-/// State of a conversion.
 struct NcnnConverter<'a> {
     blobs: BTreeMap<&'a str, NcnnBlob>,
     weights: NcnnWeights<'a>,

@@ -7,7 +7,6 @@ use std::collections::BTreeMap;
 
 /// First line of the text.
 const MAGIC: &str = "7767517";
-/// Maximum number of layers.
 const MAX_LAYERS: usize = 1 << 14;
 /// Tag before float16 weights.
 const FLOAT16: u32 = 0x0130_6b47;
@@ -47,8 +46,7 @@ impl NcnnLayer<'_> {
     }
 }
 
-/// Layers of a `.param` file in execution order. Errors: the first line is wrong, or a line is not a layer; the
-/// message has its number.
+/// Layers of a `.param` file in execution order. Errors: a wrong first line, or a line is not a layer, with its number.
 pub(crate) fn layers(file: &[u8]) -> Result<Vec<NcnnLayer<'_>>> {
     let text = std::str::from_utf8(file).context("the .param file is not UTF-8 text")?;
     let mut lines = text.lines().enumerate();

@@ -9,7 +9,6 @@ pub(crate) fn varint(out: &mut Vec<u8>, mut number: u64) {
     out.push(number as u8);
 }
 
-/// Appends an integer field.
 pub(crate) fn number(out: &mut Vec<u8>, field: u64, number: i64) {
     varint(out, field << 3);
     varint(out, number as u64);

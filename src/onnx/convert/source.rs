@@ -16,8 +16,7 @@ pub enum SourceFormat {
     Onnx,
     /// One flatbuffer with fp32 or fp16 weights.
     Tflite,
-    /// The `.json` and the `.bin` file of a graph model: MoveNet (single pose), converted to heat-maps, or NanoDet,
-    /// to person bounding boxes.
+    /// The `.json` and `.bin` of a graph model: MoveNet (single pose), to heat-maps, or NanoDet, to person boxes.
     TfjsGraph,
     /// The `.param` and the `.bin` file.
     Ncnn,
@@ -66,8 +65,7 @@ impl ConversionOptions {
 ///
 /// # Errors
 ///
-/// The number of files is wrong, or a file is damaged or contains something unsupported; the message names the layer
-/// and what was expected.
+/// The number of files is wrong, or a file is damaged or unsupported; the message names layer and what was expected.
 pub fn convert(format: SourceFormat, files: &[&[u8]], options: &ConversionOptions) -> Result<Vec<u8>> {
     let expected = match format {
         SourceFormat::Onnx | SourceFormat::Tflite => 1,

@@ -1,6 +1,5 @@
-//! Converts TensorFlow.js graph nodes to ONNX operators: all nodes on which a requested node depends, each once.
-//! Images that are channels last in TensorFlow are channels first in the result; transpositions between the two are
-//! free.
+//! Converts TensorFlow.js graph nodes to ONNX operators: all nodes on which a requested node depends, each once. Images
+//! that are channels last in TensorFlow are channels first in the result; transpositions between the two are free.
 
 use super::graph::AttributeValue::{Float, Text};
 use super::graph::{ElementType, OnnxGraph};
@@ -18,7 +17,6 @@ pub(crate) struct TfValue {
     pub channels_first: bool,
 }
 
-/// State of a conversion.
 pub(crate) struct TfConverter<'a> {
     pub source: &'a TfGraph<'a>,
     pub graph: OnnxGraph,

@@ -17,7 +17,6 @@ pub(crate) struct TfTensor<'a> {
     pub raw: &'a [u8],
 }
 
-/// An operator node.
 #[derive(Clone, Debug)]
 pub(crate) struct TfNode {
     pub op: String,
@@ -25,7 +24,6 @@ pub(crate) struct TfNode {
     attributes: Value,
 }
 
-/// Nodes and constants by name.
 #[derive(Clone, Debug)]
 pub(crate) struct TfGraph<'a> {
     pub nodes: BTreeMap<String, TfNode>,
@@ -59,7 +57,6 @@ impl<'a> TfGraph<'a> {
         Ok(Self { nodes, tensors })
     }
 
-    /// Constant of that name.
     pub(crate) fn tensor(&self, name: &str) -> Result<&TfTensor<'a>> {
         self.tensors.get(name).with_context(|| format!("missing constant {name:?}"))
     }
@@ -90,12 +87,10 @@ impl TfTensor<'_> {
 }
 
 impl TfNode {
-    /// Attribute with a list of integers.
     pub(crate) fn integers(&self, name: &str) -> Result<Vec<i64>> {
         list(&self.attributes, &format!("/{name}/list/i"))?.iter().map(integer).collect()
     }
 
-    /// String attribute.
     pub(crate) fn text(&self, name: &str) -> Result<String> {
         decode(self.attributes.pointer(&format!("/{name}/s")).with_context(|| format!("missing attribute {name:?}"))?)
     }
@@ -111,7 +106,6 @@ impl TfNode {
         self.attributes.pointer(&format!("/{name}/b")).and_then(Value::as_bool).unwrap_or(false)
     }
 
-    /// Float attribute.
     pub(crate) fn number(&self, name: &str) -> Result<f32> {
         let number = self.attributes.pointer(&format!("/{name}/f")).and_then(Value::as_f64);
         Ok(number.with_context(|| format!("missing attribute {name:?}"))? as f32)

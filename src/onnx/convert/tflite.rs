@@ -1,5 +1,4 @@
-//! Converts TFLite models: a flatbuffer of tensors, buffers and operators in execution order. 4-D tensors are
-//! channels first in the result.
+//! Converts TFLite models: a flatbuffer of tensors, buffers and operators in order. 4-D results are channels first.
 
 use super::flatbuffer::FlatTable;
 use super::graph::AttributeValue::{Int, Ints, Text};
@@ -27,7 +26,6 @@ struct TfliteOperator<'a> {
     options: Option<FlatTable<'a>>,
 }
 
-/// State of a conversion.
 struct TfliteConverter<'a> {
     /// Shapes of the tensors.
     shapes: Vec<Vec<usize>>,
@@ -37,7 +35,6 @@ struct TfliteConverter<'a> {
     graph: OnnxGraph,
 }
 
-/// Converts the model to ONNX.
 pub(crate) fn convert(file: &[u8], graph: OnnxGraph, options: &ConversionOptions) -> Result<Vec<u8>> {
     let model = FlatTable::root(file)?;
     let code = |code: FlatTable| Ok(code.int(3, 0)?.max(i32::from(code.byte(0)?)));
@@ -168,7 +165,6 @@ impl<'a> TfliteConverter<'a> {
         self.graph.weight((element, &self.shapes[tensor], raw), order, dims)
     }
 
-    /// Values of an integer constant.
     fn integers(&self, tensor: usize) -> Result<Vec<i64>> {
         let Constant { raw, element } = self.constant_of(tensor)?;
         ensure!(
@@ -340,8 +336,7 @@ impl<'a> TfliteConverter<'a> {
     }
 }
 
-/// Zeros at the top, left, bottom and right for SAME or VALID padding of a window over each axis, given with the axis
-/// sizes.
+/// Zeros at top, left, bottom and right for SAME or VALID padding of a window over each axis, given with axis sizes.
 fn padding(options: FlatTable, windows: [(SlidingWindow, usize); 2]) -> Result<[i64; 4]> {
     let is_same_padding = options.byte(0)? == 0;
     let [(top, bottom), (left, right)] =

@@ -95,15 +95,13 @@ pub fn choose_record(asked: SplitUnit, before: Option<SplitRecord>, n_videos: us
 }
 
 impl Division {
-    /// Rule of the splits, with its reason.
     pub fn rule(&self, fps: FrameRate) -> SplitRule {
         let by_time = self.record.unit == SplitUnit::Time;
         let guard_secs = if by_time { fps.secs(self.guard_frames) } else { 0.0 };
         SplitRule { unit: self.record.unit, why: self.record.why.clone(), guard_secs }
     }
 
-    /// Assigns the videos in order and records the splits. `named`: splits from the configuration, by name of the
-    /// video in the work folder.
+    /// Assigns the videos in order and records the splits. `named`: configured splits, by the video's work name.
     pub fn assign(
         &mut self,
         videos: &[&LiftedVideo],

@@ -12,7 +12,6 @@ use std::path::Path;
 const CELL: [usize; 2] = [144, 186];
 const FACE_PX: usize = 128;
 const N_COLUMNS: usize = 8;
-/// Largest number of rows.
 const MAX_ROWS: usize = 40;
 const PAPER: [u8; 3] = [255; 3];
 const RULE: [u8; 3] = [170; 3];
@@ -56,8 +55,7 @@ const TEXT_PX: f32 = 7.0;
 const LINE_PX: usize = 14;
 const MAX_LINES: usize = 3;
 
-/// Lines of a name that fit its cell. Of a longer name the end is shown, because names within a folder usually share
-/// their beginning.
+/// Lines of a name in its cell. Of a longer name the end is shown: names in a folder usually share their beginning.
 fn lines(name: &str) -> Result<Vec<String>> {
     let (mut lines, mut line) = (Vec::new(), String::new());
     for letter in name.chars().map(|letter| if letter.is_ascii() { letter } else { '?' }) {

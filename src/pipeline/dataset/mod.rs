@@ -1,6 +1,5 @@
-//! Stage 5: the dataset of a speaker. `stage` -> `division` (assignment of videos or blocks to splits) -> `run`
-//! (writes one video after the other, read by `video`) -> `outcome`. `persons` compares the persons in the videos,
-//! `faces` draws them.
+//! Stage 6: the dataset of a speaker. `stage` -> `division` (assignment of videos or blocks to splits) -> `run` (writes
+//! the videos in turn, read by `video`) -> `outcome`. `persons` compares the persons in the videos, `faces` draws them.
 
 pub mod division;
 pub mod faces;

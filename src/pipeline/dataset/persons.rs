@@ -13,19 +13,16 @@ use std::path::Path;
 const MAX_VIDEOS: usize = 200;
 /// Least number of frames for a known face shape.
 const MIN_FRAMES: usize = 3;
-/// Face difference, in thousandths of the face size, of two different persons, and the contribution of one 8-bit step
-/// of colour distance.
+/// Face difference, in thousandths of the face size, of two persons, and that of an 8-bit step of colour distance.
 const FACE_THRESHOLD: f64 = 40.0;
 const COLOUR_STEP: f64 = 0.5;
 /// Bone difference of two different persons, as log ratio of shoulder width to arm length; for one person it varies by
 /// up to 0.02 between videos.
 const BONES_THRESHOLD: f64 = 0.04;
 
-/// Description of the person in a video.
 #[derive(Clone, Debug)]
 pub struct VideoPerson {
     pub unit: Unit,
-    /// File name of the video.
     pub file: String,
     portrait: Option<Portrait>,
     /// Log ratio of shoulder width to arm length; `None`: not measured.
@@ -59,8 +56,7 @@ impl VideoPerson {
     }
 }
 
-/// Groups the videos by person, largest group first. A video that cannot be compared with any other is added to the
-/// first group.
+/// Groups the videos by person, largest group first. A video that cannot be compared is added to the first group.
 pub fn groups(videos: &[VideoPerson]) -> Vec<Vec<&VideoPerson>> {
     let step = videos.len().div_ceil(MAX_VIDEOS).max(1);
     let compared: Vec<&VideoPerson> = videos.iter().step_by(step).collect();
@@ -76,8 +72,7 @@ pub fn groups(videos: &[VideoPerson]) -> Vec<Vec<&VideoPerson>> {
     groups
 }
 
-/// Agglomerative clustering with average linkage: merges the two closest groups while their mean difference is below
-/// 1.
+/// Agglomerative clustering with average linkage: merges the two closest groups while their mean difference is below 1.
 fn cluster<'a, T>(items: &[&'a T], difference: impl Fn(&T, &T) -> Option<f64>) -> Vec<Vec<&'a T>> {
     let mut groups: Vec<Vec<&T>> = items.iter().map(|item| vec![*item]).collect();
     // Sum and number of the known differences between two groups.

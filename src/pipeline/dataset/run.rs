@@ -38,8 +38,7 @@ impl<'a> DatasetRun<'a> {
         Self { settings, out, old, before: valid_parts(old), n_reused: 0, progress }
     }
 
-    /// Writes the audio fingerprint of each video, reusing that of the old dataset if the content is unchanged.
-    /// Returns the hashes.
+    /// Writes the audio fingerprint of each video, reusing that of the old dataset if unchanged. Returns the hashes.
     pub fn sounds(&self, videos: &[&LiftedVideo]) -> Result<Sounds> {
         let task = self.progress.begin("audio", videos.len() as u64);
         let mut hashes = Sounds::new();

@@ -25,7 +25,6 @@ use orator_formats::media_json::MediaInfo;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
-/// Note for users of a dataset with shifted audio.
 const OFFSET_NOTE: &str = "Where the lips showed surely that the sound of a video was late or early, it was shifted.";
 
 /// Inputs of a dataset besides the settings.
@@ -33,8 +32,7 @@ const OFFSET_NOTE: &str = "Where the lips showed surely that the sound of a vide
 pub struct DatasetInputs {
     /// Videos that passed the earlier stages, of one or several speakers.
     pub ready: Vec<Unit>,
-    /// All videos, with the splits that the configuration names; those not in `ready` are listed as failed in the
-    /// ledger.
+    /// All videos, with the splits that the configuration names; the ledger lists those not in `ready` as failed.
     pub all: Vec<Videos>,
     /// Models that processed the videos, for `info.json`.
     pub models: Vec<ModelUsed>,
@@ -122,8 +120,7 @@ impl DatasetStage {
         failed.into_iter().map(|unit| failure(&self.work, unit)).collect()
     }
 
-    /// Persons that the speaker's videos appear to show, with an overview picture beside the stage folders; `None` if
-    /// there is one.
+    /// Persons in the speaker's videos, with an overview picture beside the stage folders; `None` if there is one.
     fn several_persons(&self, speaker: &Unit) -> Result<Option<SeveralPersons>> {
         let is_known =
             self.speakers.iter().any(|configured| configured.name == speaker.speaker && configured.same_person);
@@ -169,18 +166,29 @@ impl DatasetStage {
         videos.and_then(|videos| videos.transcripts.get(&video.video)).map(Vec::as_slice).unwrap_or_default()
     }
 
+    /// Models that processed the videos of a speaker: the recogniser only if it wrote the transcripts.
+    fn models(&self, configured: &config::SpeakerConfig) -> Vec<ModelUsed> {
+        let is_used = |model: &&ModelUsed| model.role != ModelUsed::WORDS || configured.transcribes();
+        self.inputs.models.iter().filter(is_used).cloned().collect()
+    }
+
     fn about(&self, speaker: &Unit, first: &LiftedVideo) -> About {
         let configured =
             self.speakers.iter().find(|configured| configured.name == speaker.speaker).cloned().unwrap_or_default();
+        let mut models = self.models(&configured);
         let config::SpeakerConfig { licence, consent, source, .. } = configured;
         let ready = self.ready(speaker);
         let media = ready.iter().filter_map(|video| MediaInfo::read(&Artifact::MediaInfo.path(&self.work, video)).ok());
         let not_judged: Vec<String> = media.filter_map(|media| media.not_judged()).collect();
-        let (mut models, mut notes) = (self.inputs.models.clone(), self.inputs.notes.clone());
+        let mut notes = self.inputs.notes.clone();
         if not_judged.len() == ready.len() {
-            // Without pictures, only the speech model was used.
-            models.retain(|model| model.role == "speech");
+            // Without pictures, only the models of speech were used.
+            models.retain(|model| ["speech", ModelUsed::WORDS].contains(&model.role.as_str()));
         }
+        let recogniser = models.iter().find(|model| model.role == ModelUsed::WORDS);
+        notes.extend(
+            recogniser.map(|model| format!("The words were recognised by {} (sha256 {}).", model.id, model.sha256)),
+        );
         let kinds: BTreeSet<&String> = not_judged.iter().collect();
         let count = |kind: &str| not_judged.iter().filter(|other| *other == kind).count();
         notes.extend(kinds.into_iter().map(|kind| format!("{} made {kind}.", counted(count(kind), "video"))));
@@ -222,7 +230,7 @@ impl Stage for DatasetStage {
         let guard_secs = rule.as_ref().map_or(0.0, |rule| rule.guard_secs);
         let mut settings = serde_json::json!({
             "unit": rule.as_ref().map(|rule| rule.unit), "guard_secs": guard_secs,
-            "dataset": self.settings, "models": self.inputs.models, "notes": self.inputs.notes, "tool": env!("CARGO_PKG_VERSION"),
+            "dataset": self.settings, "models": self.models(&configured), "notes": self.inputs.notes, "tool": env!("CARGO_PKG_VERSION"),
             "speaker": { "licence": configured.licence, "consent": configured.consent, "source": configured.source },
             "splits": videos.map(|videos| &videos.splits), "others": others,
         });

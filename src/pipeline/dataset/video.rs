@@ -30,7 +30,6 @@ use std::path::{Path, PathBuf};
 pub struct LiftedVideo {
     /// `<slug of the file name>-<8 hex digits of the content hash>`: prefix of its sample keys.
     pub name: String,
-    /// File name of the video.
     pub file: String,
     /// BLAKE3 of the video file.
     pub content: String,
@@ -222,7 +221,6 @@ impl LiftedVideo {
     }
 }
 
-/// Iterates over the samples of a video.
 pub struct LiftedSamples<'a> {
     video: &'a LiftedVideo,
     keypoints: Keypoints,

@@ -4,15 +4,13 @@
 
 use orator_base::types::image::{Image, PixelArea};
 
-/// Number of bands across an axis, in each of which a position has one mean; largest number of pixels sampled per
-/// position.
+/// Number of bands across an axis, in each of which a position has one mean; most pixels sampled per position.
 const BANDS: usize = 32;
 const MAX_SAMPLES: usize = 256;
 /// Largest brightness of a black bar, and least brightness of a lit band, in 8-bit steps.
 const BLACK: f32 = 24.0;
 const LIT: f32 = 48.0;
-/// Largest difference of neighbours in a smooth bar, and least difference across a seam, in 8-bit steps, averaged over
-/// the video.
+/// Largest difference of neighbours in a smooth bar, and least across a seam, in 8-bit steps, averaged over the video.
 const SMOOTH: f32 = 1.0;
 const SEAM: f32 = 5.0;
 /// Least share of the bands that are lit next to a black bar, and that show the seam of a smooth bar.

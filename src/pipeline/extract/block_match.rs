@@ -37,8 +37,7 @@ pub fn moved(from: &Thumbnail, to: &Thumbnail) -> f64 {
     if n < MIN_BLOCKS { 0.0 } else { n_moved as f64 / n as f64 }
 }
 
-/// Correlation of the gradients of two pictures at equal positions, -1..1: near 1 for one scene under different light,
-/// near 0 for two scenes.
+/// Correlation of two pictures' gradients at equal positions: near 1 for a scene in other light, near 0 for two scenes.
 pub fn edge_correlation(a: &Thumbnail, b: &Thumbnail) -> f64 {
     let [width, height] = THUMBNAIL;
     let (mut ab, mut aa, mut bb) = (0.0f64, 0.0f64, 0.0f64);

@@ -14,7 +14,6 @@ use std::fs;
 use std::hash::{DefaultHasher, Hasher as _};
 use std::path::Path;
 
-/// Result of a pass.
 pub struct PictureReading {
     /// Timeline with a single span.
     pub timeline: Timeline,

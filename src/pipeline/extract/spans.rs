@@ -7,7 +7,6 @@ use orator_base::types::image::PixelArea;
 use orator_base::types::time::FrameRate;
 use orator_media::ffmpeg::frames::FrameReader;
 
-/// Interval of the marks in seconds.
 const MARK_INTERVAL_SECS: f64 = 120.0;
 /// A cut within this many seconds after a mark replaces it.
 const MAX_CUT_DELAY_SECS: f64 = 20.0;

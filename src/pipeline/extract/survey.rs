@@ -1,5 +1,4 @@
-//! Survey of full-size pictures, two consecutive ones per second: whether they are interlaced, and whether they have
-//! bars.
+//! Survey of full-size pictures, two consecutive per second: whether they are interlaced, and whether they have bars.
 
 use super::bars::BarFinder;
 use orator_base::types::image::{Image, PixelArea};
@@ -17,7 +16,6 @@ const MIN_COMBED_SHARE: f64 = 0.25;
 /// Least difference of neighbouring lines in combing, 8-bit steps of green.
 const MIN_LINE_STEP: i32 = 10;
 
-/// Survey of a video.
 pub struct PictureSurvey {
     frames_per_sec: usize,
     /// Number of non-repeated frames so far, and the index at which the next sample begins.

@@ -45,8 +45,7 @@ impl Thumbnail {
     }
 }
 
-/// Mean absolute difference of two equally sized pictures, in 8-bit steps: near 0 for a slide, a paused video or a
-/// drawing.
+/// Mean absolute difference of equally sized pictures, in 8-bit steps: near 0 for a slide, a paused video or a drawing.
 pub fn mean_change(a: &Image, b: &Image) -> f32 {
     let sum: u64 = a.data.iter().zip(&b.data).map(|(a, b)| u64::from(a.abs_diff(*b))).sum();
     sum as f32 / a.data.len().max(1) as f32

@@ -17,14 +17,12 @@ const MAX_GAP_SECS: f64 = 1.0;
 pub struct ConvertedKeypoints {
     pub keypoints: Keypoints,
     pub extras: Extras,
-    /// Duration of the source frames in seconds.
     pub duration_secs: f64,
     /// Notes on missing data and on other persons in view.
     pub notes: Vec<String>,
 }
 
-/// Converts keypoints detected at `source_fps` in pictures of `image_size` (width, height in px) to keypoints at
-/// `fps`.
+/// Converts keypoints detected at `source_fps` in pictures of `image_size` (width, height in px) to keypoints at `fps`.
 pub fn convert(
     mut found: FoundKeypoints,
     source_fps: FrameRate,

@@ -190,8 +190,7 @@ impl Stage for KeypointPose2dStage {
     }
 }
 
-/// A stage with one implementation for videos and one for keypoints of other programs, and the set of units that are
-/// keypoints.
+/// Stage with one implementation for videos and one for keypoints of other programs, and the units that are keypoints.
 pub struct StageBySource {
     of_videos: Box<dyn Stage>,
     of_keypoints: Box<dyn Stage>,
@@ -219,8 +218,7 @@ impl StageBySource {
 }
 
 impl StageWrapper for StageBySource {
-    /// Version and cost are those of the video implementation; the version of the keypoint implementation is part of
-    /// its settings.
+    /// Version and cost are those of the video implementation; that of the keypoint implementation is in its settings.
     fn inner(&self, unit: Option<&Unit>) -> &dyn Stage {
         let is_keypoints =
             unit.is_some_and(|unit| self.keypoints.contains(&(unit.speaker.clone(), unit.video.clone())));

@@ -1,5 +1,4 @@
-//! 3D lifting of the arms: observed upper-body points through the body lifter, to joints of roughly the reference
-//! size.
+//! 3D lifting of the arms: observed upper-body points through the body lifter, to joints of roughly the reference size.
 
 use super::gaps::long_gaps;
 use super::hand_direction::hand_directions;
@@ -121,8 +120,7 @@ fn to_reference(sizes: &[f32], half_window: usize, into: &mut IntervalView) {
     }
 }
 
-/// Sets points to NaN that are not visible for more than `max_gap` frames, and the complete body if such a point is a
-/// shoulder.
+/// Sets points to NaN that are not visible for more than `max_gap` frames, and the body if such a point is a shoulder.
 fn clear_long_gaps(observed: &ObservedBody, max_gap: usize, into: &mut IntervalView) {
     let frames = |point: usize| {
         let long = long_gaps(&observed.visible.column(point).to_vec(), max_gap);

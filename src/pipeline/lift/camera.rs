@@ -15,9 +15,8 @@ use serde::Serialize;
 
 /// Least share of the frames of an interval with hips for an estimate from the torso.
 const MIN_HIPS_SHARE: f64 = 0.5;
-/// Without hips, roll is estimated from the shoulders if the speaker is turned sideways by less than this angle (20
-/// degrees, here in radians); the median error is then 4 degrees for cameras that roll up to 17, and more than 10
-/// beyond.
+/// Without hips, roll is estimated from the shoulders if the speaker is turned by less than this angle (20 degrees,
+/// here in radians); the median error is then 4 degrees for cameras that roll up to 17, and more than 10 beyond.
 const MAX_FRONTAL_ANGLE: f32 = 0.36;
 
 /// Camera tilt over an interval; `None`: cannot be estimated.

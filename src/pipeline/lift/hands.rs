@@ -1,5 +1,4 @@
-//! 3D lifting of hands: one hand over an interval through the hand lifter, then correction of the depth ambiguity and
-//! of single outliers.
+//! 3D lifting of hands: a hand over an interval through the lifter, then correction of depth ambiguity and outliers.
 
 use super::hand_depth;
 use super::observed::MAX_PX;
@@ -13,7 +12,6 @@ use orator_base::types::skeleton::Side;
 
 /// Least number of visible points of a hand that is lifted.
 const MIN_POINTS: usize = 12;
-/// Batch size of the network.
 const BATCH: usize = 1024;
 
 /// Lifts one hand from `points` [T, 21, 3] (x, y in px, score) into `joints` [T, 21, 3]: wrist at 0, sum of the bone

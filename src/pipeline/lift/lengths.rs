@@ -1,6 +1,5 @@
-//! Bone lengths of a video: one set for all its intervals, from the lifted and smoothed joints. Absolute size is a
-//! convention, since a picture does not show it: the body has the reference size, and the hand size follows from the
-//! forearm.
+//! Bone lengths of a video: one set for all its intervals, from the lifted and smoothed joints. Size is a convention,
+//! since a picture does not show it: the body has the reference size, and the hand size follows from the forearm.
 
 use orator_base::math::order::{lower_median, lower_quantile};
 use orator_base::motion::upper_body::REFERENCE_SIZE;

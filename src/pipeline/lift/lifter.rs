@@ -19,9 +19,8 @@ use orator_nn::lifter::body::BodyLifter;
 pub(crate) const MAX_GAP_SECS: f64 = 1.0;
 
 /// Temporal context in seconds: how far before and after a frame keypoints can affect its joints. It covers outlier
-/// detection, gap filling, the receptive field of the network, the median of the body size, and smoothing. Beyond
-/// that, all frames of a video share the bone lengths, the camera tilt, and the choice between the mirror images of a
-/// hand.
+/// detection, gap filling, the receptive field of the network, the median of the body size, and smoothing. Beyond that,
+/// all frames of a video share the bone lengths, the camera tilt, and the choice between the mirror images of a hand.
 pub fn context_secs(settings: &config::LiftConfig) -> f64 {
     // Unreadable weights are reported by the stage itself.
     let window =
@@ -40,14 +39,12 @@ pub struct Lifter {
     level: bool,
 }
 
-/// A lifted video.
 pub struct Lifted {
     /// The motion; NaN outside the intervals.
     pub motion: Motion,
     /// Nose, right hip, left hip, [T, 3, 3], in the coordinates of the joints (metres); NaN in long gaps.
     pub extra: Array3<f32>,
-    /// Bone lengths of the video in metres, for joints 1..=48; 0 for bones that are never visible and for the hand
-    /// roots.
+    /// Bone lengths of the video, metres, for joints 1..=48; 0 for bones that are never visible and for the hand roots.
     pub lengths: [f32; N_BONES],
     /// Camera tilt of each interval.
     pub cameras: Vec<CameraTilt>,

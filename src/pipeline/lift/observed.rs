@@ -12,11 +12,9 @@ use orator_base::types::skeleton::BODY_BONES;
 
 /// Largest valid coordinate, px.
 pub const MAX_PX: f32 = 1e6;
-/// Position of the nose on the line from the eyes to the neck; an estimated nose disturbs the lifted joints less than
-/// a missing one.
+/// Position of the nose on the line from the eyes to the neck; an estimate disturbs lifting less than a missing one.
 const NOSE_POSITION: f32 = 0.15;
-/// A point is an outlier if its distance from the median of the neighbouring frames exceeds this share of the body's
-/// largest bone...
+/// Outlier: a point whose distance from the median of neighbouring frames exceeds this share of the largest bone...
 const MIN_OUTLIER_SHARE: f32 = 0.15;
 /// ...plus this many times the largest such distance among the neighbours: in a fast gesture they move as well. Beats
 /// of up to 3.5 Hz pass unchanged.
@@ -50,8 +48,7 @@ impl ObservedBody {
         Self { points, visible }
     }
 
-    /// Hides and interpolates points that are not `is_inlier` [T, 9] for up to `max_gap` frames in a row. Returns
-    /// whether there are any.
+    /// Hides and interpolates points not `is_inlier` [T, 9] for up to `max_gap` frames. Returns whether any are.
     pub fn reject(&mut self, is_inlier: &Array2<bool>, max_gap: usize) -> bool {
         let mut any_rejected = false;
         for j in 0..N_POINTS {
@@ -72,8 +69,7 @@ impl ObservedBody {
     }
 }
 
-/// Points of a frame. A wrist that the body model misses is taken from the hand model, a missing nose from the eyes or
-/// else the ears.
+/// Points of a frame. A missing wrist is taken from the hand model, a missing nose from the eyes or else the ears.
 fn frame_points(keypoints: &Keypoints, t: usize) -> BodyPoints {
     let point = |array: &Array3<f32>, j: usize| {
         let [x, y, score] = [0, 1, 2].map(|k| array[[t, j, k]]);

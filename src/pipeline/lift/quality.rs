@@ -1,5 +1,4 @@
-//! Statistics of a lifted clip that need no ground truth: arm lengths, wrist jitter, reprojection error, and
-//! visibility.
+//! Statistics of a lifted clip that need no ground truth: arm lengths, wrist jitter, reprojection error, visibility.
 
 use anyhow::{Result, ensure};
 use orator_base::math::order;
@@ -100,8 +99,7 @@ fn arm(chain: &ArmChain, motion: &Motion, keypoints: &Keypoints) -> ArmStatistic
     }
 }
 
-/// Weak-perspective projection of one frame: `px = scale * metres + shift`, least squares over shoulders, elbows and
-/// wrists.
+/// Weak-perspective projection of one frame: `px = scale * metres + shift`, least squares over the arms.
 struct Fit {
     scale: f64,
     shift: [f64; 2],

@@ -1,5 +1,4 @@
-//! Removal of rejected frames from intervals and ledger, and of pieces that become too short. The sliders of the
-//! report use the same functions.
+//! Removal of rejected frames from intervals and ledger, and of pieces then too short. The report's sliders use them.
 
 use super::gaps::long_gaps;
 use anyhow::{Result, ensure};
@@ -71,8 +70,7 @@ pub fn exclude_frames(
     Ok((left, reduced))
 }
 
-/// Splits an interval into consecutive pieces, each accepted (`None`) or rejected for one reason with the mean of the
-/// measured value.
+/// Splits an interval into pieces, each accepted (`None`) or rejected for one reason with the mean measured value.
 fn pieces(interval: Interval, rejections: &[Option<FrameRejection>]) -> Vec<(Interval, Option<FrameRejection>)> {
     let Interval { start, end } = interval;
     let reason = |rejected: &Option<FrameRejection>| rejected.map(|rejected| rejected.rejection);

@@ -192,8 +192,7 @@ impl LiftStage {
     }
 }
 
-/// Hides the points of repeated frames, so that the motion between their neighbours is interpolated and masked instead
-/// of stopping.
+/// Hides the points of repeated frames, so that the motion there is interpolated and masked instead of stopping.
 fn hide_repeated_frames(keypoints: &mut Keypoints, repeated: &[bool]) {
     for points in [&mut keypoints.body, &mut keypoints.left_hand, &mut keypoints.right_hand] {
         for (mut frame, _) in points.outer_iter_mut().zip(repeated).filter(|(_, repeated)| **repeated) {

@@ -51,8 +51,7 @@ pub enum HandNetwork {
 }
 
 impl HandNetwork {
-    /// Lifts hands of the given side: wrist at 0, axes of the picture, any unit; `None` where too few points are
-    /// visible.
+    /// Lifts hands of the given side: wrist at 0, picture axes, any unit; `None` where too few points are visible.
     ///
     /// # Errors
     /// Those of the network.
@@ -112,35 +111,4 @@ fn parse<T>(bytes: &[u8], kinds: &[&str], make: impl Fn(&Contents, &mut Params) 
 
 fn config<T: DeserializeOwned>(contents: &Contents) -> Result<T> {
     Ok(serde_json::from_value(contents.facts["lesson"]["config"].clone())?)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_built_in_weights_fit_and_are_small() {
-        body(Path::new("")).unwrap();
-        hands(Path::new("")).unwrap();
-        assert!(BODY.len() + HANDS.len() <= 6_000_000);
-    }
-
-    #[test]
-    fn an_invalid_file_is_reported_with_the_reason() {
-        let dir = tempfile::tempdir().unwrap();
-        let path = dir.path().join("w.safetensors");
-        std::fs::write(&path, HANDS).unwrap();
-        hands(&path).unwrap();
-        let error_of = |path: &Path| format!("{:#}", body(path).err().unwrap());
-        assert!(
-            error_of(&path).contains("hand-lifter") && error_of(&path).contains("w.safetensors"),
-            "{}",
-            error_of(&path)
-        );
-        std::fs::write(&path, &HANDS[..HANDS.len() / 2]).unwrap();
-        assert!(error_of(&path).contains("w.safetensors"));
-        std::fs::write(&path, b"text").unwrap();
-        assert!(error_of(&path).contains("w.safetensors"));
-        assert!(error_of(&dir.path().join("none")).contains("cannot read"));
-    }
 }

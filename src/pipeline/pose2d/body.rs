@@ -54,7 +54,6 @@ pub struct DetectedBody {
     pub hands: Option<[[ScoredPoint; 21]; 2]>,
 }
 
-/// Body model with its decoder.
 pub struct BodyModel {
     pub input: ModelInput,
     reader: PointReader,
@@ -69,7 +68,6 @@ impl BodyModel {
         Ok(Self { input: ModelInput::open(runtime, entry, dir)?, reader, margin, map })
     }
 
-    /// Whether the model also predicts hands.
     pub fn gives_hands(&self) -> bool {
         !self.map.left_hand.is_empty()
     }

@@ -10,7 +10,6 @@ use orator_media::opencv::warp::Region;
 use orator_onnx::{Decode, ModelEntry, Runtime};
 use std::path::Path;
 
-/// Person detector.
 pub struct Detector {
     pub input: ModelInput,
     decode: Decode,
@@ -51,7 +50,6 @@ impl Detector {
     }
 }
 
-/// Palm detector.
 pub struct PalmDetector {
     pub input: ModelInput,
     decode: Decode,

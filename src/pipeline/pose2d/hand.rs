@@ -1,5 +1,4 @@
-//! Hand model: 21 points of the hand in a rotated square, the presence score, and the handedness if the model predicts
-//! it.
+//! Hand model: 21 points of the hand in a rotated square, the presence score, the handedness if the model predicts it.
 
 use super::body::{PointReader, map_points};
 use super::decode::{ScoredPoint, points};
@@ -24,7 +23,6 @@ pub struct DetectedHand {
 }
 
 impl DetectedHand {
-    /// Creates a hand from points that each have a score.
     pub fn from_points(points: [ScoredPoint; 21]) -> Self {
         Self { score: points.iter().map(|point| point[2]).sum::<f64>() / 21.0, points, right: None, depth: None }
     }
@@ -40,7 +38,6 @@ impl DetectedHand {
     }
 }
 
-/// Hand model with its decoder.
 pub struct HandModel {
     pub input: ModelInput,
     reader: PointReader,

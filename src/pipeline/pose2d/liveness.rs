@@ -12,8 +12,7 @@ const MIN_OVERLAP: f32 = 0.5;
 /// Cells per side of the compared box, and the shift in cells that is compensated (a camera that is not quite static).
 const CELLS: usize = 24;
 const SHIFT: usize = 2;
-/// Quantile of the cell changes, from the top, that counts as the change of a box: a talking head covers about this
-/// share.
+/// Quantile of the cell changes, from the top, that counts as a box's change: a talking head covers about this share.
 const MOVING_SHARE: f64 = 0.1;
 /// Detections without a match after which a track is dropped.
 const MAX_MISSED: usize = 3;
@@ -21,7 +20,6 @@ const MAX_MISSED: usize = 3;
 /// Change of the picture in a box since its track began.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Movement {
-    /// Number of measurements.
     pub n: usize,
     /// Largest change between two detections, in 8-bit steps.
     pub max_change: f32,

@@ -31,7 +31,6 @@ pub fn choose(config: &Pose2dConfig, store: &ModelStore) -> Result<Pose2dConfig>
     Ok(Pose2dConfig { person: person?, body: body?, hand: hand?, palm: palm?, face, ..config.clone() })
 }
 
-/// Models selected by a configuration.
 pub struct ChosenModels {
     /// Settings with resolved ids, see `choose`.
     pub settings: Pose2dConfig,

@@ -18,8 +18,7 @@ use serde::{Deserialize, Serialize};
 const EARLY_FRAMES: [usize; 3] = [2, 5, 10];
 /// Factor by which the detector runs more often while several people are visible.
 const CROWD_FACTOR: usize = 3;
-/// A body whose colours differ by more than this from the speaker's, in 8-bit steps, for this many frames, is another
-/// person.
+/// A body whose colours differ by more than this from the speaker's, in 8-bit steps, for this many frames, is another.
 const MAX_COLOUR_DISTANCE: f32 = 7.0;
 const MAX_DEVIATING_FRAMES: i32 = 2;
 /// Frames for which a confirmed speaker is not re-examined.
@@ -34,8 +33,7 @@ const MIN_SAME_OVERLAP: f32 = 0.5;
 /// Weight of a frame in the moving average of the speaker's colours.
 const COLOUR_WEIGHT: f32 = 0.05;
 
-/// Whether the detector runs in frame `idx` of a shot: every so many frames, more often with several people, and at
-/// the start.
+/// Whether the detector runs in frame `idx` of a shot: at intervals, more often with several people, and at the start.
 pub fn is_detection_frame(idx: usize, every: usize, is_crowd: bool) -> bool {
     let every = if is_crowd { (every / CROWD_FACTOR).max(1) } else { every };
     idx.is_multiple_of(every) || EARLY_FRAMES.contains(&idx)
@@ -54,14 +52,12 @@ pub fn is_same_person(before: &TrackedPerson, after: &TrackedPerson) -> bool {
         && before.colours.distance(&after.colours) <= MAX_SAME_COLOUR_DISTANCE
 }
 
-/// Tracks one person.
 #[derive(Default)]
 pub struct SpeakerTracker {
     pub detector: Option<Detector>,
     pub track: PersonTrack,
     tracks: LivenessTracks,
     reference: Option<BodyColours>,
-    /// Colours of the tracked person.
     colours: Option<BodyColours>,
     /// Consecutive frames with deviating colours; negative: remaining frames without re-examination.
     n_deviating: i32,
@@ -206,8 +202,7 @@ impl SpeakerTracker {
     }
 }
 
-/// Whether the candidate in the tracked box is still the speaker: known to speak, or no other candidate's appearance
-/// is much closer.
+/// Whether the candidate in the tracked box is still the speaker: known to speak, or no other looks much closer.
 fn is_still_speaker(found: &[Candidate], followed: &PersonBox) -> bool {
     let overlap = |one: &Candidate| boxes::overlap(&one.person, followed);
     let Some(tracked) = found.iter().max_by(|a, b| overlap(a).total_cmp(&overlap(b))) else { return false };

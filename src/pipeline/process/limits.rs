@@ -1,6 +1,5 @@
 //! Memory and time limits of a subprocess, derived from the picture size and the duration of the video. They are
-//! several times what real videos need (measurements are in the guide), so that only malicious or broken files reach
-//! them.
+//! several times what real videos need (measured in the guide), so that only malicious or broken files reach them.
 
 use super::message::MediaHeader;
 use anyhow::{Error, Result};
@@ -29,7 +28,6 @@ const FPS: [f64; 2] = [60.0, 240.0];
 /// Seconds without CPU use and without a report after which a process counts as hanging.
 const IDLE_SECS: u64 = 900;
 
-/// Limits of one subprocess.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Limits {
     /// Bytes of private writable memory.
@@ -56,8 +54,7 @@ impl Limits {
         Self::new(f64::INFINITY, BASE_SECS + longest * SECS_PER_FRAME, "a file on this machine".to_owned())
     }
 
-    /// Limits for a video with this header, sampled at `rate` frames per second; `n_bytes` is the size of models and
-    /// other inputs.
+    /// Limits for a video with this header, sampled at `rate`; `n_bytes` is the size of models and other inputs.
     pub fn of_video(header: &MediaHeader, rate: f64, n_bytes: u64) -> Self {
         let [width, height] = header.image_size;
         let pixels = width.saturating_mul(height).min(MAX_PIXELS as usize) as f64;

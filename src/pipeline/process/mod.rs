@@ -1,7 +1,6 @@
 //! Sandboxed subprocesses, one per unit, for stages that pass untrusted files to C libraries: `stage` wraps a stage so
-//! that it runs in a subprocess, `subprocess` starts the process and supervises it within its `limits`, `unit` is the
-//! code of the subprocess, `message` is the protocol between them (MessagePack), `failure` transfers errors with their
-//! types.
+//! that it runs in a subprocess, `subprocess` starts and supervises it within its `limits`, `unit` is the code of the
+//! subprocess, `message` is the protocol between them (MessagePack), `failure` transfers errors with their types.
 
 pub mod failure;
 pub mod limits;

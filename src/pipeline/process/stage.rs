@@ -82,8 +82,7 @@ impl SubprocessStage<'_> {
         settings.speaker.retain(|speaker| speaker.name == unit.speaker);
         let mut reads: Vec<_> = self.stage.inputs(unit)?.into_iter().map(|input| input.path.into()).collect();
         reads.push(settings.models.dir.as_os_str().to_owned());
-        // The sandboxed process cannot list the folders that the library search goes through, so the library is found
-        // here.
+        // The sandboxed process cannot list the folders of the library search, so the library is found here.
         if let Ok(library) = find_library(&settings.models.onnxruntime, &settings.models.dir) {
             reads.push(library.clone().into());
             settings.models.onnxruntime = library;

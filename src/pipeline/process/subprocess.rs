@@ -1,5 +1,4 @@
-//! Parent side of a subprocess: start it, send the request, wait for the answer, and kill it when it exceeds its
-//! limits.
+//! Parent side of a subprocess: start it, send the request, wait for the answer, kill it beyond its limits.
 
 use super::failure::plain;
 use super::limits::Limits;
@@ -56,8 +55,7 @@ impl UnitProcess {
         let _ = self.stdin.as_mut().map(|stdin| send(stdin, request));
     }
 
-    /// Reads the answer with `read`, then kills the process, so that it writes nothing afterwards. The error describes
-    /// how the process ended.
+    /// Reads with `read`, then kills the process, so that it writes nothing more. The error says how it ended.
     pub fn follow<T>(
         &mut self,
         limits: &Limits,
@@ -103,8 +101,7 @@ impl Drop for UnitProcess {
     }
 }
 
-/// Standard output of a subprocess, with a counter that is incremented before and after each read: it is odd while the
-/// run waits for data.
+/// Standard output of a subprocess, with a counter incremented before and after each read: odd while waiting.
 pub struct CountedReader<'a> {
     from: ChildStdout,
     n_reads: &'a AtomicU64,
@@ -148,8 +145,7 @@ fn watch(pid: Pid, limits: &Limits, n_reads: &AtomicU64, stop: Receiver<()>) -> 
 /// a read from storage. `None`: unknown.
 fn cpu_secs(pid: Pid) -> Option<(f64, bool)> {
     let stat = std::fs::read_to_string(format!("/proc/{}/stat", pid.as_raw_nonzero())).ok()?;
-    // The process name may contain anything, so parsing starts after it: field 3 is the state, fields 14 and 15 are
-    // the times.
+    // The process name may contain anything, so parsing starts after it: field 3 is the state, 14 and 15 are the times.
     let (_, fields) = stat.rsplit_once(')')?;
     let ticks = fields.split_whitespace().skip(11).take(2).map(|ticks| ticks.parse::<u64>().ok());
     let is_blocked = fields.trim_start().starts_with('D');

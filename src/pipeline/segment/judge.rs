@@ -11,7 +11,6 @@ use orator_base::types::time::FrameRate;
 use orator_dataset::config;
 use orator_formats::media_json::MediaInfo;
 
-/// Segments a complete video.
 pub fn judge(measures: &Measures, video: &MediaInfo, rules: &config::SegmentConfig) -> (Intervals, Ledger) {
     let n_frames = measures.n_frames();
     let begins_shot = |t: usize| {

@@ -40,13 +40,11 @@ pub struct Measures {
     /// Mean score of the points of each hand.
     pub left_hand: Vec<f32>,
     pub right_hand: Vec<f32>,
-    /// Share of the frames of a hand's gap in which a duplicate of the other hand was detected in its place; 0 outside
-    /// gaps.
+    /// Share of a hand's gap in which a duplicate of the other hand was detected in its place; 0 outside gaps.
     pub left_other: Vec<f32>,
     pub right_other: Vec<f32>,
     /// Movement of the wrists in the second around the frame, in shoulder widths, if they are together; 10 otherwise.
     pub rest: Vec<f32>,
-    /// Number of persons in view.
     pub n_persons: Vec<f32>,
     /// Movement of the neck since the previous frame, in shoulder widths (the wider of the two frames); 0 in frame 0.
     pub jump: Vec<f32>,
@@ -97,7 +95,6 @@ impl Measures {
         }
     }
 
-    /// Number of frames.
     pub fn n_frames(&self) -> usize {
         self.person.len()
     }
@@ -164,8 +161,7 @@ mod tests {
     use super::*;
     use ndarray::Array2;
 
-    /// Shoulders `width` px apart (negative: left one on the left), the nose 50 px above the neck, shifted by `aside`
-    /// px.
+    /// Shoulders `width` px apart (negative: left on the left), the nose 50 px above the neck, shifted by `aside` px.
     fn turned(width: f32, aside: f32) -> [f32; 2] {
         let mut body = Array2::from_elem((17, 3), 0.9_f32);
         for (joint, x, y) in [

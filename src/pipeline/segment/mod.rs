@@ -1,12 +1,9 @@
-//! Stage 3: keypoints to accepted intervals. `measure`, `rest` and, if selected by `speech_rule`, `speech_activity`
-//! compute per-frame measures from the outputs of earlier stages (`store` saves them), `table` defines the rules,
-//! `judge` applies them, `stage` reads and writes the files.
+//! Stage 3: keypoints to accepted intervals. `measure` and `rest` compute per-frame measures from the outputs of earlier
+//! stages (`store` saves them), `table` defines the rules, `judge` applies them, `stage` reads and writes the files.
 
 pub mod judge;
 pub mod measure;
 pub mod rest;
-pub mod speech_activity;
-pub mod speech_rule;
 pub mod stage;
 pub mod store;
 pub mod table;

@@ -6,10 +6,8 @@ use ndarray::ArrayView2;
 use orator_base::math::order::lower_median;
 use orator_base::types::pose2d::{Keypoints, VISIBLE_SCORE, coco};
 
-/// Largest wrist distance, in shoulder widths, of hands that are together. In videos of three resting people it is 0.3
-/// to 0.55.
+/// Largest wrist distance, in shoulder widths, of hands that are together. Three resting people had 0.3 to 0.55.
 const MAX_WRIST_DISTANCE: f32 = 0.6;
-/// Half window of the movement, seconds.
 const HALF_WINDOW_SECS: f64 = 0.5;
 /// Quantile of the distances that counts as movement, so that single outliers are ignored.
 const QUANTILE: f64 = 0.8;

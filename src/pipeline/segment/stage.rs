@@ -3,7 +3,7 @@
 
 use super::judge::judge;
 use super::measure::{self, Measures};
-use super::speech_rule::SpeechDetector;
+use crate::speech::speech_rule::SpeechDetector;
 use crate::{lip_sync, sound};
 use anyhow::{Result, ensure};
 use orator_base::stage::artifacts::{Artifact, StageName};
@@ -34,7 +34,6 @@ impl SegmentStage {
         Self { rules: rules.clone(), work: work.to_owned(), speech: None }
     }
 
-    /// Sets the speech detector.
     pub fn with_speech(self, speech: Option<SpeechDetector>) -> Self {
         Self { speech, ..self }
     }

@@ -8,7 +8,6 @@ use orator_dataset::config;
 /// Share of duplicate detections in a gap of a hand above which the gap is attributed to the other hand.
 const MAX_DUPLICATE_SHARE: f64 = 0.3;
 
-/// Bound of a value.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Bound {
     AtLeast(f64),
@@ -53,7 +52,6 @@ pub struct SegmentRule {
 }
 
 impl Bound {
-    /// The threshold.
     pub const fn threshold(self) -> f64 {
         match self {
             Self::AtLeast(threshold) | Self::AtMost(threshold) => threshold,
@@ -69,7 +67,6 @@ impl Bound {
     }
 }
 
-/// The rules on frames.
 pub fn frame_rules(rules: &config::SegmentConfig) -> [FrameRule; 16] {
     use Bound::{AtLeast, AtMost};
     let score = AtLeast(rules.joint_score);
@@ -107,7 +104,6 @@ pub fn frame_rules(rules: &config::SegmentConfig) -> [FrameRule; 16] {
     ]
 }
 
-/// The rules on segments.
 pub fn segment_rules(rules: &config::SegmentConfig) -> [SegmentRule; 3] {
     use Bound::{AtLeast, AtMost};
     let row = |rejection, values: fn(&Measures) -> &[f32], counted, share| SegmentRule {

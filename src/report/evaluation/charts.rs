@@ -54,8 +54,7 @@ pub fn joints(table: &Table, clips: &EvalClips) -> Vec<Node> {
     vec![node("p").text(about), node("div").class("card scroll wide").child(drawing), scale]
 }
 
-/// Share of frames in which each joint is correct (PCK with the threshold `alpha`); NaN for a joint that is never
-/// visible.
+/// Share of frames in which each joint is correct (PCK with threshold `alpha`); NaN for a joint that is never visible.
 fn shares(clips: &EvalClips, alpha: f64) -> Vec<f64> {
     let (mut n_correct, mut n_visible) = (vec![0.0; N_JOINTS], vec![0.0; N_JOINTS]);
     for clip in &clips.clips {

@@ -145,8 +145,7 @@ fn group_of(definition: &Definition) -> usize {
     fitting.max_by_key(|(_, start)| start.len()).map_or(GROUPS.len() - 1, |(group, _)| group)
 }
 
-/// Row of a metric; `None` if it is not shown. A metric that differs from the previous one (`last`) only in its body
-/// part shows only the part.
+/// Row of a metric; `None` if it is not shown. A metric that differs from `last` only in its body part shows only that.
 fn row(table: &Table, index: usize, last: &mut String) -> Option<Node> {
     let definition = &table.definitions[index];
     if !table.is_shown(index) {

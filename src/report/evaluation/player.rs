@@ -25,8 +25,7 @@ const MAX_SECS: f64 = 20.0;
 const MAX_FPS: f64 = 30.0;
 /// Coordinate value of a missing joint.
 pub const MISSING: i16 = i16::MIN;
-/// Half window of a motion beat, seconds, as in beat consistency: a local minimum of speed over 7 frames at 30 fps on
-/// either side.
+/// Half window of a motion beat, seconds, as in beat consistency: a speed minimum over 7 frames at 30 fps each way.
 const BEAT_SECS: f64 = 7.0 / 30.0;
 
 /// Part of a clip that the player shows.

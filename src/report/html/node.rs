@@ -166,7 +166,6 @@ pub fn page_head(title: &str, style: &'static str) -> Node {
         .child(node("style").verbatim(STYLE).verbatim(style))
 }
 
-/// Text of a file with this head and body.
 pub fn html_file(head: Node, body: Node) -> String {
     format!("<!doctype html>\n{}\n", node("html").attr("lang", "en").child(head).child(body))
 }

@@ -29,8 +29,7 @@ pub struct SheetCrop {
 }
 
 impl SheetCrop {
-    /// Square around all keypoints detected in the clip, in a frame of `image_size` px; the complete frame if there are
-    /// none.
+    /// Square around all keypoints of the clip, in a frame of `image_size` px; the complete frame if there are none.
     pub fn around(keypoints: &Keypoints, image_size: [usize; 2]) -> Self {
         let frame_size = image_size.map(|px| px as f32);
         let found = overlay::extent(keypoints).unwrap_or([0.0, 0.0, frame_size[0], frame_size[1]]);

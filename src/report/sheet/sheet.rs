@@ -109,8 +109,7 @@ impl SheetClip<'_> {
         Ok(moments.collect())
     }
 
-    /// Checks that video and motion differ in length by at most 1 s; skipped if the headers of the video do not state
-    /// it.
+    /// Checks that video and motion differ in length by at most 1 s; skipped if the video's headers do not state it.
     fn check_length(&self, reader: &FrameReader) -> Result<()> {
         let (n_frames, fps) = (self.motion.n_frames(), self.motion.fps);
         let Some(expected) = reader.expected_frames() else { return Ok(()) };

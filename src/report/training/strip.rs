@@ -10,8 +10,7 @@ use orator_base::types::skeleton::{L_WRIST, R_WRIST};
 use orator_media::opencv::draw;
 use std::ops::Range;
 
-/// Ground truth and generated motion of an interval, held out if possible, with the same rate and, up to rounding, the
-/// same length.
+/// Ground truth and generated motion of an interval, held out if possible, of equal rate and, up to rounding, length.
 pub struct HeldOutPair {
     /// Split and key of the interval.
     pub name: String,

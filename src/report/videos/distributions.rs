@@ -1,5 +1,4 @@
-//! Histograms, with their thresholds, of every measure over all frames of all videos and of the lengths of accepted
-//! intervals.
+//! Histograms, with their thresholds, of every measure over all frames and of the lengths of accepted intervals.
 
 use super::thresholds::THRESHOLDS;
 use crate::html::chart::histogram::{Counts, ThresholdLine, histogram};
@@ -14,7 +13,6 @@ pub struct Measure {
     name: &'static str,
     pub title: &'static str,
     pub unit: &'static str,
-    /// Range of the histogram.
     ends: [f64; 2],
     n_bins: usize,
     /// Key of the threshold in `[segment]`, or `max_bone_change` of `[lift]`.

@@ -10,18 +10,22 @@ use super::worst::Worst;
 use crate::preview::{MAX_PREVIEWS, MotionPreview};
 use anyhow::{Context, Result, ensure};
 use orator_base::stage::Unit;
-use orator_base::stage::artifacts::{Artifact, StageName, dir};
-use orator_base::stage::ledger::Ledger;
+use orator_base::stage::artifacts::{Artifact, dir};
+use orator_base::stage::ledger::{Ledger, WordCount};
 use orator_base::stage::progress::Progress;
 use orator_base::stage::record::Failure;
 use orator_base::types::interval::Intervals;
 use orator_dataset::config::Settings;
 use orator_dataset::config::videos::Videos;
+use orator_dataset::words::{self, VideoWords};
 use orator_formats::media_json::MediaInfo;
 use orator_formats::npz::Npz;
 use orator_formats::{joints_npz, sound_offset_json};
 use orator_pipeline::segment::Measures;
-use std::path::Path;
+use std::path::{Path, PathBuf};
+
+/// Letters of the words of an interval that are shown.
+const MAX_LETTERS: usize = 300;
 
 pub struct ReportData {
     pub videos: Vec<VideoSummary>,
@@ -51,11 +55,14 @@ pub fn gather(settings: &Settings, videos: &[Videos], n_pictures: usize, progres
         missing: missing.collect(),
         n_speech_model: (0, 0),
     };
-    let units: Vec<&Unit> = videos.iter().flat_map(|of| &of.units).collect();
+    let units: Vec<(&Videos, &Unit)> =
+        videos.iter().flat_map(|of| of.units.iter().map(move |unit| (of, unit))).collect();
     let task = progress.begin("reading", units.len() as u64);
-    for unit in units {
+    for (of_speaker, unit) in units {
         task.detail(&unit.video);
-        let mut video = VideoSummary::read(&settings.work.dir, unit);
+        let mut video = VideoSummary::read(settings, unit);
+        let transcripts = of_speaker.transcripts.get(&unit.video).map(Vec::as_slice).unwrap_or_default();
+        video.add_words(&settings.work.dir, transcripts);
         let accepted = if video.ledger.failed.is_empty() && video.ledger.duration_secs > 0.0 {
             all.add(settings, &mut video)
         } else {
@@ -153,13 +160,15 @@ fn motion(work: &Path, unit: &Unit) -> Result<(orator_base::types::pose3d::Motio
 #[derive(Clone, Debug)]
 pub struct VideoSummary {
     pub unit: Unit,
-    /// File name.
     pub file: String,
     /// Ledger of the video; empty if its length is unknown.
     pub ledger: Ledger,
-    /// Whether the lift stage has finished.
     pub is_lifted: bool,
     pub has_failed: bool,
+    /// Numbers of words in the transcript; `None`: it has none.
+    pub words: Option<WordCount>,
+    /// Start of each interval of the ledger in seconds, sorted, and the words in it.
+    spoken: Vec<(f64, String)>,
     /// Notes on missing data and on properties of the file, a sentence each.
     pub notes: Vec<String>,
     /// Local folder names and their replacements on the page.
@@ -167,8 +176,9 @@ pub struct VideoSummary {
 }
 
 impl VideoSummary {
-    /// Reads the state of `unit` from the folder `work`; unreadable data becomes a note.
-    pub fn read(work: &Path, unit: &Unit) -> Self {
+    /// Reads the state of `unit` from the work folder; unreadable data becomes a note.
+    pub fn read(settings: &Settings, unit: &Unit) -> Self {
+        let work: &Path = &settings.work.dir;
         let file = unit.source.file_name().unwrap_or_default().to_string_lossy().into_owned();
         let folders = [(work, "work"), (unit.source.parent().unwrap_or(work), "")];
         let folders = folders.map(|(folder, name)| (folder.display().to_string(), name));
@@ -178,6 +188,8 @@ impl VideoSummary {
             ledger: Ledger::default(),
             is_lifted: false,
             has_failed: false,
+            words: None,
+            spoken: Vec::new(),
             notes: Vec::new(),
             folders,
         };
@@ -195,7 +207,8 @@ impl VideoSummary {
         {
             video.note(&format!("Measured by lip sync: the {offset}."));
         }
-        let failure = StageName::OF_VIDEOS
+        let failure = settings
+            .stages_of(&unit.speaker)
             .into_iter()
             .find_map(|stage| Some((stage, Failure::read(&dir(work, stage, unit))?.error)));
         if let Some((stage, error)) = failure {
@@ -220,6 +233,37 @@ impl VideoSummary {
         }
         video.mark_unavailable(work, WAITING, "not processed yet: run `orator run`");
         video
+    }
+
+    /// Adds the words of the first usable one of the files `transcripts`.
+    fn add_words(&mut self, work: &Path, transcripts: &[PathBuf]) {
+        if !transcripts.iter().any(|path| path.is_file()) {
+            return;
+        }
+        let media = MediaInfo::read(&Artifact::MediaInfo.path(work, &self.unit)).ok();
+        let start_secs = media.as_ref().map_or(0.0, |media| media.first_image_secs);
+        let audio_secs = media.and_then(|media| media.audio_secs).unwrap_or(self.ledger.duration_secs);
+        let end_secs = start_secs + audio_secs;
+        let choice = words::choose(transcripts, &self.unit.speaker, end_secs);
+        let words = VideoWords::of(choice, transcripts, end_secs, start_secs);
+        let accepted = self.ledger.accepted.iter().map(|accepted| (accepted.start_secs, accepted.end_secs));
+        let rejected = self.ledger.rejected.iter().map(|rejected| (rejected.start_secs, rejected.end_secs));
+        let spoken = |(start, end): (f64, f64)| {
+            let words: Vec<String> = words.within(start, end).into_iter().map(|word| word.word).collect();
+            let text = words.join(" ");
+            let is_long = text.chars().nth(MAX_LETTERS).is_some();
+            let shown: String = text.chars().take(MAX_LETTERS).collect();
+            (start, if is_long { format!("{shown} ...") } else { shown })
+        };
+        self.words = Some(words.report(accepted.clone()).count);
+        self.spoken = accepted.chain(rejected).map(spoken).collect();
+        self.spoken.sort_by(|a, b| a.0.total_cmp(&b.0));
+    }
+
+    /// Words in the interval of the ledger that begins at `start_secs`.
+    pub fn spoken(&self, start_secs: f64) -> &str {
+        let found = self.spoken.binary_search_by(|(start, _)| start.total_cmp(&start_secs));
+        found.ok().and_then(|at| self.spoken.get(at)).map_or("", |(_, text)| text)
     }
 
     /// Marks all seconds as failed in `stage` or, for `WAITING`, as not processed yet.

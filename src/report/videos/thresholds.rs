@@ -106,36 +106,3 @@ impl ThresholdGrid {
         }
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use orator_dataset::config;
-
-    #[test]
-    fn every_threshold_can_be_tried_and_every_value_can_be_written() {
-        let rules = SegmentConfig::default();
-        let fields = serde_json::to_value(&rules).unwrap();
-        let numbers = fields.as_object().unwrap().iter().filter(|(_, value)| value.is_number());
-        let mut keys: Vec<&str> = numbers.map(|(key, _)| key.as_str()).collect();
-        let mut tried = THRESHOLDS.map(|threshold| threshold.key);
-        keys.sort_unstable();
-        tried.sort_unstable();
-        assert_eq!(keys, tried);
-        let dir = tempfile::tempdir().unwrap();
-        let file = dir.path().join("pipeline.toml");
-        for threshold in THRESHOLDS {
-            let (grid, at) = threshold.grid(&rules);
-            assert!((21..=22).contains(&grid.len()) && grid.is_sorted() && grid[at] == (threshold.get)(&rules));
-            for value in grid {
-                let line = format!("[segment]\n{} = {}\n", threshold.key, threshold.written(value));
-                std::fs::write(&file, line).unwrap();
-                let read = config::load(&file, &[]).unwrap().settings.segment;
-                assert_eq!(read, threshold.with(&rules, value));
-            }
-        }
-        let odd = SegmentConfig { max_jump: 7.25, ..rules };
-        let jump = THRESHOLDS.iter().find(|threshold| threshold.key == "max_jump").unwrap();
-        assert_eq!(jump.grid(&odd).0.last(), Some(&7.25));
-    }
-}

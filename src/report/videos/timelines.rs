@@ -39,8 +39,10 @@ pub fn lines(videos: &[VideoSummary]) -> Vec<Node> {
             secs if secs >= 0.05 => format!(", hands at rest for {}", length(secs)),
             _ => String::new(),
         };
+        let words =
+            video.words.map(|of| format!(", with {} of {} words", of.n_accepted, of.n_words)).unwrap_or_default();
         let about = format!(
-            "{} of {} accepted in {}{rest}",
+            "{} of {} accepted in {}{rest}{words}",
             length(ledger.accepted_secs()),
             length(ledger.duration_secs),
             counted(ledger.accepted.len(), "interval")
@@ -73,6 +75,7 @@ fn spans(video: &VideoSummary) -> Vec<TimelineSpan> {
             clock(end_secs),
             number((10.0 * (end_secs - start_secs)).round() / 10.0)
         )
+        .replace("\n\n", "\n")
         .trim_end()
         .to_owned(),
     };
@@ -84,7 +87,8 @@ fn spans(video: &VideoSummary) -> Vec<TimelineSpan> {
         ledger.resting.iter().filter(inside).map(span).collect::<Vec<_>>().join("\n")
     };
     let accepted = ledger.accepted.iter().map(|accepted| {
-        timeline_span(accepted.start_secs, accepted.end_secs, "accepted".to_owned(), "accepted", rests(accepted))
+        let description = [rests(accepted).as_str(), video.spoken(accepted.start_secs)].join("\n");
+        timeline_span(accepted.start_secs, accepted.end_secs, "accepted".to_owned(), "accepted", description)
     });
     let rejected = ledger.rejected.iter().map(|rejected| {
         timeline_span(
@@ -92,7 +96,7 @@ fn spans(video: &VideoSummary) -> Vec<TimelineSpan> {
             rejected.end_secs,
             class(&rejected.reason),
             Rejection::label(&rejected.reason),
-            description(rejected),
+            [description(rejected).as_str(), video.spoken(rejected.start_secs)].join("\n"),
         )
     });
     let failed = ledger.failed.iter().map(|failed| {

@@ -137,8 +137,7 @@ fn farthest(
 ) -> Option<(usize, f64, Bound, bool)> {
     let on_frames = frame_rules(rules).into_iter().filter(|rule| rule.rejection == rejection);
     let on_frames = on_frames.map(|rule| (rule.values, rule.bound, !rule.measures_secs));
-    // If the rule requires a minimum share, frames that do not count are bad; for a maximum share, those that count
-    // are.
+    // If the rule requires a minimum share, frames that do not count are bad; for a maximum, those that count are.
     let on_pieces = segment_rules(rules).into_iter().filter(|rule| rule.rejection == rejection).map(|rule| {
         let bad = match rule.share {
             Bound::AtLeast(_) => rule.counted,
@@ -156,8 +155,7 @@ fn farthest(
     known.max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, found)| found)
 }
 
-/// Frame with the smallest (or largest) known value, ties going to the one nearest the middle, and the value; NaN if no
-/// value is known.
+/// Frame with the smallest (or largest) known value, ties going to the one nearest the middle, and the value, or NaN.
 fn extreme(values: &[f32], frames: std::ops::Range<usize>, lowest: bool) -> (usize, f64) {
     let middle = frames.start.midpoint(frames.end.saturating_sub(1));
     let known = frames.filter(|t| !values[*t].is_nan());
@@ -244,8 +242,7 @@ pub fn thumbnails(
     moments.into_iter().map(|frames| Ok((frames.clone(), picture(frames)?))).collect()
 }
 
-/// Current frame of the reader, or an empty picture, overlaid with its keypoints; `n_wide` thumbnails share the maximum
-/// width.
+/// Current frame of the reader, or an empty picture, overlaid with its keypoints; `n_wide` thumbnails share the width.
 fn draw_thumbnail(
     reader: Option<&mut FrameReader>,
     keypoints: &Keypoints,
@@ -275,43 +272,4 @@ fn side_by_side<'a>(images: impl Iterator<Item = &'a Image> + Clone) -> Image {
         left += image.width + GAP_PX;
     }
     all
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use orator_base::stage::rejection::FrameRejection;
-    use orator_base::types::time::FrameRate;
-
-    #[test]
-    fn the_worst_frame_of_the_worst_spans_is_chosen() {
-        let of = |value: f32| vec![value; 100];
-        let mut measures = Measures { person: of(0.9), left_hand: of(0.9), right_hand: of(0.9), ..Measures::default() };
-        measures.jump = of(0.1);
-        (measures.jump[20], measures.jump[50]) = (0.8, 1.8);
-        measures.right_hand[70..90].fill(0.2);
-        measures.right_hand[74] = 0.1;
-        let span = |start: f64, end: f64, rejection: Rejection, measured: f64| {
-            RejectedInterval::new(start, end, FrameRejection::new(rejection, measured, 0.5))
-        };
-        let rejected = vec![
-            span(2.0, 2.1, Rejection::Jump, 0.8),
-            span(5.0, 5.1, Rejection::Jump, 1.8),
-            span(7.0, 9.0, Rejection::HandGap, 2.0),
-            span(9.0, 9.5, Rejection::TooShort, 0.5),
-        ];
-        let ledger = Ledger { duration_secs: 10.0, rejected, ..Ledger::default() };
-        let judged = MediaInfo::new(10.0, 100, FrameRate::new(10, 1));
-        let mut worst = Worst::new(1);
-        worst.add(0, &ledger, (&measures, &[]), &judged, &SegmentConfig::default());
-        let frames: Vec<(&str, Vec<usize>)> =
-            worst.rules.iter().map(|((_, reason, _), of)| (reason.as_str(), of[0].frames.clone())).collect();
-        assert_eq!(frames, [("hands", vec![74]), ("jump", vec![49, 50]), ("too short", vec![92])]);
-        assert_eq!(worst.frames_of(0), [49, 50, 74, 92]);
-        worst.add(1, &ledger, (&measures, &[]), &judged, &SegmentConfig::default());
-        assert!(worst.frames_of(1).is_empty(), "equal ones: the first video's");
-        let mut none = Worst::new(0);
-        none.add(0, &ledger, (&measures, &[]), &judged, &SegmentConfig::default());
-        assert!(none.rules.is_empty());
-    }
 }

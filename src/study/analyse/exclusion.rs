@@ -38,9 +38,7 @@ struct ExclusionTest<'r> {
 }
 
 enum Excluded<'r> {
-    /// Identifiers of excluded participants.
     Participants(BTreeSet<&'r str>),
-    /// Predicate of excluded votes.
     Votes(Box<dyn Fn(&StudyVote) -> bool>),
 }
 

@@ -57,8 +57,7 @@ pub struct BinaryVote<'v> {
     /// Score 1 for success, otherwise 0.
     pub vote: ClipVote,
     pub speaker: &'v str,
-    /// Condition judged: the generated one of a Turing test, the condition of the expected film of a mismatch task, or
-    /// the one shown.
+    /// Condition judged: generated one of a Turing test, that of the expected film of a mismatch task, or that shown.
     pub condition: &'v str,
     /// Whether the expected film was on the left, and whether the left film was chosen; `None` for single films.
     pub sides: Option<[bool; 2]>,
@@ -123,8 +122,7 @@ pub fn conditions(votes: &[&StudyVote]) -> Vec<String> {
     names.into_iter().map(str::to_owned).collect()
 }
 
-/// Differences between two conditions from votes that judged both: preference steps towards `first`, or its score less
-/// that of `second`.
+/// Differences of two conditions from votes on both: preference steps towards `first`, or its score less `second`'s.
 pub fn differences(votes: &[&StudyVote], numbering: &Numbering, [first, second]: [&str; 2]) -> Vec<ClipVote> {
     let one = |vote: &&StudyVote| {
         let index = |name: &str| vote.conditions.iter().position(|condition| condition == name);

@@ -216,8 +216,7 @@ pub struct PairAnalysis {
     pub n_votes: usize,
     pub n_participants: usize,
     pub n_clips: usize,
-    /// Numbers of votes for the first condition, undecided, and for the second; `None` if each vote judged only one of
-    /// them.
+    /// Numbers of votes for the first condition, undecided, and for the second; `None` if each vote judged only one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub orders: Option<[u64; 3]>,
     /// Preferences: number of votes per step, from clearly the second to clearly the first condition.

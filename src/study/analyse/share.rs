@@ -102,8 +102,7 @@ fn side_blocks(votes: &[BinaryVote]) -> Option<Vec<SideBlock>> {
 }
 
 /// Fits a mixed logistic model with crossed random intercepts to votes with scores 0 and 1. The interval is that of the
-/// marginal proportion; the test compares the intercept with log odds of 0, with min(participants, clips) - 1 degrees
-/// of freedom.
+/// marginal proportion; the test compares the intercept with 0, with min(participants, clips) - 1 degrees of freedom.
 fn mixed_model(votes: &[ClipVote], found: &mut StatisticSet, confidence: f64) -> Option<ModelEstimate> {
     let model = found.ok_or_record(StatisticMethod::MixedModel, MixedLogit::fit(votes))?;
     let (share, interval) = found.ok_or_record(StatisticMethod::MixedModel, model.share(confidence))?;

@@ -58,7 +58,6 @@ impl StatisticMethod {
     }
 }
 
-/// Origin of a statistic: its method and whether it was registered.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 pub struct StatisticOrigin {
     pub method: StatisticMethod,

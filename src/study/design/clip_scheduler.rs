@@ -30,8 +30,7 @@ pub(super) struct ClipScheduler {
     order: Vec<usize>,
     n_comparisons: usize,
     n_arrangements: usize,
-    /// Offset of this scheduler's comparisons and arrangements, so that schedulers used in parallel do not all show the
-    /// same ones at once.
+    /// Offset of this scheduler's comparisons and arrangements, so that parallel schedulers do not all show the same.
     offset: usize,
     n_assigned: usize,
     rng: ChaCha8Rng,
@@ -153,7 +152,6 @@ impl ClipNeeds {
         }
     }
 
-    /// Total number of clips that each speaker needs.
     pub fn total(&self) -> usize {
         let of_tasks = |needs: &[usize]| match self.reuse {
             ClipReuse::Never => needs.iter().sum::<usize>(),
@@ -204,8 +202,7 @@ pub struct SharedClips {
 }
 
 impl SharedClips {
-    /// Allocates `clips`, which must be at least as many as needed; surplus clips go to the main trials in proportion to
-    /// their number.
+    /// Allocates `clips`, at least as many as needed; surplus ones go to the main trials in proportion to their number.
     pub fn new(needs: &ClipNeeds, mut clips: Vec<String>) -> Self {
         let n_surplus = clips.len().saturating_sub(needs.total());
         let mut take = |n: usize| clips.drain(..n.min(clips.len())).collect::<Vec<String>>();

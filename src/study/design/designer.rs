@@ -1,5 +1,4 @@
-//! Builds sessions one after another: task blocks with practice, training and main trials, and attention checks among
-//! the main trials.
+//! Builds sessions in turn: task blocks with practice, training and main trials, attention checks among these.
 
 use super::clip_scheduler::{ClipScheduler, SharedClips, SquareRows, stream};
 use super::task_design::{AssignedTrial, TaskBalance, TaskDesigner, assign, right_response};
@@ -152,8 +151,7 @@ impl Designer<'_> {
         self.films(&clip, shown, FilmSound::Tones).map(|films| films.concat())
     }
 
-    /// Names of the films of a clip, one per condition with the number that it shows, if any; one for both conditions of
-    /// a side-by-side film.
+    /// Names of the films of a clip, one per condition with its number, if any; one for both of a side-by-side film.
     fn films(&mut self, clip: &NamedClip, shown: Vec<(String, Option<u16>)>, sound: FilmSound) -> Result<Vec<String>> {
         let drawn = self.file.drawn_conditions();
         let content = |(condition, number): (String, Option<u16>)| {
@@ -173,8 +171,7 @@ fn film_sound(task: &StudyTask) -> FilmSound {
     if task.sound { FilmSound::Speech } else { FilmSound::Silence }
 }
 
-/// Variants per check clip, each with its own number, so that a number passed on between participants helps few of
-/// them.
+/// Variants per check clip, each with its own number, so that a number passed on helps few participants.
 pub(super) const N_VARIANTS: usize = 4;
 
 /// Indices of the main trials before which attention checks are inserted, ascending: spread evenly over the session,

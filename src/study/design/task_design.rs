@@ -105,8 +105,7 @@ impl<'a> TaskDesigner<'a> {
         assign(&mut self.training, self.task.training, session + self.number)
     }
 
-    /// Main trials of a session in order. One square orders the groups (speaker, comparison), another the clips within
-    /// a group.
+    /// Main trials of a session in order. One square orders the groups (speaker, comparison), another their clips.
     pub fn main(&mut self, session: usize) -> Vec<AssignedTrial> {
         let assigned = assign(&mut self.main, self.task.trials, session + self.number);
         let mut groups: BTreeMap<usize, VecDeque<AssignedTrial>> = BTreeMap::new();

@@ -35,8 +35,7 @@ impl StudyPreset {
     }
 }
 
-/// Merges `written` onto `base`: tables key by key, lists of named tables by name; other values replace those of
-/// `base`.
+/// Merges `written` onto `base`: tables key by key, lists of named tables by name; others replace those of `base`.
 pub(super) fn merge<'t>(written: DeTable<'t>, base: &mut DeTable<'t>) {
     for (key, value) in written {
         let Some(base_value) = base.get_mut(key.get_ref().as_ref()) else {

@@ -1,5 +1,4 @@
-//! Sections of the study file, and the defaults derived from the rest of the file: compared conditions of a task,
-//! hypotheses of a design.
+//! Sections of the study file, and defaults derived from the rest: conditions of a task, hypotheses of a design.
 
 use super::condition::{ConditionSource, StudyCondition};
 use super::layers::StudyPreset;
@@ -22,8 +21,7 @@ pub struct StudyFile {
     pub seed: u64,
     /// Target number of participants.
     pub participants: usize,
-    /// Number of extra sessions, for replacing participants who withdraw or are excluded, divided by the number of
-    /// participants.
+    /// Extra sessions, for replacing participants who withdraw or are excluded, divided by the number of participants.
     #[serde(default = "half", alias = "spare")]
     pub extra_session_ratio: f64,
     /// Languages of the page; the first is the fallback for participants who prefer none of them.

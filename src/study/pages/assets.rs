@@ -53,8 +53,7 @@ pub fn page_texts(languages: &[String], written: &BTreeMap<String, PageTexts>) -
     languages.iter().map(|language| (language.clone(), texts_of(language))).collect()
 }
 
-/// Keys for which a study with these tasks may provide texts: those of the page, and each task's own question, title
-/// and instructions.
+/// Text keys of a study with these tasks: those of the page, and each task's own question, title and instructions.
 pub fn text_keys<'t>(tasks: impl IntoIterator<Item = &'t str>) -> Vec<String> {
     let parts = ["question", "title", "instructions"];
     let of_task = |task: &'t str| parts.map(|part| format!("{part}.{task}"));

@@ -286,8 +286,7 @@ pub async fn film(State(app): Shared, Path(name): Path<String>, mut request: Req
     reply.map(Body::new)
 }
 
-/// Whether a `Range` header requests a single byte range such as `bytes=2-5`; a server may ignore all others (RFC 9110,
-/// section 14.2).
+/// Whether a `Range` header requests a single byte range such as `bytes=2-5`; others may be ignored (RFC 9110, 14.2).
 fn is_one_range(range: &str) -> bool {
     let ends = range.strip_prefix("bytes=").and_then(|ends| ends.split_once('-'));
     let is_number = |digits: &str| digits.bytes().all(|byte| byte.is_ascii_digit());

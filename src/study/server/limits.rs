@@ -1,6 +1,5 @@
-//! Rate limits: a token bucket for each participant, and one shared by all requests to begin. Limit of connections per
-//! peer, so that no peer can occupy all of them; addresses are kept in memory while connections are open, and never
-//! logged.
+//! Rate limits: a token bucket per participant, and one for all requests to begin. Limit of connections per peer, so
+//! that no peer can occupy all of them; addresses are kept in memory while connections are open, and never logged.
 
 use std::collections::HashMap;
 use std::net::{IpAddr, Ipv6Addr};
@@ -36,8 +35,7 @@ impl Bucket {
     }
 }
 
-/// Token buckets of the server. The map of participants is bounded, because entries are created for verified tokens
-/// only.
+/// Token buckets of the server. The map of participants is bounded: entries are created for verified tokens only.
 #[derive(Debug)]
 pub struct RateLimits {
     participants: Mutex<HashMap<String, Bucket>>,

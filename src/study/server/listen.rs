@@ -1,5 +1,4 @@
-//! Accepts connections: limits their number and duration, disconnects clients that stop reading a reply, and shuts all
-//! of them down at the end.
+//! Connections: limits their number and duration, disconnects clients that stop reading, and shuts all down at the end.
 
 use super::limits::PeerLimit;
 use axum::Router;

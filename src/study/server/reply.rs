@@ -1,5 +1,4 @@
-//! Requests and replies: JSON bodies, bearer tokens, errors as a sentence with a status, and the headers of every
-//! reply.
+//! Requests and replies: JSON bodies, bearer tokens, errors as a sentence with a status, the headers of every reply.
 
 use crate::store::database::NotStored;
 use axum::body::Bytes;

@@ -95,8 +95,7 @@ impl StudySecret {
         URL_SAFE_NO_PAD.encode(bytes)
     }
 
-    /// Session and identifier of the participant to whom a token was issued; `None` if this study's key did not sign
-    /// it.
+    /// Session and identifier of a token's participant; `None` if this study's key did not sign it.
     pub fn verify(&self, token: &str) -> Option<(u32, String)> {
         let bytes: [u8; TOKEN_BYTES] = URL_SAFE_NO_PAD.decode(token).ok()?.try_into().ok()?;
         let (payload, signature) = bytes.split_at(4 + ID_BYTES);

@@ -145,8 +145,7 @@ pub struct Clock {
 }
 
 impl Clock {
-    /// Starts at the wall clock's time or at `latest_ms` (the latest stored time, milliseconds since 1970), whichever
-    /// is later.
+    /// Starts at the wall clock or `latest_ms` (the latest stored time, milliseconds since 1970), whichever is later.
     pub fn start(latest_ms: i64) -> Self {
         let since = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH);
         let wall_ms = since.map_or(0, |since| since.as_millis() as i64);

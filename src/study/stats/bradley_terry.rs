@@ -1,8 +1,7 @@
 //! Bradley-Terry model (Bradley and Terry 1952): strengths of conditions whose difference is the log odds that one is
 //! preferred to the other, by maximum likelihood; also on the Elo scale of the GENEA leaderboard (Nagy et al. 2024) and
 //! Chatbot Arena (Chiang et al. 2024). A tie counts as half a win for each side, a graded preference as its share.
-//! There is no prior, so strengths are finite only if every condition reaches every other by a chain of wins (Ford
-//! 1957).
+//! Without a prior, strengths are finite only if every condition reaches every other by a chain of wins (Ford 1957).
 
 use super::cluster::sign_flips::rng_of_draw;
 use super::estimate::{ConfidenceInterval, StatisticsError, at_least, interval_of_draws, within};
@@ -29,8 +28,7 @@ pub struct PairedVote {
 /// Validates votes.
 ///
 /// # Errors
-/// Fewer than two conditions, no votes, a condition compared with itself, a condition index out of range, or a share
-/// outside 0 to 1.
+/// Fewer than two conditions, no votes, one compared with itself, an index out of range, a share outside 0 to 1.
 fn check(votes: &[PairedVote], n_conditions: usize) -> Result<(), StatisticsError> {
     at_least("conditions", 2, n_conditions)?;
     at_least("votes", 1, votes.len())?;

@@ -114,7 +114,7 @@ impl StudentEstimate {
     }
 
     /// Value that the statistic exceeds with probability 1 - `share`.
-    pub(super) fn quantile(&self, share: f64) -> f64 {
+    pub fn quantile(&self, share: f64) -> f64 {
         let student = (self.degrees_of_freedom < 1e4).then(|| StudentsT::new(0.0, 1.0, self.degrees_of_freedom));
         let expanded = || {
             // Expansion around the normal quantile (Fisher and Cornish 1960); its error is below 1e-7 here.
@@ -125,8 +125,7 @@ impl StudentEstimate {
     }
 }
 
-/// Holm-adjusted p values in the given order: a hypothesis is rejected at a level if its adjusted p value is at most
-/// that level.
+/// Holm-adjusted p values in given order: a hypothesis is rejected at a level if its adjusted value is at most that.
 ///
 /// # Errors
 /// A p value is outside 0 to 1.

@@ -10,6 +10,3 @@ pub mod estimate;
 pub mod glmm;
 pub mod proportion;
 pub mod rank;
-
-#[cfg(test)]
-mod golden;

@@ -96,8 +96,7 @@ fn tail_from(distribution: &Binomial, outcome: u64) -> f64 {
     outcome.checked_sub(1).map_or(1.0, |before| distribution.sf(before))
 }
 
-/// Smallest value in `low..high` for which the monotone predicate `holds` is true, by bisection; `high` if there is
-/// none.
+/// Smallest value in `low..high` for which the monotone `holds` is true, by bisection; `high` if there is none.
 fn partition_point(mut low: u64, mut high: u64, holds: impl Fn(u64) -> bool) -> u64 {
     while low < high {
         let middle = low + (high - low) / 2;

@@ -29,8 +29,7 @@ fn ranks(values: &[f64]) -> (Vec<f64>, Vec<f64>) {
     (ranks, ties)
 }
 
-/// Distribution of the sum of a random subset of `sizes`, in which each element is included with probability 1/2;
-/// indexed by the sum.
+/// Distribution of the sum of a random subset of `sizes`, each included with probability 1/2; indexed by the sum.
 fn half_sums(sizes: &[usize]) -> Vec<f64> {
     let mut sums = vec![1.0];
     for size in sizes {
@@ -106,9 +105,8 @@ pub fn friedman(blocks: &[Vec<f64>]) -> Result<RankTest, StatisticsError> {
 }
 
 /// Interval of the median of independent `values`: the narrowest symmetric pair of order statistics that covers the
-/// true median with at least `confidence`, by the binomial distribution of the number of values below it (Hahn and
-/// Meeker 1991, section 5.2). Exact for continuous distributions, conservative with ties. 95 % confidence needs at
-/// least six values.
+/// true median with at least `confidence`, by the binomial distribution of the values below it (Hahn and Meeker 1991,
+/// section 5.2). Exact for continuous distributions, conservative with ties. 95 % needs at least six values.
 ///
 /// # Errors
 /// There are too few values for `confidence`, a value is not finite, or `confidence` is not between 0 and 1.
@@ -118,8 +116,7 @@ pub fn median_interval(values: &[f64], confidence: f64) -> Result<ConfidenceInte
     let n = values.len();
     let too_few = |min| StatisticsError::TooFew { what: "values", min, found: n };
     let below = Binomial::new(0.5, n as u64).map_err(|_| too_few(1))?;
-    // `outside` values are excluded at each end: it is the largest rank whose cumulative probability does not exceed
-    // the tail.
+    // `outside` values are excluded at each end: the largest rank whose cumulative probability is within the tail.
     let Some(outside) = (0..n.div_ceil(2)).take_while(|rank| below.cdf(*rank as u64) <= tail).last() else {
         return Err(too_few((-tail.log2()).ceil() as usize));
     };

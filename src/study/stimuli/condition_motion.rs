@@ -80,8 +80,7 @@ fn open(condition: &StudyCondition, path: &Path, speaker: &str) -> Result<Vec<Ev
 /// Motions by condition, then by clip. `tick` is called after each segment of speech.
 ///
 /// # Errors
-/// A model fails, a file of another system is missing or has the wrong length, or there are too few clips for
-/// mismatching.
+/// A model fails, a file of another system is missing or has the wrong length, or there are too few clips to mismatch.
 pub fn motions(
     source: &SpeakerSource,
     clips: &[StudyClip],

@@ -15,7 +15,6 @@ use std::ops::Range;
 const GRADES: [(f32, f64); 4] = [(-25.0, 0.0), (-25.0, MAX_HIDDEN), (-15.0, MAX_HIDDEN), (f32::INFINITY, MAX_HIDDEN)];
 /// Maximum proportion of joints of a clip that may be hidden in all its films.
 pub(super) const MAX_HIDDEN: f64 = 0.25;
-/// Minimum proportion of speech in a clip.
 const MIN_SPEECH: f64 = 0.3;
 
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

@@ -17,7 +17,6 @@ use std::path::Path;
 
 const CAMERA: FilmCamera = FilmCamera::Front;
 const SIDE_BY_SIDE_FPS: FrameRate = FrameRate::new(30, 1);
-/// Key derivation context of the film names.
 const NAME_CONTEXT: &str = "orator study 2026 names of films";
 /// Incremented when the same content gives different bytes.
 const VERSION: u32 = 1;
@@ -54,8 +53,7 @@ pub struct FilmScene<'a> {
     pub number: Option<u16>,
 }
 
-/// Opaque name of the film with this content: 16 hexadecimal digits of a hash keyed by the seed, which do not reveal
-/// the content.
+/// Opaque name of a film with this content: 16 hex digits of a hash keyed by the seed, which do not reveal the content.
 pub fn film_name(seed: u64, content: &FilmContent) -> String {
     let key = blake3::derive_key(NAME_CONTEXT, &seed.to_le_bytes());
     let FilmContent { clip, speaker, condition, motion_of, number, sound, right } = content;

@@ -166,8 +166,7 @@ impl FilmedSpeaker {
         self.clips.iter().position(|known| known.name == name)
     }
 
-    /// Name `speaker/clip` of the clip whose motion the left avatar shows in the film with this content, unless the
-    /// design draws it.
+    /// Name `speaker/clip` of the clip whose motion the left avatar shows in this film, unless the design draws it.
     pub fn motion_of(&self, content: &FilmContent) -> Result<String> {
         let (of, _) = self.shown(content)?;
         Ok(format!("{}/{}", content.speaker, self.clips[*of].name))
@@ -219,8 +218,7 @@ fn fade_ends(mut sound: Sound) -> Sound {
     sound
 }
 
-/// Sound of the sound check: `n` evenly spaced tones separated by silence of at least their duration, over `length`
-/// samples.
+/// The sound check: `n` evenly spaced tones separated by silence of at least their duration, over `length` samples.
 fn tones(n: usize, rate: u32, length: usize) -> Sound {
     let rate_hz = f64::from(rate.max(1));
     let apart = length as f64 / rate_hz / (n + 1) as f64;

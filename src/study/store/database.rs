@@ -33,8 +33,7 @@ const TABLES: &str = "
     ) STRICT, WITHOUT ROWID;
     INSERT OR IGNORE INTO about VALUES ('withdrawn', '0');";
 
-/// Opens the database at `path` for writing and creates it if missing. `plan`: hash of the plan to which its sessions
-/// belong.
+/// Opens the database at `path` for writing and creates it if missing. `plan`: hash of the plan of its sessions.
 ///
 /// # Errors
 /// The file is not a database, cannot be written, or belongs to another plan.
@@ -108,8 +107,7 @@ const MAX_JOBS_PER_COMMIT: usize = 256;
 /// Maximum number of queued jobs; further callers wait to enqueue.
 const MAX_QUEUED: usize = 1024;
 
-/// Timeout of a job including its time in the queue. Shorter than the timeout of a request, so that the client gets a
-/// reply.
+/// Timeout of a job including its time in the queue. Shorter than that of a request, so that the client gets a reply.
 const STORE_TIMEOUT: Duration = Duration::from_secs(8);
 /// Time that a transaction waits for locks of other processes.
 const LOCK_TIMEOUT: Duration = Duration::from_secs(3);
@@ -136,8 +134,7 @@ pub struct ResponseStore {
 }
 
 impl ResponseStore {
-    /// Opens the database at `path` for the plan with this hash and starts the writer thread, which ends after the last
-    /// handle is dropped.
+    /// Opens the database at `path` for the plan with this hash and starts the writer, which ends with the last handle.
     ///
     /// # Errors
     /// The database cannot be opened (see [`open`]), or the thread cannot be started.

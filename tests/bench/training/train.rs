@@ -103,6 +103,7 @@ impl FixedBatch {
             poses: tensor(poses, N_FEATURES, n_frames)?,
             mask: tensor(mask, N_FEATURES, n_frames)?,
             speakers: vec![0; args.batch],
+            words: None,
         };
         let facts = SpeakerMetadata::new("benchmark", FPS, "", network, normalisation, representation);
         Ok(Self { trainer: GanTrainer::new(vec![facts], settings)?, batch })

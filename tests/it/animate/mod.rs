@@ -12,5 +12,6 @@ pub(crate) mod motion_files;
 pub(crate) mod noise;
 pub(crate) mod posture;
 pub(crate) mod rates;
+pub(crate) mod renderer;
 pub(crate) mod skeleton;
 pub(crate) mod visibility;

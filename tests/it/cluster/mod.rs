@@ -2,7 +2,11 @@
 
 mod blocked_paths;
 mod changed_videos;
+mod forget;
 mod jobs;
 mod long_video;
+mod sealed_input;
+mod shared_folder;
+mod simulation;
 mod timing;
 mod workers;

@@ -2,6 +2,7 @@
 //! sets the number of kills (`make prove`: 200, with eight workers). The clocks of workers differ by minutes and jump.
 
 use crate::fixtures::faults::plan_workers::{WorkerClocks, epochs, worker, written};
+use crate::fixtures::media::recogniser::project_with_words;
 use orator_test_support::project::{Project, files_under};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -37,7 +38,7 @@ fn handles_term(process: Pid) -> bool {
 fn killed_and_stopped_workers_give_the_bytes_of_one_run() {
     let n_kills: usize = std::env::var("ORATOR_KILLS").ok().and_then(|n| n.parse().ok()).unwrap_or(4);
     let (n_clips, n_workers) = (6, if n_kills > 20 { 8 } else { 4 });
-    let undisturbed = Project::with_clips("calm", n_clips, 4.6);
+    let undisturbed = project_with_words("calm", n_clips, 4.6);
     assert_eq!(undisturbed.run(&[]).code, 0);
     let expected = written(&undisturbed.work());
     assert!(expected.keys().any(|name| name.ends_with(".tar")));
@@ -45,7 +46,7 @@ fn killed_and_stopped_workers_give_the_bytes_of_one_run() {
     let (mut n_killed, mut n_stopped, mut n_reclaimed, mut n_plans) = (0, 0, 0, 0);
     while n_killed + n_stopped < n_kills {
         n_plans += 1;
-        let project = Project::with_clips("crowd", n_clips, 4.6);
+        let project = project_with_words("crowd", n_clips, 4.6);
         let plan = project.answer(&["plan", "--no-timing"]);
         assert_eq!((plan.code, &plan.json["units"]), (0, &serde_json::json!(n_clips)), "{}", plan.errors);
         let mut workers: Vec<Child> = (0..n_workers).map(|_| clocks.start(&project, &mut rng)).collect();

@@ -1,6 +1,7 @@
 //! `orator forget` removes all data derived from a video, leaves other data unchanged byte for byte, and completes an
 //! interrupted removal.
 
+use crate::fixtures::media::recogniser::project_with_words;
 use orator_base::stage::progress::Silent;
 use orator_dataset::forget::removal::PENDING;
 use orator_dataset::verify::verify::verify;
@@ -20,7 +21,7 @@ fn problems(project: &Project) -> usize {
 
 #[test]
 fn forgetting_removes_all_data_of_a_video_and_no_other_data() {
-    let project = Project::with_clips("forget", 2, 6.0);
+    let project = project_with_words("forget", 2, 6.0);
     assert_eq!(project.run(&[]).code, 0);
     let clips = project.clips();
     let (forgotten, other) = (&clips[0], &clips[1]);

@@ -12,5 +12,7 @@ pub(crate) mod shard;
 pub(crate) mod shared_audio;
 pub(crate) mod splits;
 pub(crate) mod splits_by_time;
+pub(crate) mod transcribe;
+pub(crate) mod transcribe_verb;
 pub(crate) mod transcripts;
 pub(crate) mod words;

@@ -31,9 +31,11 @@ fn streamed_audio_gives_the_motion_of_loaded_audio() {
         assert_eq!(note, None);
         assert_eq!(n, loaded.samples.len());
         let mut n_done = 0;
-        let streamed =
-            speaker.motion_from_stream(SoundStream::open(&path, 16_000), n, CHUNK, &mut |n| n_done += n).unwrap().0;
-        assert_eq!(streamed, speaker.motion(&loaded).unwrap());
+        let streamed = speaker
+            .motion_from_stream(SoundStream::open(&path, 16_000), n, &[], CHUNK, &mut |n| n_done += n)
+            .unwrap()
+            .0;
+        assert_eq!(streamed, speaker.motion(&loaded, &[]).unwrap());
         assert_eq!(n_done, streamed.n_frames());
         assert!(generate(dir, "--checkpoint host.safetensors --audio speech.wav --out a.npy").status.success());
         assert_eq!(npy::read(&dir.join("a.npy"), FPS).unwrap(), streamed);

@@ -2,5 +2,6 @@
 
 pub(crate) mod bad_input;
 pub(crate) mod dataset_from_keypoints;
+pub(crate) mod follow;
 pub(crate) mod formats;
 pub(crate) mod point_orders;

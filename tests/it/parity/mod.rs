@@ -10,3 +10,4 @@ pub(crate) mod packages;
 pub(crate) mod pose_parity;
 pub(crate) mod real_clips;
 pub(crate) mod seq2seq_parity;
+pub(crate) mod whisper_parity;

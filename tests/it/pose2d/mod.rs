@@ -1,4 +1,9 @@
 //! Keypoint detection with the chain of 2D models.
 
+pub(crate) mod appearance;
+pub(crate) mod decode;
 pub(crate) mod footage_conditions;
 pub(crate) mod pose_chain;
+pub(crate) mod region;
+pub(crate) mod tracker;
+pub(crate) mod visibility;

@@ -1,6 +1,7 @@
 //! A run that is killed at any time and resumed writes identical bytes and repeats no work. `ORATOR_KILLS` sets the
 //! number of kills (`make prove`: 20).
 
+use crate::fixtures::media::recogniser::project_with_words;
 use orator_test_support::project::{Project, files_under};
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -24,14 +25,14 @@ fn dataset(work: &Path) -> BTreeMap<String, Vec<u8>> {
 #[test]
 fn a_run_killed_at_any_time_resumes_to_identical_bytes() {
     let n_kills: u32 = std::env::var("ORATOR_KILLS").ok().and_then(|n| n.parse().ok()).unwrap_or(4);
-    let undisturbed = Project::with_clips("calm", 2, 4.6);
+    let undisturbed = project_with_words("calm", 2, 4.6);
     let started = Instant::now();
     assert_eq!(undisturbed.run(&[]).code, 0);
     let duration = started.elapsed();
     let expected = dataset(&undisturbed.work());
     assert!(expected.keys().any(|name| name.ends_with(".tar")));
 
-    let killed = Project::with_clips("killed", 2, 4.6);
+    let killed = project_with_words("killed", 2, 4.6);
     let (mut before, mut n_killed, mut random) = (BTreeMap::new(), 0, 0x9e37_79b9_7f4a_7c15_u64);
     // A run that ends before its kill does not count: its dataset is checked and removed, and another run starts.
     for _ in 0..20 * n_kills {
@@ -68,8 +69,8 @@ fn a_run_killed_at_any_time_resumes_to_identical_bytes() {
 
 #[test]
 fn output_is_independent_of_the_number_of_workers() {
-    let one = Project::with_clips("one-worker", 2, 4.6);
-    let two = Project::with_clips("two-workers", 2, 4.6);
+    let one = project_with_words("one-worker", 2, 4.6);
+    let two = project_with_words("two-workers", 2, 4.6);
     assert_eq!(one.run(&["--jobs", "1"]).code, 0);
     assert_eq!(two.run(&["--jobs", "2"]).code, 0);
     assert!(dataset(&one.work()) == dataset(&two.work()));

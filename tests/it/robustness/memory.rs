@@ -5,6 +5,7 @@
 use crate::fixtures::clips;
 use crate::fixtures::clips::ffmpeg;
 use crate::fixtures::keypoints::keypoints;
+use crate::fixtures::media::recogniser::write_recogniser;
 use crate::fixtures::untrained::write_untrained_speaker;
 use ndarray::{Array3, s};
 use ndarray_npy::NpzWriter;
@@ -25,7 +26,7 @@ fn high_water_mib(id: &str) -> f64 {
 }
 
 /// Waits until a program succeeds, and returns its peak resident memory in MiB, including its child processes.
-fn peak_mib(mut child: Child) -> f64 {
+pub(crate) fn peak_mib(mut child: Child) -> f64 {
     let id = child.id().to_string();
     let mut peak = 0.0_f64;
     while child.try_wait().unwrap().is_none() {
@@ -128,4 +129,23 @@ fn long_audio_needs_memory_only_for_its_motion() {
         "150 s {short:.0} MiB, {secs} s {long:.0} MiB: {growth:.0} MiB more, joints {joints:.0}, audio {audio:.0}"
     );
     assert!(short > 10.0 && growth <= 2.2 * joints + 24.0, "{growth:.0} MiB more for {joints:.0} MiB of joints");
+}
+
+/// Peak resident memory in MiB of `orator transcribe` for `secs` of a tone, in every window of which the network
+/// recognises two words.
+fn peak_of_transcribe(secs: f64) -> f64 {
+    let dir = tempfile::tempdir().unwrap();
+    write_recogniser(&dir.path().join("whisper"));
+    wav::write(&dir.path().join("tone.wav"), &clips::tone(16_000, secs, 220.0)).unwrap();
+    let mut command = Command::new(env!("CARGO_BIN_EXE_orator"));
+    command.args(["transcribe", "tone.wav", "--model", "whisper", "--set", "models.dir=models", "--out", "words.json"]);
+    peak_mib(command.current_dir(dir.path()).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap())
+}
+
+#[test]
+fn recognition_of_long_audio_needs_no_more_memory() {
+    let secs = if std::env::var("ORATOR_LONG").is_ok() { 10_800.0 } else { 240.0 };
+    let (short, long) = (peak_of_transcribe(60.0), peak_of_transcribe(secs));
+    eprintln!("60 s {short:.0} MiB, {secs} s {long:.0} MiB");
+    assert!(short > 10.0 && long <= short + 32.0, "{short:.0} MiB became {long:.0} MiB");
 }

@@ -14,5 +14,6 @@ pub(crate) mod memory;
 pub(crate) mod output;
 pub(crate) mod parts;
 pub(crate) mod privacy;
+pub(crate) mod process;
 pub(crate) mod runner;
 pub(crate) mod sandbox;

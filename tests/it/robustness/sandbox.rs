@@ -1,6 +1,7 @@
 //! Videos are read in sandboxed processes: forbidden operations fail, the output is identical to that of one process,
 //! and the end of such a process, or of the run that started it, affects no other work.
 
+use crate::fixtures::media::recogniser::project_with_words;
 use orator::{Pipeline, Selection, Silent, StageName, UnreadableMedia, load_config};
 use orator_media::sandbox::{FileAccess, restrict, restrict_thread};
 use orator_pipeline::process::message::MediaRequest;
@@ -205,7 +206,7 @@ fn output_files(work: &Path) -> BTreeMap<String, Vec<u8>> {
 
 #[test]
 fn separate_processes_give_the_same_bytes_as_one_process() {
-    let project = Project::with_clips("same", 2, 4.6);
+    let project = project_with_words("same", 2, 4.6);
     fs::write(project.video("text.mp4"), "this is no video\n").unwrap();
     let pipeline = || Pipeline::open(load_config(&project.dir().join("pipeline.toml"), &[]).unwrap()).unwrap();
     let run = |pipeline: &Pipeline| {

@@ -57,7 +57,7 @@ fn head_and_trunk_follow_held_out_audio() {
     assert!(errors.values().all(|of| of.generator < 0.5 * of.mean_pose), "{errors:?}");
 
     let speaker = GestureGenerator::open(&out).unwrap();
-    let (motion, posture) = speaker.motion_and_posture(&held_out.sound).unwrap();
+    let (motion, posture) = speaker.motion_and_posture(&held_out.sound, &[]).unwrap();
     let posture = posture.unwrap();
     assert_eq!((motion.n_frames(), posture.head.dim(), posture.trunk.dim()), (150, (150, 3), (150, 3)));
     assert!(posture.head.iter().chain(&posture.trunk).all(|v| v.is_finite()));
@@ -112,7 +112,7 @@ fn without_channels_the_posture_of_a_dataset_is_ignored() {
     let (_, facts, out) = trained(&posed, "c", trunk);
     assert!(facts.contains("\"channels\":[\"trunk\"]"), "{facts}");
     let speaker = GestureGenerator::open(&out).unwrap();
-    let (_, posture) = speaker.motion_and_posture(&sample("d-00000000-000000", 40, 0.3).sound).unwrap();
+    let (_, posture) = speaker.motion_and_posture(&sample("d-00000000-000000", 40, 0.3).sound, &[]).unwrap();
     let posture = posture.unwrap();
     assert!(posture.head.iter().all(|v| v.is_nan()) && posture.trunk.iter().all(|v| v.is_finite()));
 

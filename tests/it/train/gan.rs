@@ -200,7 +200,7 @@ fn a_few_windows_are_memorised_and_generated() {
     assert!(validation.bone_change_mm < 0.01 && validation.alarm.is_none(), "{validation:?}");
 
     let speaker = GestureGenerator::open(&out).unwrap();
-    let motion = speaker.motion(&long.sound).unwrap();
+    let motion = speaker.motion(&long.sound, &[]).unwrap();
     assert_eq!((speaker.name(), motion.n_frames()), ("host", 99));
     assert!(motion.joints.iter().all(|v| v.is_finite()));
     for t in 0..99 {
@@ -210,10 +210,10 @@ fn a_few_windows_are_memorised_and_generated() {
         }
     }
     let short = Sound { rate: 16_000, samples: long.sound.samples[..3_000].to_vec() };
-    assert_eq!(speaker.motion(&short).unwrap().n_frames(), 2);
+    assert_eq!(speaker.motion(&short, &[]).unwrap().n_frames(), 2);
     let empty = Sound { rate: 16_000, samples: Vec::new() };
-    assert!(speaker.motion(&empty).is_err());
-    assert!(speaker.motion(&Sound { rate: 8_000, ..short }).is_err());
+    assert!(speaker.motion(&empty, &[]).is_err());
+    assert!(speaker.motion(&Sound { rate: 8_000, ..short }, &[]).is_err());
     assert!(GestureGenerator::open(&dataset_folder.join("info.json")).is_err());
 }
 

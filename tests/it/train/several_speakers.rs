@@ -77,13 +77,13 @@ fn each_speaker_is_generated_with_its_own_skeleton() {
     let (anna, ben) = (speaker(dir, "anna", 0.0, 1.0), speaker(dir, "ben", 1.5, 1.2));
     let ignore = &mut |_: ValidatedStep| ();
     let both = dir.join("both");
-    train_with_callback(&[&anna, &ben], &settings(), None, &both, &Silent, ignore).unwrap();
+    train_with_callback(&[&anna, &ben], &settings(), None, None, &both, &Silent, ignore).unwrap();
 
     let audio = Sound { rate: 16_000, samples: (0..48_000).map(|n| (n as f32 * 0.05).sin() * 0.3).collect() };
     let motion = |name: &str| -> Array3<f32> {
         let generator = as_speaker(&both, name).unwrap();
         assert_eq!(generator.name(), name);
-        generator.motion(&audio).unwrap().joints
+        generator.motion(&audio, &[]).unwrap().joints
     };
     let (of_anna, of_ben) = (motion("anna"), motion("ben"));
     let elbow = parent(L_WRIST).unwrap();
@@ -99,10 +99,10 @@ fn each_speaker_is_generated_with_its_own_skeleton() {
     // Stopped and resumed, it ends with identical bytes.
     let parts = dir.join("parts");
     let half = GanConfig { steps: 3.into(), ..settings() };
-    train_with_callback(&[&anna, &ben], &half, None, &parts, &Silent, ignore).unwrap();
+    train_with_callback(&[&anna, &ben], &half, None, None, &parts, &Silent, ignore).unwrap();
     let error = train(&anna, &settings(), &parts, &Silent).unwrap_err();
     assert!(format!("{error:#}").contains("2 speakers"), "{error:#}");
-    train_with_callback(&[&anna, &ben], &settings(), None, &parts, &Silent, ignore).unwrap();
+    train_with_callback(&[&anna, &ben], &settings(), None, None, &parts, &Silent, ignore).unwrap();
     let last = |out: &Path| std::fs::read(checkpoint::path(out, 6)).unwrap();
     assert!(last(&both) == last(&parts));
     let names = |out: &Path| bytes(out).into_iter().map(|(name, _)| name).collect::<Vec<_>>();
@@ -112,25 +112,25 @@ fn each_speaker_is_generated_with_its_own_skeleton() {
     let carl = speaker(dir, "carl", 0.7, 0.9);
     assert_starts_from_nearest_speaker(&both, &carl);
     let of_carl = dir.join("carl-gan");
-    train_with_callback(&[&carl], &settings(), Some(&both), &of_carl, &Silent, ignore).unwrap();
+    train_with_callback(&[&carl], &settings(), Some(&both), None, &of_carl, &Silent, ignore).unwrap();
     let model = GestureGenerator::open(&of_carl).unwrap().metadata;
     assert_eq!((model.name.as_str(), model.network.n_speakers), ("carl", 1));
     let trained_on: Vec<&str> = model.videos.iter().map(|video| video.speaker.as_str()).collect();
     assert!(["anna", "ben", "carl"].iter().all(|name| trained_on.contains(name)), "{trained_on:?}");
     assert_trains_only_speaker_layer(&both, &carl, &dir.join("layer"));
     // Two speakers can also be initialised from a single one.
-    train_with_callback(&[&anna, &ben], &settings(), Some(&of_carl), &dir.join("all"), &Silent, ignore).unwrap();
+    train_with_callback(&[&anna, &ben], &settings(), Some(&of_carl), None, &dir.join("all"), &Silent, ignore).unwrap();
     assert_eq!(as_speaker(&dir.join("all"), "ben").unwrap().metadata.network.n_speakers, 1);
 
     let error =
-        train_with_callback(&[&anna, &anna], &settings(), None, &dir.join("twice"), &Silent, ignore).unwrap_err();
+        train_with_callback(&[&anna, &anna], &settings(), None, None, &dir.join("twice"), &Silent, ignore).unwrap_err();
     assert!(format!("{error:#}").contains("both of speaker anna"), "{error:#}");
 }
 
 /// The weights shared by all speakers do not change at a learning rate of 0.
 fn assert_trains_only_speaker_layer(both: &Path, new: &Dataset, out: &Path) {
     let settings = GanConfig { shared_rate: 0.0.into(), ..settings() };
-    train_with_callback(&[new], &settings, Some(both), out, &Silent, &mut |_| ()).unwrap();
+    train_with_callback(&[new], &settings, Some(both), None, out, &Silent, &mut |_| ()).unwrap();
     let initial = Contents::read(&both.join(BEST)).unwrap().part(GENERATOR);
     let trained = Contents::read(&checkpoint::path(out, 6)).unwrap().part("training.generator.");
     let values = |tensor: &Tensor| tensor.flatten_all().unwrap().to_vec1::<f32>().unwrap();
@@ -148,7 +148,7 @@ fn assert_starts_from_nearest_speaker(both: &Path, new: &Dataset) {
         recipe::settings(&settings(), &TrainingMaterial::measure(&[new], 32), InitialWeights::SeveralSpeakers).unwrap();
     let metadata = speakers::metadata(new, &normal, &loader, &of, 1).unwrap();
     let windows = JoinedWindows::new(vec![loader]);
-    let trainer = PretrainedModel::read(both).unwrap().trainer(vec![metadata], of, &windows).unwrap();
+    let trainer = PretrainedModel::read(both).unwrap().trainer(vec![metadata], of, None, &windows).unwrap();
     let batch = windows.batch_changed(&(0..windows.len()).collect::<Vec<_>>(), &[]).unwrap();
     let initial_error = trainer.error(&batch).unwrap();
 

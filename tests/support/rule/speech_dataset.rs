@@ -29,10 +29,14 @@ pub fn is_by_speech(sample: &Sample) -> bool {
     sample.meta.pointer("/rule/rule").and_then(serde_json::Value::as_u64) == Some(u64::from(RULE_OF_SPEECH))
 }
 
+/// Events of a sample's speech, from its audio and words.
+pub fn events(sample: &Sample) -> SpeechEvents {
+    SpeechEvents::detect(&sample.sound, sample.words.as_deref().unwrap_or_default())
+}
+
 /// Predictable part of a sample's motion: the rule without variation, for its audio and words.
 pub fn predictable(sample: &Sample) -> orator_base::types::pose3d::Motion {
-    let events = SpeechEvents::detect(&sample.sound, sample.words.as_deref().unwrap_or_default());
-    SpeechGestures::new(&events).motion(sample.n_frames(), sample.motion.fps)
+    SpeechGestures::new(&events(sample)).motion(sample.n_frames(), sample.motion.fps)
 }
 
 /// Speech in a folder: `NAME.wav` with `NAME.tsv`. The split is the one that the name begins with, else train.

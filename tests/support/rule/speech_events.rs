@@ -15,8 +15,12 @@ const MIN_BEAT_INTERVAL: f64 = 0.45;
 const MIN_PAUSE: f64 = 0.22;
 
 /// Words that move the left hand to each of four targets.
-pub const WORDS: [[&str; 2]; 4] =
-    [["river", "mountain"], ["garden", "window"], ["letter", "money"], ["morning", "city"]];
+pub const WORDS: [[&str; 10]; 4] = [
+    ["river", "mountain", "forest", "bridge", "castle", "valley", "desert", "ocean", "village", "tower"],
+    ["garden", "window", "kitchen", "ladder", "mirror", "blanket", "curtain", "candle", "bottle", "basket"],
+    ["letter", "money", "ticket", "camera", "necklace", "pencil", "button", "newspaper", "hammer", "wallet"],
+    ["morning", "city", "evening", "country", "station", "market", "museum", "library", "holiday", "birthday"],
+];
 
 /// Events of a speech, in seconds and in order of time.
 #[derive(Clone, Debug, Default, PartialEq)]

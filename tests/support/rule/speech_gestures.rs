@@ -5,10 +5,10 @@ use super::speech_events::SpeechEvents;
 use crate::drawn::figure::{ArmControls, Controls, DrawnFigure};
 use crate::drawn::gesture::minimum_jerk;
 use ndarray::Array3;
-use orator_base::math::vec3::sub;
+use orator_base::math::vec3::{Vec3, sub};
 use orator_base::types::pose3d::Motion;
 use orator_base::types::posture::Posture;
-use orator_base::types::skeleton::{N_JOINTS, NECK};
+use orator_base::types::skeleton::{L_WRIST, N_JOINTS, NECK};
 use orator_base::types::time::FrameRate;
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
@@ -27,8 +27,8 @@ const TARGETS: [ArmTarget; 4] = [
 ];
 
 /// Delay from a word to its stroke, and durations of stroke, hold and return, seconds.
-const WORD_DELAY: f64 = 0.45;
-const STROKE: f64 = 0.45;
+pub const WORD_DELAY: f64 = 0.45;
+pub const STROKE: f64 = 0.45;
 const HOLD: f64 = 0.4;
 const RETURN: f64 = 0.7;
 /// Delay from the peak of a loud syllable to its beat, durations of the downward and upward movement, seconds; depth
@@ -66,7 +66,7 @@ const SWAY_HZ: std::ops::Range<f64> = 0.2..1.2;
 /// * right hand: a beat of 0.1 m x height at 0.28 s after the peak of each loud syllable (down in 0.15 s, back in
 ///   0.3 s), on an arc over the duration of the phrase: up by 0.1 m within 0.8 s, to the side and back in 3 s, down at
 ///   its end;
-/// * left hand: to one of four targets at 0.45 s after the start of its eight words, with hold and return;
+/// * left hand: to one of four targets at 0.45 s after the start of a word of `speech_events::WORDS`, with hold and return;
 /// * head: a nod after each loud syllable, a turn with the arc.
 pub struct SpeechGestures {
     events: SpeechEvents,
@@ -128,6 +128,15 @@ impl SpeechGestures {
             });
         }
         Controls { arms: [ArmControls::from(left), ArmControls::from(right)], ..Controls::default() }
+    }
+
+    /// Wrist position relative to the neck, metres, of the left hand at a target of the words; the rest of the pose is that
+    /// of the rule at `secs`.
+    pub fn wrist_at(&self, target: usize, secs: f64) -> Vec3 {
+        let mut controls = self.controls(secs);
+        controls.arms[0] = ArmControls::from(TARGETS[target]);
+        let figure = DrawnFigure::new(&controls);
+        sub(figure.joints[L_WRIST], figure.joints[NECK])
     }
 
     /// Height of the hand in its arc, 0..1, and position in the sweep, 0..1.
@@ -197,7 +206,7 @@ fn with_returns(strokes: Vec<(f64, ArmTarget)>) -> Vec<(f64, f64, ArmTarget)> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use orator_base::types::skeleton::{L_WRIST, R_WRIST};
+    use orator_base::types::skeleton::R_WRIST;
     use rand::SeedableRng;
 
     const FPS: FrameRate = FrameRate::new(50, 1);

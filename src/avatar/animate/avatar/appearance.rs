@@ -1,10 +1,8 @@
-//! Appearance of an avatar: build, skin, face, hair, clothes and their colours. Lengths scale with the rig; colours are
-//! linear RGB reflectances.
+//! Appearance of an avatar: build, skin, face, hair, clothes. Lengths scale with the rig; colours: linear reflectances.
 
 /// Linear RGB reflectance, 0..1.
 pub type Reflectance = [f32; 3];
 
-/// Hairstyle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Hairstyle {
     Bald,
@@ -62,7 +60,6 @@ pub struct Appearance {
     pub iris: Reflectance,
     pub hair: Hairstyle,
     pub hair_colour: Reflectance,
-    /// Thickness of the hair.
     pub hair_volume: f64,
     /// How far the hair covers the forehead, cm, and how much farther on the right than on the left, -1 .. 1.
     pub fringe: f64,
@@ -76,7 +73,6 @@ pub struct Appearance {
     /// Colour of stripes and checks, or of the shirt under a jacket.
     pub second_colour: Reflectance,
     pub weave: Weave,
-    /// Whether the shirt has a collar.
     pub collar: bool,
     /// Whether a skirt is worn instead of trousers.
     pub skirt: bool,

@@ -27,7 +27,6 @@ const NORMAL_WIDTH: f64 = 0.1;
 /// Radius around the wrist in which the cells of a bare arm hardly grow, cm.
 const ARM_FOCUS_RADIUS: f64 = 7.0;
 
-/// Mesh of one material in the stance.
 #[derive(Default)]
 pub struct PosedMesh {
     pub surface: Surface,
@@ -47,7 +46,6 @@ impl PosedMesh {
     }
 }
 
-/// Meshes of one avatar, by material.
 pub struct Assembly<'a> {
     body: &'a BodyForm<'a>,
     appearance: &'a Appearance,

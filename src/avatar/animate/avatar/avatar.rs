@@ -33,7 +33,6 @@ pub struct AvatarMesh {
     pub twist: Vec<f32>,
 }
 
-/// All meshes of an avatar.
 #[derive(Clone, Debug)]
 pub struct Avatar {
     pub parts: Vec<AvatarMesh>,

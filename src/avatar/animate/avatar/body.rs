@@ -232,7 +232,6 @@ impl<'a> BodyForm<'a> {
             .cut(self.stance.at(hips, knees), [0.0, -1.0, 0.0], self.cm(1.4))
     }
 
-    /// One shoe.
     pub fn shoe(&self, side: usize) -> Form {
         let foot = self.rig.legs[side][2];
         let out = [0.6, -0.6][side];

@@ -1,5 +1,4 @@
-//! Facial features modelled point by point: eyes with lids, brows, lips, teeth, and glasses, in the axes of the
-//! reference head.
+//! Facial features: eyes with lids, brows, lips, teeth, and glasses, in the axes of the reference head.
 
 use super::appearance::{Appearance, Reflectance};
 use super::head::{EAR, EYE, EYE_RADIUS, HeadForm};
@@ -213,8 +212,7 @@ fn lid(appearance: &Appearance, upper: bool) -> Feature {
         for k in -12..=12 {
             let u = f64::from(k) / 10.0;
             let turn = CORNER * u;
-            // The highest point of the upper lid is nearer to the nose, the lowest point of the lower lid farther from
-            // it.
+            // The highest point of the upper lid is nearer to the nose, the lowest of the lower lid farther from it.
             let skewed = (u + side * 0.12 * (1.0 - u * u)).clamp(-1.0, 1.0);
             let open = (1.0 - skewed * skewed).max(0.0).powf(0.72) * if upper { UPPER_LID } else { LOWER_LID };
             // The outer corner is slightly higher.

@@ -1,5 +1,4 @@
-//! Opening of the mouth, in the axes of the head: the part below the mouth line rotates down about the hinge of the
-//! jaw.
+//! Opening of the mouth, in the axes of the head: the part below the mouth line rotates down about the jaw's hinge.
 
 use orator_base::math::rotation::Rotation;
 use orator_base::math::vec3::{Vec3, add, scale, sub};

@@ -1,6 +1,5 @@
 //! Materials of an avatar's meshes.
 
-/// Material of a mesh.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Material {
     Skin,

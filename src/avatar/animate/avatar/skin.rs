@@ -21,8 +21,7 @@ type Shares = Vec<(usize, f64)>;
 /// A chain of joints and the transitions between them.
 struct WeightChain {
     joints: Vec<usize>,
-    /// For each joint but the first: position and normal of the transition plane, and half the width of the transition
-    /// (cm).
+    /// For each joint but the first: position and normal of the transition plane, half the transition's width (cm).
     transitions: Vec<(Vec3, Vec3, f64)>,
 }
 
@@ -79,13 +78,11 @@ impl BodyForm<'_> {
         }
     }
 
-    /// Weights of the head and the neck.
     pub fn head_weights(&self, surface: &Surface) -> Vec<Weights> {
         let spine = self.spine();
         smoothed_weights(surface, 2, |at, shares| spine.shares(at, 1.0, shares))
     }
 
-    /// Weights of the shirt.
     pub fn shirt_weights(&self, surface: &Surface) -> Vec<Weights> {
         let cm = self.stance.scale;
         let mut spine = self.spine();
@@ -117,7 +114,6 @@ impl BodyForm<'_> {
         })
     }
 
-    /// Weights of trousers and shoes.
     pub fn leg_weights(&self, surface: &Surface) -> Vec<Weights> {
         let cm = self.stance.scale;
         let chains = self.rig.legs.map(|[upper, lower, foot, end]| {

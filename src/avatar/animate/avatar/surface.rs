@@ -46,8 +46,7 @@ impl Surface {
         cell: f64,
         (focus, even): (Vec3, f64),
     ) -> Self {
-        // The grid has uniform cells in a warped space, in which a point at distance `even` sinh(r / even) is at
-        // distance r.
+        // The grid has uniform cells in a warped space: a point at distance `even` sinh(r / even) is at distance r.
         let space = |at: Vec3| {
             let far = norm(at) / even;
             add(focus, scale(at, if far > 1e-9 { far.sinh() / far } else { 1.0 }))
@@ -129,8 +128,7 @@ impl Surface {
         self
     }
 
-    /// Number of leading triangles that form closed surfaces: they have no open edge and share no vertex with later
-    /// ones.
+    /// Number of leading triangles that form closed surfaces: no open edge, no vertex shared with later ones.
     pub fn n_closed(&self) -> usize {
         let edges = |[a, b, c]: [u32; 3]| [[a, b], [b, c], [c, a]];
         let all: HashSet<[u32; 2]> = self.triangles.iter().flat_map(|triangle| edges(*triangle)).collect();

@@ -86,8 +86,7 @@ struct DrawnLimb {
     radii: [f32; 2],
     left: bool,
     rgb: [u8; 3],
-    /// Fraction of the length at which the outline begins (1: no outline); an earlier one would cut into the parent
-    /// limb.
+    /// Fraction of the length at which the outline begins (1: no outline); earlier, it would cut into the parent limb.
     seam_from: f32,
 }
 

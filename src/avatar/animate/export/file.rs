@@ -26,7 +26,6 @@ pub struct ExportContent<'a> {
     pub names: Names,
     /// What a film shows besides the avatar.
     pub second_panel: film::SecondPanel<'a>,
-    /// Viewpoint of a film.
     pub camera: FilmCamera,
     /// Frame rate of a film; `None` interpolates to at least 30 fps (`film::smooth_rate`).
     pub film_fps: Option<FrameRate>,
@@ -34,7 +33,6 @@ pub struct ExportContent<'a> {
     pub posture: Option<(FrameRate, &'a Posture)>,
 }
 
-/// Options of the figure in a file.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct FigureOptions {
     /// Naming convention of the bones, for formats with bone names.
@@ -43,7 +41,6 @@ pub struct FigureOptions {
     pub fps: Option<FrameRate>,
 }
 
-/// Format of a motion file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ExportFormat {
     /// Joints [T, 49, 3] f32, with the rate in a file next to it (`formats::joints_description`).
@@ -159,7 +156,6 @@ impl ExportFormat {
     }
 }
 
-/// Writes a text file through a buffered writer.
 fn write_text(path: &Path, write: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>) -> anyhow::Result<()> {
     workdir::replace(path, |attempt| {
         let mut text = BufWriter::new(File::create(attempt)?);

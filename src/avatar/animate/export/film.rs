@@ -44,7 +44,6 @@ pub fn smooth_rate(fps: FrameRate) -> FrameRate {
     fps.num.checked_mul(times as u32).map_or(fps, |num| FrameRate::new(num, fps.den))
 }
 
-/// Content of a film.
 #[derive(Clone, Copy, Debug)]
 pub struct FilmSource<'a> {
     pub performance: &'a Performance,
@@ -65,7 +64,6 @@ pub enum SecondPanel<'a> {
     Motion { performance: &'a Performance, labels: [&'a str; 2] },
 }
 
-/// Renderer of the frames of a film.
 pub struct Film<'a> {
     fps: FrameRate,
     n_frames: usize,
@@ -80,7 +78,6 @@ pub struct Film<'a> {
     voice: Vec<f32>,
 }
 
-/// An avatar in its area of the image.
 struct LabelledPanel<'a> {
     performance: &'a Performance,
     view: AvatarView<'a>,

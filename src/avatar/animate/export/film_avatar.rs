@@ -11,7 +11,6 @@ use orator_base::types::image::Image;
 use orator_base::types::skeleton::N_JOINTS;
 use rayon::prelude::*;
 
-/// Viewpoint of a film.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum FilmCamera {
     #[default]
@@ -47,7 +46,6 @@ impl FilmCamera {
 const FOCAL_RATIO: f64 = 2.2;
 /// Margin around the content, as a fraction of the image.
 const MARGIN: f64 = 0.06;
-/// Radius of the body around a joint, cm.
 const BODY_RADIUS_CM: f64 = 4.0;
 /// Direction of the key light for a front view.
 const TO_KEY: Vec3 = [-0.5, 0.8, 0.7];
@@ -66,7 +64,6 @@ const ABOVE_TOP_CM: f64 = 1.0;
 /// Offsets of the avatars of a picture, cm, left to right; two avatars are 1.5 m apart.
 const ALONE: [Vec3; 1] = [[0.0; 3]];
 const PAIR: [Vec3; 2] = [[-75.0, 0.0, 0.0], [75.0, 0.0, 0.0]];
-/// Materials of the head.
 const HEAD_MATERIALS: [Material; 4] = [Material::Face, Material::Eyes, Material::Hair, Material::Frames];
 
 /// Avatar and camera that films of several performances on one rig share.
@@ -80,8 +77,7 @@ pub struct AvatarStage {
 }
 
 impl AvatarStage {
-    /// Avatar of the performances' rig, with a camera of `size` px in which all of them fit; `None` without a
-    /// performance.
+    /// Avatar of the performances' rig, with a camera of `size` px in which they all fit; `None` without a performance.
     pub fn new(shown: &[&Performance], appearance: &Appearance, size: [usize; 2], from: FilmCamera) -> Option<Self> {
         let avatar = Avatar::new(&shown.first()?.rig, appearance);
         Some(Self { avatar, camera: from.framing(shown, size), from, offsets: &ALONE })
@@ -140,7 +136,6 @@ struct PlacedAvatar<'a> {
     meshes: Vec<Mesh>,
 }
 
-/// Renderer of the performances of one film.
 pub struct AvatarView<'a> {
     placed: Vec<PlacedAvatar<'a>>,
     avatar: Avatar,
@@ -174,7 +169,6 @@ impl<'a> AvatarView<'a> {
         }
     }
 
-    /// Number of triangles of the avatar.
     pub fn n_triangles(&self) -> usize {
         self.avatar.parts.iter().map(|part| part.triangles.len()).sum()
     }

@@ -1,5 +1,4 @@
-//! Camera of the video from which a motion was lifted, with an assumed focal length, and the position of the body in
-//! front of it.
+//! Camera of the video from which a motion was lifted, with an assumed focal length, and the body's position before it.
 
 use crate::render::PinholeCamera;
 use anyhow::{Context as _, ensure};
@@ -10,8 +9,7 @@ use orator_base::types::pose3d::Motion;
 use orator_base::types::skeleton::{L_ELBOW, L_SHOULDER, L_WRIST, R_ELBOW, R_SHOULDER, R_WRIST};
 use orator_base::types::time::FrameRate;
 
-/// Assumed focal length relative to the longer side of the image. If it is wrong, the body is estimated too near or too
-/// far.
+/// Assumed focal length relative to the longer side of the image. If it is wrong, the body seems too near or too far.
 const FOCAL_RATIO: f64 = 1.2;
 /// Joints with their keypoints.
 const PAIRS: [[usize; 2]; 6] = [
@@ -43,8 +41,7 @@ pub struct SourceCamera {
 type Correspondence = (Vec3, [f64; 2]);
 
 impl SourceCamera {
-    /// Fits the camera that projects the joints of a motion onto the keypoints of the same frames; the depth of the
-    /// neck is constant.
+    /// Fits the camera that projects a motion's joints onto the keypoints of its frames; the neck's depth is constant.
     ///
     /// # Errors
     /// The numbers of frames differ, or no frame shows enough keypoints.

@@ -64,7 +64,6 @@ pub fn asset() -> Value {
     json!({ "version": "2.0", "generator": concat!("orator ", env!("CARGO_PKG_VERSION")) })
 }
 
-/// Nodes of the joints at rest.
 pub fn joint_nodes(skeleton: &FileSkeleton, root: Vec3) -> Vec<Value> {
     let node = |(joint, rest): (usize, Rotation)| {
         let bone = &skeleton.skeleton.joints[joint];
@@ -151,7 +150,6 @@ fn inverse_binds(buffer: &mut GlbBuffer, skeleton: &FileSkeleton, root: Vec3) ->
     buffer.floats(&matrices, "MAT4", BufferUse::Other)
 }
 
-/// The clip as an animation of the nodes of its joints.
 pub fn animation(buffer: &mut GlbBuffer, clip: &BvhClip) -> Value {
     let times: Vec<[f32; 1]> = (0..clip.n_frames()).map(|frame| [clip.fps.secs(frame) as f32]).collect();
     let once = buffer.floats(&times[..1], "SCALAR", BufferUse::Other);

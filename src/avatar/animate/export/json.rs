@@ -14,7 +14,6 @@ use orator_base::types::time::FrameRate;
 use serde_json::json;
 use std::io::{self, Write};
 
-/// Writes the text of the file.
 pub fn write(
     text: &mut impl Write,
     performance: &Performance,

@@ -23,8 +23,7 @@ pub fn avatar(rig: &Rig, avatar: &Avatar) -> Vec<u8> {
     buffer.file(scene)
 }
 
-/// Bytes of the `.vrma` file of a clip: joints without a skin, the animation, and the mapping of humanoid bones to
-/// nodes.
+/// Bytes of the `.vrma` file of a clip: joints without skin, the animation, the mapping of humanoid bones to nodes.
 pub fn motion(rig: &Rig, clip: &BvhClip) -> Vec<u8> {
     let skeleton = FileSkeleton::new(&rig.skeleton, Names::Vrm, RestAxes::Convention);
     let mut buffer = GlbBuffer::default();
@@ -43,8 +42,7 @@ pub fn motion(rig: &Rig, clip: &BvhClip) -> Vec<u8> {
     buffer.file(scene)
 }
 
-/// Turns a scene with VRM names into a humanoid: adds the bones, the open-mouth expression, and metadata with author
-/// and permissions.
+/// Turns a scene with VRM names into a humanoid: adds bones, open-mouth expression, author and permissions.
 pub fn make_humanoid(scene: &mut Value, named: &Skeleton) {
     // The last node is the face.
     let face = named.joints.len() + 1;
@@ -75,7 +73,6 @@ pub fn make_humanoid(scene: &mut Value, named: &Skeleton) {
     scene["extensions"] = json!({ "VRMC_vrm": extension });
 }
 
-/// Node of each humanoid bone.
 fn bones(named: &Skeleton) -> Map<String, Value> {
     let moving = named.joints.iter().enumerate().filter(|(_, joint)| !joint.end);
     moving.map(|(node, joint)| (joint.name.clone(), json!({ "node": node }))).collect()

@@ -47,7 +47,6 @@ pub enum CapturedPart {
 impl CapturedPart {
     const ALL: [Self; 3] = [Self::Head, Self::Spine, Self::Legs];
 
-    /// Name in reports.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Head => "head",
@@ -149,14 +148,12 @@ impl CapturedBody {
         self
     }
 
-    /// The parts it contains.
     pub fn parts(&self) -> Vec<CapturedPart> {
         let has = |part: &CapturedPart| self.bones.iter().any(|(bone, _)| bone.part == *part);
         CapturedPart::ALL.into_iter().filter(has).collect()
     }
 
-    /// Gives a rig the rest pose of the capture, and its legs the captured lengths unless these are implausible for its
-    /// arms.
+    /// Gives a rig the rest pose of the capture, and its legs the captured lengths unless implausible for its arms.
     pub fn fit(&self, rig: &mut Rig) {
         let rest = self.rest.iter().filter_map(|(ours, turn)| Some((rig.skeleton.find(ours)?, *turn))).collect();
         rig.rest = rest;

@@ -179,7 +179,6 @@ fn parsed_chunks(file: &[u8]) -> Option<(Value, Vec<u8>)> {
     scene.is_object().then_some((scene, bytes))
 }
 
-/// Node of a glTF scene.
 #[derive(Debug, Deserialize)]
 #[serde(default)]
 struct SceneNode {
@@ -228,8 +227,7 @@ impl SceneNode {
     }
 }
 
-/// Translation, rotation, scale factors of a matrix, and whether its axes are not perpendicular. The factors of a
-/// reflection are negative.
+/// Translation, rotation, scale factors of a matrix, whether its axes are skewed. Those of a reflection are negative.
 fn decomposed(matrix: &[f64; 16]) -> (Vec3, Rotation, Vec3, bool) {
     let column = |k: usize| [matrix[4 * k], matrix[4 * k + 1], matrix[4 * k + 2]];
     let columns = [0, 1, 2].map(column);

@@ -18,7 +18,6 @@ use std::path::Path;
 pub struct RetargetRig {
     file: RigFile,
     rig: UserRig,
-    /// Whether the file is a VRM avatar.
     is_vrm: bool,
 }
 
@@ -77,7 +76,6 @@ impl RetargetRig {
         Ok((frames, (0..self.rig.joints.len()).map(|joint| transfer.moves(joint)).collect()))
     }
 
-    /// Writes a performance on this skeleton.
     pub fn write(&self, path: &Path, performance: &Performance, map: &BoneMap) -> Result<()> {
         self.check_output(path)?;
         let (transfer, clip) = (Transfer::new(&performance.rig, &self.rig, map)?, &performance.clip);

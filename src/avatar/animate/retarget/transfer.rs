@@ -1,7 +1,6 @@
-//! Converts rotations of our rig to rotations of a user's skeleton, whose rest pose may differ. Each of its bones is
-//! first aligned, by the smallest rotation, with the rest direction of ours and then follows our world rotation.
-//! Finally, two-bone inverse kinematics puts the wrists at our positions relative to the centre of the shoulders,
-//! scaled by arm length.
+//! Converts rotations of our rig to rotations of a user's skeleton, with another rest pose. Each of its bones is first
+//! aligned, by the smallest rotation, with the rest direction of ours and then follows our world rotation. Two-bone
+//! inverse kinematics puts the wrists at our positions relative to the shoulders' centre, scaled by arm length.
 
 use super::bone_map::BoneMap;
 use super::two_bone::solve_two_bone;
@@ -136,7 +135,6 @@ impl<'a> Transfer<'a> {
         placed.iter().enumerate().map(local).collect()
     }
 
-    /// Whether a joint is moved.
     pub fn moves(&self, joint: usize) -> bool {
         self.moved[joint].is_some()
     }

@@ -4,7 +4,6 @@ use orator_base::math::rotation::Rotation;
 use orator_base::math::vec3::{Vec3, add, scale};
 use std::collections::BTreeMap;
 
-/// A joint of a user's skeleton.
 #[derive(Clone, Debug, PartialEq)]
 pub struct UserJoint {
     pub name: String,
@@ -35,8 +34,7 @@ pub struct JointTransform {
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct UserRig {
     pub joints: Vec<UserJoint>,
-    /// Local rotations of a pose that is upright in the world of the file, since a zero pose may lie down. Empty if the
-    /// rest pose is to be used.
+    /// Local rotations of a pose upright in the file's world, since a zero pose may lie down. Empty: the rest pose.
     pub standing_pose: Vec<Rotation>,
     /// Joints that the file itself assigns to our bones; empty to match them by name.
     pub humanoid: BTreeMap<String, usize>,

@@ -10,13 +10,11 @@ use crate::animate::solve::track::smoothstep;
 use orator_base::math::rotation::Rotation;
 use serde::Serialize;
 
-/// Constraints to apply.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Constraints {
     /// Whether to apply the limits of every joint.
     pub limits: bool,
-    /// Whether to keep fingers within 10 degrees of the mean curl of the four. This also bends a pointing finger, so it
-    /// is off by default.
+    /// Whether to keep fingers within 10 degrees of their mean curl. It also bends a pointing finger: off by default.
     pub curl_coherence: bool,
 }
 
@@ -74,7 +72,6 @@ const COHERENCE: usize = 13;
 /// Minimum change that counts as a clamp, degrees; smaller ones are rounding errors.
 const MIN_CLAMP_DEGREES: f64 = 1e-6;
 
-/// Clamps of one kind.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Clamps {
     pub kind: &'static str,
@@ -86,7 +83,6 @@ pub struct Clamps {
     pub largest_excess_degrees: f64,
 }
 
-/// Counter of clamps.
 #[derive(Clone, Debug, Default)]
 pub struct ClampCounter {
     n_frames: usize,
@@ -173,9 +169,8 @@ fn limit_curl_spread(pose: &mut ArmPose, counter: &mut ClampCounter) {
     }
 }
 
-/// Mean of four angles that is also the mean after clamping around it; if there are several, the one nearest to the
-/// plain mean. `rise(m)`, the mean of the clamped angles minus m, decreases with m; its root is bisected from the plain
-/// mean.
+/// Mean of four angles that is also the mean after clamping around it; of several, the one nearest to the plain mean.
+/// `rise(m)`, the mean of the clamped angles minus m, decreases with m; its root is bisected from the plain mean.
 fn coherent_mean(given: [f64; 4]) -> f64 {
     let rise = |m: f64| given.iter().map(|f| (f - m).clamp(-CURL_COHERENCE, CURL_COHERENCE)).sum::<f64>() / 4.0;
     let mean = given.iter().sum::<f64>() / 4.0;

@@ -7,7 +7,6 @@ use orator_base::math::vec3::{Vec3, scale, unit};
 use orator_base::motion::fk::{Joint, Skeleton};
 use orator_formats::bvh::write::BvhClip;
 
-/// Axes of the joints at rest.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum RestAxes {
     /// Parallel to the world axes.
@@ -17,7 +16,6 @@ pub enum RestAxes {
     Convention,
 }
 
-/// Skeleton of a file with the rest axes of its joints.
 #[derive(Clone, Debug)]
 pub struct FileSkeleton {
     /// Joints with the names of the file, bone ends included; offsets in cm in the parent's rest axes.
@@ -67,7 +65,6 @@ impl FileSkeleton {
         self.skeleton.joints.iter().zip(&self.rest).map(own).collect()
     }
 
-    /// Converts a clip of the rig to this skeleton.
     pub fn clip(&self, clip: &BvhClip) -> BvhClip {
         let turned = |local: &Vec<Rotation>| -> Vec<Rotation> {
             let joint = |(n, joint): (usize, &Joint)| {

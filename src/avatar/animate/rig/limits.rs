@@ -42,8 +42,7 @@ const fn finger(spread: [f64; 2], middle_side: [f64; 2]) -> [Limit; 3] {
     [limit([-45.0, 130.0], spread), limit([-25.0, 115.0], middle_side), limit([-25.0, 90.0], SIDE)]
 }
 
-/// Clamps a circular angle to a range. Near the point opposite the range the result blends from one end to the other,
-/// so that it is continuous.
+/// Clamps a circular angle to a range. Opposite the range the result blends from one end to the other, continuously.
 pub fn clamp_circular([low, high]: [f64; 2], degrees: f64) -> f64 {
     let (middle, half) = ((low + high) / 2.0, (high - low) / 2.0);
     let off = turn(degrees - middle);

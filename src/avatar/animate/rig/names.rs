@@ -3,7 +3,6 @@
 
 use orator_base::motion::fk::Skeleton;
 
-/// Naming convention.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Names {
     /// `Hips`, `LeftForeArm`, `LeftHandIndex1`: Mixamo's names without prefix, and `Chest`.
@@ -15,8 +14,7 @@ pub enum Names {
     UnityHumanoid,
     /// Humanoid bones of VRM 1.0 (`VRMC_vrm`).
     Vrm,
-    /// Body of Unreal's Manny and of MetaHumans; our chest is `spine_05`, and `spine_02` to `spine_04` and `neck_02`
-    /// are absent.
+    /// Unreal's Manny and MetaHumans; our chest is `spine_05`, and `spine_02` to `spine_04` and `neck_02` are absent.
     Unreal,
 }
 
@@ -71,7 +69,6 @@ impl Names {
     }
 }
 
-/// Name in Unreal's convention.
 fn unreal(own: &str) -> String {
     let (part, side) = match (own.strip_prefix("Left"), own.strip_prefix("Right")) {
         (Some(part), _) => (part, "_l"),

@@ -163,8 +163,7 @@ pub fn finger_hinge(finger: usize) -> Hinge {
     Hinge::new(along, scale(cross(along, bends), 1.0 / norm(bends)))
 }
 
-/// Medians over the frames of the finger bases in the left hand's frame, metres; `None` if they were never detected or
-/// are implausible.
+/// Medians over frames of the finger bases in the left hand's frame, metres; `None` if never detected or implausible.
 fn median_palm(positions: &JointPositions) -> Option<[Vec3; 5]> {
     let seen: Vec<_> = (0..positions.n_frames()).filter_map(|t| positions.palm(t)).collect();
     let middle = |finger: usize, axis: usize| upper_median(seen.iter().filter_map(|palm| Some(palm[finger]?[axis])));
@@ -193,9 +192,8 @@ fn default_palm(metres: &[f64; N_JOINTS]) -> [Vec3; 5] {
     })
 }
 
-/// Median length over the frames of the bone to each joint, metres; that of the other side or a default if never
-/// detected. Noise lengthens short bones; where it does, the length is taken from products of different frames, whose
-/// errors are independent.
+/// Median length over frames of the bone to each joint, metres; if never detected, the other side's or a default. Noise
+/// lengthens short bones; where it does, products of different frames are used, whose errors are independent.
 pub fn bone_metres(motion: &Motion) -> [f64; N_JOINTS] {
     let seen: [Option<f64>; N_JOINTS] = std::array::from_fn(|joint| {
         let parent = skeleton::parent(joint)?;
@@ -227,7 +225,6 @@ fn default_metres(joint: usize) -> f64 {
 pub(crate) mod tests {
     use super::*;
 
-    /// Rig with default bone lengths.
     pub(crate) fn default_rig() -> Rig {
         let missing = ndarray::Array3::from_elem((1, N_JOINTS, 3), f32::NAN);
         Rig::from_motion(&Motion::from_joints(orator_base::types::time::FrameRate::new(15, 1), missing))

@@ -1,8 +1,7 @@
 //! Joint positions to bone rotations. The shoulders' yaw is shared equally by spine and chest, and each arm is solved
 //! as a left arm from shoulder to finger tips. Bones take their smoothed directions; the roll of the upper arm aligns
 //! the elbow axis with the normal of the arm's plane and is interpolated where the arm is straight; the hand's frame is
-//! computed from its knuckles, and half of its rotation about the forearm is given to the forearm. Fingers bend without
-//! twist.
+//! computed from its knuckles, and half of its twist is given to the forearm. Fingers bend without twist.
 
 use super::arm_pose::{ArmPose, elbow};
 use super::positions::JointPositions;
@@ -142,8 +141,7 @@ fn smooth_hand(forearm: &RotationTrack, frames: &ObservedTrack, filter: &Filter,
     angles.into_iter().map(|angles| angles.map(rotation)).collect()
 }
 
-/// Local rotations of a finger's three joints. Bones are smoothed in the axes of the observed hand, which removes noise
-/// of the hand as a whole.
+/// Rotations of a finger's joints. Bones are smoothed in the observed hand's axes, which removes the hand's noise.
 fn solve_finger(
     positions: &JointPositions,
     frames: &ObservedTrack,

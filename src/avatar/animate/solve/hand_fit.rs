@@ -12,8 +12,7 @@ use orator_base::types::skeleton::N_HAND_JOINTS;
 /// Distance at which the filter's tolerance, an angle, applies to a point of the hand, metres.
 const LEVER_METRES: f64 = 0.04;
 
-/// Replaces both hands and wrists in frames in which the knuckles of index and little finger were detected; missing
-/// points stay missing.
+/// Replaces both hands and wrists where the knuckles of index and little finger were detected; gaps remain.
 pub fn with_fitted_hands(positions: JointPositions, filter: &Filter) -> JointPositions {
     if matches!(filter, Filter::None) {
         return positions;

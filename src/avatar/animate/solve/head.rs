@@ -1,5 +1,4 @@
-//! Head and neck from a posture: both share the head's rotation relative to the chest equally; if not detected, they
-//! relax.
+//! Head and neck from a posture: each has half the head's rotation relative to the chest; if not detected, they relax.
 
 use super::arm::SolveFilters;
 use super::track::{ObservedTrack, RotationTrack, filled};

@@ -20,14 +20,12 @@ pub enum Legs {
 
 /// Maximum extension of a standing leg relative to its length, so that the knee does not snap straight.
 const MAX_STRETCH: f64 = 0.99;
-/// Displacement of the hips relative to that of the top of the trunk: the trunk has half of the body's mass, and its
-/// centre moves half as far.
+/// Displacement of the hips relative to the trunk's top: the trunk has half the mass, and its centre moves half as far.
 const BALANCE: f64 = 0.25;
 const DOWN: Vec3 = [0.0, -1.0, 0.0];
 const ACROSS: Vec3 = [1.0, 0.0, 0.0];
 const FORWARD: Vec3 = [0.0, 0.0, 1.0];
 
-/// Joints of a leg.
 struct Leg {
     upper: usize,
     lower: usize,
@@ -40,8 +38,7 @@ impl Leg {
         [self.lower, self.foot].map(|joint| norm(rig.skeleton.joints[joint].offset))
     }
 
-    /// Rotates the leg so that it reaches by `way` from the hip joint to the ankle, with the knee forward and the foot
-    /// level.
+    /// Rotates the leg so that it reaches by `way` from the hip joint to the ankle, the knee forward, the foot level.
     fn reach_ankle(&self, rig: &Rig, hips: Rotation, way: Vec3, local: &mut [Rotation]) {
         let [thigh, shin] = self.lengths(rig);
         let far = norm(way).clamp((thigh - shin).abs() + 1e-6, thigh + shin - 1e-6);

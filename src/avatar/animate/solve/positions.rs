@@ -14,7 +14,6 @@ const LEVER_METRES: f64 = 0.1;
 /// Points of a hand, its wrist first.
 pub type HandPositions = [Option<Vec3>; skeleton::N_HAND_JOINTS];
 
-/// Joint positions by frame.
 pub struct JointPositions {
     positions: Vec<[Option<Vec3>; N_JOINTS]>,
     /// Errors of the left and right hand's directions, estimated by the joint limits, radians, by frame.
@@ -52,7 +51,6 @@ impl JointPositions {
         Self { positions, hand_errors }
     }
 
-    /// Points of the left hand.
     pub fn left_hand(&self, t: usize) -> HandPositions {
         std::array::from_fn(|point| self.position(t, L_HAND + point))
     }

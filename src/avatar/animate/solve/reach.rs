@@ -9,8 +9,7 @@ use orator_base::math::order::upper_median;
 use orator_base::math::vec3::{Vec3, add, dot, norm, scale, sub, unit};
 use orator_base::types::skeleton::{L_ELBOW, L_SHOULDER, L_WRIST, NECK};
 
-/// Maximum difference of the rig's bones from those of the motion, as a share. With other bones, the arm keeps its
-/// directions.
+/// Maximum share by which the rig's bones differ from the motion's. With other bones, the arm keeps its directions.
 const SAME_LENGTH: f64 = 0.03;
 /// Elbow angles, degrees (0 is straight), between which the weight of the wrist's position rises from 0 to 1: in a
 /// straight arm a small change of the distance moves the elbow a lot.

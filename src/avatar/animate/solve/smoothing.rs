@@ -8,7 +8,6 @@ use orator_base::math::savitzky_golay::SavitzkyGolay;
 use orator_base::math::vec3::{Vec3, unit};
 use orator_base::types::time::FrameRate;
 
-/// Smoothing method.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Smoothing {
     None,
@@ -46,7 +45,6 @@ pub enum Filter {
 }
 
 impl Smoothing {
-    /// Filter for trunk, head and arms.
     pub fn arms(self, fps: FrameRate) -> Filter {
         self.filter(fps, ARMS_HALF_SECS, ARMS_RADIANS)
     }
@@ -56,7 +54,6 @@ impl Smoothing {
         self.filter(fps, HANDS_HALF_SECS, HANDS_RADIANS)
     }
 
-    /// Filter for fingers.
     pub fn fingers(self, fps: FrameRate) -> Filter {
         self.filter(fps, HANDS_HALF_SECS, FINGERS_RADIANS)
     }
@@ -82,8 +79,7 @@ impl Filter {
         track.iter_mut().for_each(|seen| *seen = seen.and_then(|v| unit(v, 1e-3)));
     }
 
-    /// Smooths vectors of any length in each run of detected frames. `known` is the known standard deviation of the
-    /// noise by frame, or empty.
+    /// Smooths vectors in each run of detected frames. `known`: standard deviation of the noise by frame, or empty.
     pub fn runs(&self, track: &mut [Option<Vec3>], known: &[f64]) {
         let mut start = 0;
         while start < track.len() {

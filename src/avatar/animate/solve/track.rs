@@ -13,7 +13,6 @@ pub fn world(parent: &RotationTrack, local: &RotationTrack) -> RotationTrack {
     parent.iter().zip(local).map(|(&parent, &local)| parent * local).collect()
 }
 
-/// The mirror image of a track.
 pub fn mirrored(mut track: RotationTrack) -> RotationTrack {
     track.iter_mut().for_each(|rotation| *rotation = rotation.mirrored());
     track

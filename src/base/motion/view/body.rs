@@ -15,11 +15,9 @@ const AROUND: isize = 40;
 /// Maximum length of a bone as a multiple of the second largest bone, so that a keypoint that is wrong for a long time
 /// does not change the scale. For rendered persons 1 in 100 ranges exceeds 1.28, 1 in 1,000 exceeds 1.53.
 const LARGEST_BY_SECOND: f32 = 1.4;
-/// Number of bone types with a maximum length in the input: shoulders, upper arm, forearm, neck to nose, neck to
-/// pelvis.
+/// Number of bone types with a maximum input length: shoulders, upper arm, forearm, neck to nose, neck to pelvis.
 const N_KINDS: usize = 5;
-/// Input channels per frame without hands: x, y and visibility of each point, then the bone types, which are constant
-/// over the window.
+/// Input channels per frame without hands: x, y and visibility of each point, then the constant bone types.
 pub const N_BODY_IN: usize = 3 * N_POINTS + N_KINDS;
 /// Channels of one hand: x, y, z of its direction and whether it is known.
 const N_OF_HAND: usize = 4;
@@ -40,9 +38,8 @@ pub struct BodyView {
 
 impl BodyView {
     /// Builds the input for frame `t`: `window` frames (an odd number), `step` frames apart, interpolated if that is
-    /// not an integer; the first and last frame are repeated beyond the ends. `hands` has the directions of the hands in
-    /// every frame, or is empty if none is known. `None` if a shoulder is never visible in the window or all points
-    /// coincide.
+    /// not an integer; the end frames are repeated beyond the ends. `hands` has the directions of the hands in every
+    /// frame, or is empty if none is known. `None` if a shoulder is never visible in the window or all points coincide.
     pub fn around(seen: &[BodyPoints], hands: &[HandDirections], t: usize, window: usize, step: f64) -> Option<Self> {
         let last = seen.len().checked_sub(1)? as f64;
         let source_time = |d: isize| t as f64 + d as f64 * step;
@@ -149,8 +146,7 @@ pub fn mirror_mean(output: &[f32], of_mirrored: &[f32]) -> Vec<f32> {
     mean
 }
 
-/// Interpolates the points at `time` between two frames linearly; a point that is visible in only one of them is
-/// taken from the nearer frame.
+/// Interpolates points at `time` between two frames linearly; a point visible in one only is the nearer frame's.
 fn at(seen: &[BodyPoints], time: f64) -> BodyPoints {
     let (before, after) = (&seen[time.floor() as usize], &seen[time.ceil() as usize]);
     let share = time.fract() as f32;

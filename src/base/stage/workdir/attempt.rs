@@ -1,7 +1,6 @@
 //! Names of attempts: hidden, beside their target, with the target's extension (by which writers choose a format), and
 //! unique (`.NAME.attempt-PROCESS-START-MACHINE-NUMBER.EXT`), so that programs that write the same file never share an
-//! attempt. What a killed program left is removed by the next attempt at that target, and by the next run
-//! (`sweep_folder`).
+//! attempt. What a killed program left is removed by the next attempt at that target and the next run (`sweep_folder`).
 
 use super::file::parent;
 use super::process::{is_alive, machine, started};
@@ -120,8 +119,7 @@ impl Owner {
         Some(Self { process, origin })
     }
 
-    /// Returns whether the process is still working on the attempt; `None`: it ran, or may have run, on another
-    /// machine.
+    /// Returns whether the process is still working on the attempt; `None`: it may have run on another machine.
     fn is_working(&self) -> Option<bool> {
         match &self.origin {
             Some((start, on)) if on == machine() => {
@@ -180,7 +178,6 @@ mod tests {
         File::create_new(path).map(drop)
     }
 
-    /// Returns the id of a process that has ended.
     fn ended_process() -> u32 {
         let mut child = std::process::Command::new("true").spawn().unwrap();
         child.wait().unwrap();

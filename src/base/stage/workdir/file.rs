@@ -111,8 +111,7 @@ pub fn remove_file(path: &Path) -> Result<()> {
     .with_context(|| format!("cannot remove {}", path.display()))
 }
 
-/// Moves finished files, named relative to `attempt` with `/` as the separator, into `folder` beside existing files,
-/// and removes `attempt`.
+/// Moves finished files, named relative to `attempt` with `/`, into `folder` beside existing files; removes `attempt`.
 ///
 /// # Errors
 /// A file cannot be moved (`NoSpace` if the disk is full); `attempt` cannot be removed.

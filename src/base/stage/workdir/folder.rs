@@ -1,5 +1,4 @@
-//! Replacing a folder by another: an atomic exchange of names, or two renames where the file system does not support
-//! it.
+//! Replacing a folder by another: an atomic exchange of names, or two renames where the file system lacks it.
 
 use super::attempt;
 use super::file::{flush, flush_tree, full_disk, parent};

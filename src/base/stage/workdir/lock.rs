@@ -19,7 +19,6 @@ use std::sync::OnceLock;
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{} is in use by {by}; wait for it to end", folder.display())]
 pub struct BusyFolder {
-    /// The locked folder.
     pub folder: PathBuf,
     /// The programs that hold the lock: what they do, and their process ids.
     pub by: String,
@@ -36,8 +35,7 @@ pub struct FolderLock {
 
 static PROGRAM: OnceLock<String> = OnceLock::new();
 
-/// Sets the description of this program that other programs report when they find its locks; only the first call
-/// counts.
+/// Sets the description of this program that others report when they find its locks; only the first call counts.
 pub fn announce(program: String) {
     PROGRAM.get_or_init(|| program);
 }
@@ -104,8 +102,7 @@ impl FolderLock {
 impl Drop for FolderLock {
     fn drop(&mut self) {
         if let (Some(file), Some(path)) = (&self.file, &self.path) {
-            // The last holder deletes the file; a program that has opened it meanwhile notices that and opens a new
-            // one.
+            // The last holder deletes the file; a program that opened it meanwhile notices that and opens a new one.
             if file.unlock().is_ok() && file.try_lock().is_ok() && is_at(file, path) {
                 let _ = fs::remove_file(path);
             }
@@ -162,8 +159,7 @@ fn take(folder: &Path, path: &Path, is_exclusive: bool) -> Result<Option<File>> 
     }
 }
 
-/// Opens a lock file, created if missing: links are rejected and the file is never truncated. Opened for reading only
-/// if it is not writable.
+/// Opens a lock file, created if missing: links are rejected and it is never truncated. Read-only if not writable.
 fn open(path: &Path) -> std::io::Result<File> {
     let flags = (OFlags::NOFOLLOW | OFlags::NONBLOCK).bits() as i32;
     let mut options = OpenOptions::new();

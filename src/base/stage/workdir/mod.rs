@@ -1,6 +1,5 @@
-//! Crash-safe writing: a kill at any moment leaves either the complete old or the complete new files. An attempt is
-//! written beside the target, flushed to disk and renamed. All renames of the project are here, and the locks between
-//! programs.
+//! Crash-safe writing: a kill at any moment leaves the complete old or new files. An attempt is written beside the
+//! target, flushed to disk and renamed. All renames of the project are here, and the locks between programs.
 
 mod attempt;
 mod file;

@@ -31,8 +31,7 @@ fn stat(process: u32, field: usize) -> Option<String> {
     fields.split_whitespace().nth(field).map(str::to_owned)
 }
 
-/// Identifies this boot of this machine, and the container: 16 hex digits; empty if the system does not provide a boot
-/// id.
+/// Identifies this boot of this machine, and the container: 16 hex digits; empty if the system has no boot id.
 pub fn machine() -> &'static str {
     static MACHINE: OnceLock<String> = OnceLock::new();
     MACHINE.get_or_init(|| {

@@ -248,8 +248,7 @@ fn neighbours(clips: &EvalClips, fallback: &Predictor, store: &MotionStore) -> R
 
 /// For each clip the motion of another one (predicted, or the ground truth for `MismatchedTruth`), played back and
 /// forth if it is shorter; for a single clip its own, shifted by half of it with wrap-around. `None` if a single clip
-/// is too short.
-/// `fallback` fills missing values.
+/// is too short. `fallback` fills missing values.
 pub fn mismatched(
     clips: &EvalClips,
     kind: PredictorKind,

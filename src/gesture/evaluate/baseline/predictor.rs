@@ -16,12 +16,18 @@ use orator_formats::transcript::Word;
 use rayon::prelude::*;
 use std::ops::Range;
 
-/// Generates motion of exactly `n_frames` frames for a sound, with posture if the network was trained on it.
-pub fn motion(speaker: &GestureGenerator, sound: &Sound, n_frames: usize) -> Result<(Motion, Option<Posture>)> {
+/// Generates motion of exactly `n_frames` frames for a sound and its words, with posture if the network was trained on
+/// it.
+pub fn motion(
+    speaker: &GestureGenerator,
+    sound: &Sound,
+    words: &[Word],
+    n_frames: usize,
+) -> Result<(Motion, Option<Posture>)> {
     let n_needed = sample_at(speaker.fps(), SAMPLE_RATE, n_frames) + 1;
     let mut sound = sound.clone();
     sound.samples.resize(sound.samples.len().max(n_needed), 0.0);
-    let (predicted, posture) = speaker.motion_and_posture(&sound)?;
+    let (predicted, posture) = speaker.motion_and_posture(&sound, words)?;
     ensure!(
         predicted.n_frames() >= n_frames,
         "{} frames of motion were generated for {n_frames} frames of audio",
@@ -87,13 +93,11 @@ fn mismatched_parts(lengths: &[usize], which: usize) -> Vec<(usize, Range<usize>
     parts
 }
 
-/// Length of a window, seconds.
 const WINDOW_SECS: f64 = 4.0;
 /// Spectrogram rows between two candidate windows.
 const STRIDE: usize = 2;
 
-/// Sound to find poses for: rows of pooled spectrogram (`sound_features::SoundFeatures`), and its number of motion
-/// frames.
+/// Sound to find poses for: rows of pooled spectrogram (`sound_features::SoundFeatures`), its number of motion frames.
 #[derive(Clone, Copy, Debug)]
 pub struct Query<'a> {
     pub rows: &'a [f32],
@@ -194,38 +198,4 @@ fn distance(a: &[f32], b: &[f32]) -> f32 {
 fn nearer(a: Option<NearestMatch>, b: Option<NearestMatch>) -> Option<NearestMatch> {
     let order = |a: &NearestMatch, b: &NearestMatch| a.0.total_cmp(&b.0).then_with(|| (a.1, a.2).cmp(&(b.1, b.2)));
     a.into_iter().chain(b).min_by(order)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use orator_formats::transcript::WordSource;
-
-    #[test]
-    fn mismatched_sounds_have_the_same_length() {
-        let all = [vec![1.0, 2.0, 3.0], vec![], vec![4.0, 5.0, 6.0, 7.0]];
-        let lengths = all.each_ref().map(Vec::len);
-        let read = |at: usize, range: Range<usize>| Ok(all[at][range].to_vec());
-        let mismatched_sound: Vec<Vec<f32>> = (0..3).map(|i| mismatched_sound(&lengths, i, read).unwrap()).collect();
-        assert_eq!(mismatched_sound, [vec![4.0, 5.0, 6.0], vec![], vec![7.0, 1.0, 2.0, 3.0]]);
-        assert!(super::mismatched_sound(&[0], 0, read).unwrap().is_empty());
-    }
-
-    #[test]
-    fn words_follow_their_sound() {
-        let word = |text: &str, start_secs: f64| Word {
-            word: text.into(),
-            start_secs,
-            end_secs: start_secs + 0.5,
-            source: WordSource::Given,
-            confidence: None,
-        };
-        let lengths = [4, 2].map(|secs| secs * SAMPLE_RATE as usize);
-        let words = [vec![word("a", 0.2), word("cut", 0.8), word("b", 3.2)], vec![word("c", 1.0)]];
-        // Shifted by 3 s: the last second of sound 0, all of sound 1, the first second of sound 0.
-        let shifted = mismatched_words(&lengths, SAMPLE_RATE, &words, 0);
-        let shifted: Vec<(&str, f64)> =
-            shifted.iter().map(|word| (word.word.as_str(), (100.0 * word.start_secs).round() / 100.0)).collect();
-        assert_eq!(shifted, [("b", 0.2), ("c", 2.0), ("a", 3.2)]);
-    }
 }

@@ -144,7 +144,7 @@ impl EvaluatedCheckpoint {
         fps: FrameRate,
     ) -> Result<(Motion, Option<Posture>)> {
         let network = match &self.speaker {
-            TrainedSpeaker::Gan(of) => return predictor::motion(of, sound, n_frames),
+            TrainedSpeaker::Gan(of) => return predictor::motion(of, sound, words, n_frames),
             TrainedSpeaker::Sequence(network) => network,
         };
         let rate = network.metadata.rate;
@@ -222,10 +222,10 @@ pub fn of_checkpoints(
         if checkpoint.seams() == Some(StateAtSeams::Carried) {
             notes.push(format!("{name} carries its decoder state across segments"));
         }
-        if let TrainedSpeaker::Sequence(network) = speaker
-            && let Some(n_from_table) = network.n_from_table(words)
+        if let Some(known_words) = speaker.known_words()
+            && let Some(n_from_table) = known_words.n_from_table(words)
         {
-            let n_known = network.metadata.vocabulary.n_known(words);
+            let n_known = known_words.vocabulary.n_known(words);
             let n_words = counted(words.len(), "word");
             notes.push(format!(
                 "{n_known} of {n_words} of this split are in the vocabulary of {name}, {n_from_table} of the others in \

@@ -108,7 +108,6 @@ impl EvalClip {
     }
 }
 
-/// Clips of one frame rate.
 #[derive(Clone, Debug)]
 pub struct EvalClips {
     pub fps: FrameRate,
@@ -277,8 +276,7 @@ fn clip(
 }
 
 /// Mask of the compared joints, which are those visible in the ground truth, and the number of them that are missing in
-/// the prediction. Missing joints of the prediction are replaced by their last position (before the first: by the
-/// neck's).
+/// the prediction. Missing predicted joints are replaced by their last position (before the first: by the neck's).
 pub fn compared(ground_truth: &Array3<f32>, seen: &Array2<bool>, predicted: &mut Array3<f32>) -> (Array2<bool>, usize) {
     let is_present = |joints: &Array3<f32>, t: usize, joint: usize| (0..3).all(|k| joints[[t, joint, k]].is_finite());
     let mask =

@@ -26,8 +26,7 @@ use orator_formats::transcript::Word;
 /// lengths are those of the first checkpoint that was trained on a dataset, or else of this dataset.
 ///
 /// # Errors
-/// No checkpoint; a dataset of another frame rate than a checkpoint, except for captured skeletons; a split without
-/// intervals.
+/// No checkpoint; a dataset of another frame rate, except for captured skeletons; a split without intervals.
 pub fn prepare(
     dataset: &Dataset,
     checkpoints: &[EvaluatedCheckpoint],

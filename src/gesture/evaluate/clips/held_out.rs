@@ -25,8 +25,7 @@ pub struct HeldOutInterval {
     pub words: Vec<Word>,
 }
 
-/// Samples of `split` in the order of the dataset. Fails if there are none, with the names of the splits that have
-/// some.
+/// Samples of `split` in the order of the dataset. Fails if there are none, naming the splits that have some.
 pub fn samples(dataset: &Dataset, split: Split) -> Result<Vec<SampleRef>> {
     let samples = dataset.samples(split);
     if samples.is_empty() {
@@ -42,8 +41,7 @@ pub fn samples(dataset: &Dataset, split: Split) -> Result<Vec<SampleRef>> {
     Ok(samples)
 }
 
-/// Joints [T, 49, 3] of some frames of a sample with the speaker's bone lengths, followed by the angles of head and
-/// trunk if `has_channels`.
+/// Joints [T, 49, 3] of frames with the speaker's bone lengths, then head and trunk angles if `has_channels`.
 ///
 /// # Errors
 /// A sample that cannot be read; its hash is not checked.

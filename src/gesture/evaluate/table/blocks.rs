@@ -13,15 +13,13 @@ use std::ops::Range;
 
 /// Length of the blocks in the comparison of the ground-truth halves, seconds.
 const HALVES_SECS: f64 = 4.0;
-/// Largest number of pairs of such blocks (one hour) that are kept separately; if there are more, neighbours are
-/// summed, which bounds memory.
+/// Most pairs of such blocks (one hour) kept apart; if there are more, neighbours are summed, which bounds memory.
 const MAX_PAIRS: usize = 450;
 /// Length, seconds, of the pieces in which longer clips are measured, in parallel and with bounded memory; differences
 /// across a boundary are not counted.
 const PIECE_SECS: f64 = 600.0;
 
-/// Metric sums of a predictor over all clips and their blocks of about `length` frames. The result does not depend on
-/// the number of threads.
+/// Metric sums of a predictor over clips and blocks of about `length` frames. Equal for any number of threads.
 pub fn measure(catalogue: &Catalogue, clips: &EvalClips, predictor: &Predictor, length: usize) -> IntervalSums {
     let all: Vec<IntervalSums> = pieces(clips)
         .into_par_iter()
@@ -90,8 +88,7 @@ pub fn frame_errors(clips: &EvalClips, predictor: &Predictor) -> Vec<Vec<f64>> {
     (0..clips.clips.len()).into_par_iter().map(of_clip).collect()
 }
 
-/// Compares one half of the ground truth with the other: every second block is treated as the prediction of the
-/// previous block.
+/// Compares one half of the ground truth with the other: every second block is the prediction of the previous one.
 pub fn halves(catalogue: &Catalogue, clips: &EvalClips) -> IntervalSums {
     let length = ((HALVES_SECS * clips.fps.per_sec()).round() as usize).max(1);
     let stretches = |clip: usize| (0..clips.clips[clip].n_frames() / length).map(move |i| (clip, i * length));
@@ -135,7 +132,6 @@ const MAX_SECS: f64 = 3600.0;
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BlockLength {
-    /// Length in seconds.
     pub secs: f64,
     /// Integrated autocorrelation time of the differences between two predictors' errors, seconds.
     pub decorrelation_secs: f64,
@@ -157,9 +153,8 @@ impl BlockLength {
         ((self.secs * fps).round() as usize).max(1)
     }
 
-    /// Variance of the mean of blocks of `block_secs` relative to that of independent blocks: `1 + 2 r` with the
-    /// correlation r of the means of neighbouring blocks of a first-order autoregressive process with this
-    /// decorrelation time.
+    /// Variance of the mean of blocks of `block_secs` relative to independent blocks: `1 + 2 r` with the correlation r
+    /// of the means of neighbouring blocks of a first-order autoregressive process with this decorrelation time.
     pub fn variance_inflation(&self, block_secs: f64) -> f64 {
         // Length of a block in time constants of the exponential decay.
         let length = 2.0 * block_secs / self.decorrelation_secs;
@@ -177,10 +172,9 @@ const WINDOW: f64 = 5.0;
 const MIN_REMAINING: f64 = 0.1;
 
 /// Integrated autocorrelation time in frames, `1 + 2 * (sum of the autocorrelations)`, of a series in pieces: the mean
-/// of N frames has the variance of that of N / time independent frames. It is at least 1 and at most the number of
-/// frames; 1 for a constant series. Lags do not cross pieces, but the mean is that of all pieces, so that pieces of
-/// different level give a long time. Frames that are not finite are ignored. The result is corrected for the use of the
-/// sample mean.
+/// of N frames has the variance of that of N / time independent frames. It is 1 to the number of frames; 1 for a
+/// constant series. Lags do not cross pieces, but the mean is that of all pieces, so that pieces of different level
+/// give a long time. Frames that are not finite are ignored. The result is corrected for the use of the sample mean.
 pub fn integrated_time(pieces: &[Vec<f64>]) -> f64 {
     let (time, window, n) = windowed(pieces);
     if window == 0 {

@@ -1,7 +1,6 @@
-//! Resampling of blocks: confidence intervals of a metric from blocks drawn with replacement (Efron 1979; Kuensch
-//! 1989), and contributions of groups of blocks to a metric that is any function of sums over blocks, from the values
-//! without each group (the jackknife; Efron and Tibshirani 1993, chapter 11). For a mean over frames they are the
-//! groups' own sums.
+//! Confidence intervals of a metric from blocks drawn with replacement (Efron 1979; Kuensch 1989), and contributions of
+//! groups of blocks to a metric that is any function of sums over blocks, from the values without each group (the
+//! jackknife; Efron and Tibshirani 1993, chapter 11). For a mean over frames they are the groups' own sums.
 
 use ndarray::Array2;
 use orator_base::math::estimate::Estimate;

@@ -1,5 +1,4 @@
-//! Comparison of two results. Values are only compared if their definitions agree in all parameters; otherwise the
-//! differences are reported.
+//! Comparison of two results. Values are compared if their definitions agree; otherwise the differences are reported.
 
 use super::result::{StoredMetric, StoredResult};
 use crate::evaluate::baseline::baselines::PredictorKind;

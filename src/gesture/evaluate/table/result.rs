@@ -1,5 +1,4 @@
-//! Result file: the table as JSON. Each value has its definition, parameters and their hash; only values with equal
-//! hashes are comparable.
+//! The table as JSON. Each value has its definition, parameters and their hash; values of equal hash are comparable.
 
 use super::table::{PredictorRow, Table};
 use crate::evaluate::baseline::baselines::PredictorKind;
@@ -12,11 +11,9 @@ use serde::Deserialize;
 use serde_json::{Map, Value, json};
 use std::path::Path;
 
-/// Version of the JSON layout.
 pub const VERSION: u64 = 1;
 
-/// Result as JSON. The keys of the first checkpoint are the same as for a single one; those of the others end in their
-/// number.
+/// Result as JSON. The keys of the first checkpoint are those of a single one; those of the others end in their number.
 pub fn json(table: &Table) -> Value {
     let metrics = (0..table.definitions.len()).map(|index| metric(table, index));
     let predictors = table.rows.iter().map(|row| {

@@ -12,7 +12,6 @@ use ndarray::{Array2, s};
 use orator_base::math::estimate::Estimate;
 use orator_base::stage::progress::Task;
 
-/// Number of bootstrap draws for an interval.
 pub const N_DRAWS: usize = 1000;
 /// Number of draws for costly metrics (Frechet distances, correlations).
 pub const N_COSTLY_DRAWS: usize = 100;
@@ -223,8 +222,7 @@ impl Table {
         self.definitions[index].better != Better::Neither && has_value
     }
 
-    /// Gain of `a` over `b` in a metric, in its unit, positive if `a` is better. NaN if neither direction of the metric
-    /// is better.
+    /// Gain of `a` over `b` in a metric, in its unit, positive if `a` is better. NaN if neither direction is better.
     pub fn gain(&self, a: &PredictorRow, b: &PredictorRow, index: usize) -> f64 {
         let value = |row: &PredictorRow, index: usize| row.values[index].value;
         self.quality(index, |index| value(a, index)) - self.quality(index, |index| value(b, index))

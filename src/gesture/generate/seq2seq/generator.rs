@@ -1,10 +1,10 @@
-//! Generates poses for a sound of any length segment by segment; each segment starts from the last poses of the
-//! previous one.
+//! Generates poses for a sound of any length by segment; each segment starts from the last poses of the previous one.
 
-use super::architecture::{self, Architecture, NumberedWord, UNKNOWN};
+use super::architecture::{self, Architecture, NumberedWord};
 use super::metadata::{self, SequenceMetadata};
 use super::poses::PoseFormat;
 use crate::generate::model::checkpoint_file;
+use crate::generate::word_input::{KnownWords, check_vectors};
 use anyhow::{Result, ensure};
 use candle_core::{DType, Device, Tensor};
 use ndarray::{Array2, ArrayView2, s};
@@ -13,11 +13,10 @@ use orator_base::types::sound::Sound;
 use orator_base::types::time::FrameRate;
 use orator_formats::bvh::exponential_maps::smooth;
 use orator_formats::transcript::Word;
-use orator_formats::word_vectors::{WordVectors, table};
+use orator_formats::word_vectors::WordVectors;
 use orator_nn::params::Params;
 use orator_nn::seq2seq::config::Config;
 use orator_nn::seq2seq::predict::{GesturePredictor, StateAtSeams, generate};
-use std::collections::BTreeSet;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -42,8 +41,7 @@ pub struct SpeechInput {
 pub struct GeneratedPoses {
     /// Smoothed pose features [T, C].
     pub features: Array2<f32>,
-    /// Mean pose change across segment seams relative to that within segments, before and after smoothing; 1 for a
-    /// single segment.
+    /// Mean pose change across seams relative to that within, before and after smoothing; 1 for a single segment.
     pub seam_jump: [f64; 2],
 }
 
@@ -60,19 +58,9 @@ impl SequenceGenerator {
     /// # Errors
     /// A network that does not read words or was trained without a table, or whose word vectors have another dimension.
     pub fn set_word_vectors(&mut self, vectors: Arc<WordVectors>) -> Result<()> {
-        let (name, dim) = (&self.metadata.name, self.metadata.network.word);
+        let SequenceMetadata { name, network, has_word_vectors, .. } = &self.metadata;
         ensure!(self.reads_words(), "the model of {name} does not read words: omit --words");
-        ensure!(
-            self.metadata.has_word_vectors,
-            "the model of {name} was trained without a table of word vectors (`orator train seq2seq --words`): omit --words"
-        );
-        ensure!(
-            vectors.dim() == dim,
-            "the word vectors in {} have {} dimensions, those of the model of {name} {dim}: expected the table that it \
-             was trained with",
-            vectors.path().display(),
-            vectors.dim()
-        );
+        check_vectors(name, *has_word_vectors, network.word, &vectors)?;
         self.vectors = Some(vectors);
         Ok(())
     }
@@ -82,8 +70,7 @@ impl SequenceGenerator {
         self.metadata.architecture != Architecture::Autoencoder
     }
 
-    /// Initial decoder state of the segments, for all callers: carried from segment to segment if requested, or if the
-    /// model was trained to.
+    /// Initial decoder state of the segments, for all callers: carried across segments if requested, or if trained to.
     pub fn seams(&self, carry_state: bool) -> StateAtSeams {
         if self.has_state() && (carry_state || self.metadata.carries_state) {
             StateAtSeams::Carried
@@ -114,24 +101,9 @@ impl SequenceGenerator {
         Ok(n_frames)
     }
 
-    /// Number of words that take their vectors from the table of word vectors; `None` without a table.
-    pub fn n_from_table<'w>(&self, words: impl IntoIterator<Item = &'w Word>) -> Option<usize> {
-        let is_in_table = |word: &&Word| self.table_index(word).is_some();
-        self.vectors.as_ref().map(|_| words.into_iter().filter(is_in_table).count())
-    }
-
-    /// Index in the table of word vectors of a word that is not in the vocabulary; `None` if it has no vector.
-    fn table_index(&self, word: &Word) -> Option<usize> {
-        let vectors = self.vectors.as_ref().filter(|_| self.metadata.vocabulary.number(&word.word) == UNKNOWN)?;
-        Some(vectors.index(&word.word)).filter(|index| *index != table::UNKNOWN)
-    }
-
-    /// The network with the table's vectors of these indices after those of the vocabulary; `None` without indices.
-    fn with_vectors(&self, indices: &[usize]) -> Result<Option<Box<dyn GesturePredictor>>> {
-        let Some(vectors) = self.vectors.as_ref().filter(|_| !indices.is_empty()) else { return Ok(None) };
-        let added = indices.iter().map(|index| vectors.vector(*index)).collect::<Result<Vec<_>>>()?.concat();
-        let added = Tensor::from_vec(added, (indices.len(), vectors.dim()), &Device::Cpu)?;
-        self.metadata.with_word_vectors(&self.params, &added).map(Some)
+    /// Vocabulary and table of word vectors.
+    pub fn known_words(&self) -> KnownWords<'_> {
+        KnownWords { vocabulary: &self.metadata.vocabulary, vectors: self.vectors.as_deref() }
     }
 
     /// Input features for a sound at `metadata.rate` and its words, of which there may be none. The sound is padded
@@ -148,14 +120,9 @@ impl SequenceGenerator {
             architecture::audio_features(sound, self.fps(), n_frames, n_frames.next_multiple_of(predicted), context);
         let shape = (1, cepstra.nrows(), cepstra.ncols());
         let audio = Tensor::from_iter(cepstra.iter().copied(), &Device::Cpu)?.reshape(shape)?;
-        let vocabulary = &self.metadata.vocabulary;
-        let indices: BTreeSet<usize> = words.iter().filter_map(|word| self.table_index(word)).collect();
-        let indices: Vec<usize> = indices.into_iter().collect();
-        let words = vocabulary.numbered_with(words, |word| {
-            let at = self.table_index(word).and_then(|index| indices.binary_search(&index).ok());
-            at.map_or(UNKNOWN, |at| (vocabulary.n_indices() + at) as u32)
-        });
-        Ok(SpeechInput { n_frames, audio, words, network: self.with_vectors(&indices)? })
+        let (words, added) = self.known_words().numbered(words)?;
+        let network = added.map(|added| self.metadata.with_word_vectors(&self.params, &added)).transpose()?;
+        Ok(SpeechInput { n_frames, audio, words, network })
     }
 
     /// Generates poses for the input. The first segment starts from the mean pose.

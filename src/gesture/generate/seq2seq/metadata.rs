@@ -53,8 +53,7 @@ impl SequenceMetadata {
         KIND.to_owned()
     }
 
-    /// Word indices that the network reads for a segment whose first predicted pose is `first`; `spoken_words` are
-    /// sorted by start time.
+    /// Word indices for a segment whose first predicted pose is `first`; `spoken_words` are sorted by start time.
     pub fn words_of_segment(&self, spoken_words: &[NumberedWord], first: usize) -> Vec<Vec<u32>> {
         architecture::words(
             self.architecture,
@@ -109,10 +108,11 @@ const fn around_segment_secs() -> f64 {
     AROUND_SEGMENT_SECS
 }
 
-/// Whether a file is a checkpoint of a sequence-to-sequence network. Fails if it cannot be read or is not a checkpoint.
-pub fn is_sequence(path: &Path) -> Result<bool> {
-    let facts = orator_formats::checkpoint::facts(path)?;
-    Ok(is_sequence_kind(&facts["speaker"]["kind"]))
+/// Whether a file is a checkpoint of a sequence-to-sequence network or of a GAN with word input. Fails if it cannot be
+/// read or is not a checkpoint.
+pub fn reads_transcript(path: &Path) -> Result<bool> {
+    let speaker = &orator_formats::checkpoint::facts(path)?["speaker"];
+    Ok(is_sequence_kind(&speaker["kind"]) || speaker["words"].is_object())
 }
 
 /// Whether a kind denotes checkpoints of sequence-to-sequence networks of any version.

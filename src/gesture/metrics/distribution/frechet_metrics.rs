@@ -1,6 +1,5 @@
 //! Frechet distances of the catalogue, computed from packed moments of predicted and of ground-truth rows. A row is a
-//! single pose, or a window in a fixed space. Diversity of the poses of an interval, which is small for motion that
-//! stays near its mean pose.
+//! single pose, or a window in a fixed space. Diversity of an interval's poses, small for motion near its mean pose.
 
 use super::frechet::between;
 use super::moments;

@@ -75,8 +75,7 @@ struct IndependentDimensions {
 }
 
 impl IndependentDimensions {
-    /// Selects independent dimensions of a range by pivoted Cholesky decomposition, which stops when all remaining
-    /// dimensions are determined.
+    /// Independent dimensions of a range by pivoted Cholesky decomposition, which stops when the others are determined.
     fn select(covariance: ArrayView2<f64>, range: std::ops::Range<usize>) -> Self {
         let mut remaining: Vec<usize> = range.filter(|i| covariance[[*i, *i]].max(0.0).sqrt() > CONSTANT).collect();
         let scale_of = |i: usize| covariance[[i, i]].sqrt();

@@ -1,5 +1,4 @@
-//! Metrics of how joints move: speed, acceleration and jerk, energy, distributions of speeds, correlation, bone
-//! changes.
+//! Metrics of how joints move: speed, acceleration, jerk, energy, distributions of speeds, correlation, bone changes.
 
 pub mod angles;
 pub mod bone_change;

@@ -2,8 +2,7 @@
 //! motion capture and of rule-based motion (`models/motion_basis.md`). A row is one matrix product, without a network.
 //!
 //! A pose is 46 joints in centimetres, arms relative to the neck and fingers relative to their wrist. Fixed weights
-//! give the fingers the same variance over the corpus as the arms, since the principal components would ignore the
-//! hands otherwise.
+//! give the fingers the same variance over the corpus as the arms, else principal components would ignore the hands.
 
 use super::fixed_rate::{Frames, N_COORDINATES, N_JOINTS_USED, joints_used};
 use anyhow::{Context, Result, ensure};
@@ -86,8 +85,7 @@ impl Basis {
     }
 }
 
-/// Unweighted poses [T, 138] in centimetres of joints [T, 49, 3] in metres: arms relative to the neck, fingers relative
-/// to their wrist.
+/// Unweighted poses [T, 138] in cm of joints [T, 49, 3] in metres: arms relative to the neck, fingers to their wrist.
 pub fn poses(joints: ArrayView3<f32>) -> Array2<f32> {
     let mut poses = Array2::zeros((joints.shape()[0], N_COORDINATES));
     for (mut pose, frame) in poses.outer_iter_mut().zip(joints.outer_iter()) {

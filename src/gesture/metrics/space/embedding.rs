@@ -19,7 +19,6 @@ pub const WINDOW: usize = motion_encoder::WINDOW;
 /// Frames between the starts of two windows.
 pub const STRIDE: usize = 4;
 pub const N: usize = motion_encoder::N_CODE;
-/// Kind of the weights file.
 pub const KIND: &str = "motion-embedding";
 
 const FILE: &[u8] = include_bytes!("../../../../models/motion_embedding.safetensors");

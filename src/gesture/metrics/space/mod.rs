@@ -1,5 +1,4 @@
-//! Feature spaces for windows of fixed length, in which Frechet distances are computed: a linear basis and a trained
-//! embedding.
+//! Feature spaces for windows of fixed length, for Frechet distances: a linear basis and a trained embedding.
 
 pub mod basis;
 pub mod embedding;

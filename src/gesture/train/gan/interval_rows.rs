@@ -3,6 +3,7 @@
 
 use crate::generate::generator::mel_frames;
 use crate::generate::normalisation::Normalisation;
+use crate::generate::seq2seq::architecture::{NumberedWord, Vocabulary};
 use anyhow::Result;
 use ndarray::Array2;
 use orator_base::audio::mel;
@@ -74,6 +75,12 @@ impl<'d> TrainingIntervals<'d> {
         // Because of rounding, the motion may need one spectrogram frame more than the sound has.
         let enough = mel::n_samples(mel_frames(self.dataset.info().fps, sample.n_frames) + 1);
         mel::n_frames(enough.max(sample.n_sound_samples()))
+    }
+
+    /// Words of all intervals, sorted by start time.
+    pub fn words(&self, vocabulary: &Vocabulary) -> Result<Vec<Vec<NumberedWord>>> {
+        let of_sample = |sample| Ok(vocabulary.numbered(&self.dataset.words(sample)?.unwrap_or_default()));
+        self.samples.iter().map(of_sample).collect()
     }
 
     /// Rows that contain at least these frames of motion and these spectrogram frames.

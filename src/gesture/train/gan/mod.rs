@@ -14,3 +14,4 @@ pub mod step;
 pub mod train;
 pub mod validate;
 pub mod windows;
+pub mod words;

@@ -5,12 +5,16 @@ use super::recipe::InitialWeights;
 use super::step::GanTrainer;
 use super::windows::JoinedWindows;
 use crate::generate::model::{self, GENERATOR, SpeakerMetadata, TrainedVideo, checkpoint_file};
+use crate::generate::seq2seq::architecture::{PADDING, UNKNOWN};
 use anyhow::{Context, Result, bail, ensure};
-use candle_core::Tensor;
+use candle_core::{Device, Tensor};
 use orator_dataset::Dataset;
 use orator_dataset::config::GanSettings;
+use orator_formats::word_vectors::WordVectors;
 use orator_nn::gan::generator::Config;
 use orator_nn::gan::speaker_layer::SPEAKER;
+use orator_nn::gan::words::WORDS;
+use orator_nn::seq2seq::encoders::table_name;
 use orator_nn::weights::Contents;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -53,14 +57,16 @@ impl PretrainedModel {
 
     /// Trainer of these speakers, initialised with the weights of this model, whose videos are added to the speakers'
     /// lists. A single speaker initialised from a model of several gets the speaker layer with the smallest initial
-    /// error on `windows`, among those of all speakers and their mean.
+    /// error on `windows`, among those of all speakers and their mean. Words that the model does not have get their
+    /// vectors from `vectors`, or random ones.
     ///
     /// # Errors
-    /// A network of another shape.
+    /// A network of another shape, or with word input if the training has none.
     pub fn trainer(
         &self,
         mut speakers: Vec<SpeakerMetadata>,
         settings: GanSettings,
+        vectors: Option<&WordVectors>,
         windows: &JoinedWindows,
     ) -> Result<GanTrainer> {
         let (Some(own), Some(other)) = (speakers.first(), self.speakers.first()) else { bail!("no speaker to train") };
@@ -77,6 +83,11 @@ impl PretrainedModel {
             own.width,
             own.n_out
         );
+        ensure!(
+            other.vocabulary == 0 || own.vocabulary > 0,
+            "{} reads words: set gan.words = true",
+            self.path.display()
+        );
         let inherited = self.speakers.iter().flat_map(|speaker| speaker.videos.iter().cloned());
         let inherited: Vec<TrainedVideo> = inherited.collect();
         speakers.iter_mut().for_each(|speaker| speaker.add_videos(inherited.clone()));
@@ -88,6 +99,8 @@ impl PretrainedModel {
             speakers[0].network = Config { n_speakers: 1, speaker_weights, ..speakers[0].network.clone() };
         }
         let trainer = GanTrainer::new(speakers, settings)?;
+        trainer.initialise_words(vectors)?;
+        trainer.set_tensors(self.words(&trainer)?)?;
         let initialise = || {
             if is_layer_chosen {
                 self.initialise_from_nearest(&trainer, &layers, windows)
@@ -97,6 +110,33 @@ impl PretrainedModel {
         };
         initialise().with_context(|| format!("cannot initialise from {}", self.path.display()))?;
         Ok(trainer)
+    }
+
+    /// Tensors of the words with the vectors of those that the model has in common with the training; none if the
+    /// model does not read words, or vectors of another dimension.
+    fn words(&self, trainer: &GanTrainer) -> Result<BTreeMap<String, Tensor>> {
+        let (own, other) = (&trainer.speakers.all()[0], &self.speakers[0]);
+        let (Some(own_words), Some(other_words)) = (&own.words, &other.words) else { return Ok(BTreeMap::new()) };
+        if own.network.word != other.network.word {
+            return Ok(BTreeMap::new());
+        }
+        let mut tensors = self.contents.part(GENERATOR);
+        tensors.retain(|name, _| name.starts_with(&format!("{WORDS}.")));
+        let rows = |of: &BTreeMap<String, Tensor>| -> Result<Vec<Vec<f32>>> {
+            Ok(of.get(&table_name(WORDS)).context("the network has no word embedding")?.to_vec2()?)
+        };
+        let (mut vectors, known) = (rows(&trainer.generator_tensors()?)?, rows(&tensors)?);
+        let words = own_words.vocabulary.words().iter();
+        let of_words = words.map(|word| (own_words.vocabulary.number(word), other_words.vocabulary.number(word)));
+        let common = of_words.filter(|(_, number)| *number != UNKNOWN).chain([(PADDING, PADDING), (UNKNOWN, UNKNOWN)]);
+        for (own, number) in common {
+            if let Some(vector) = known.get(number as usize) {
+                vectors[own as usize].clone_from(vector);
+            }
+        }
+        let shape = (own.network.vocabulary, own.network.word);
+        tensors.insert(table_name(WORDS), Tensor::from_vec(vectors.concat(), shape, &Device::Cpu)?);
+        Ok(tensors)
     }
 
     /// Copies the weights, with the layer of smallest error among those of all speakers (rows of the tensors in

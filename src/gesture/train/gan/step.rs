@@ -4,18 +4,19 @@ use super::losses::{self, number};
 use super::score::Validation;
 use super::speakers::SpeakerSet;
 use super::windows::WindowBatch;
-use super::{augment, average};
+use super::{augment, average, words};
 use crate::generate::model::{BEST, GENERATOR, SpeakerMetadata};
 use crate::train::optim::adam::{self, Adam};
-use crate::train::resume;
+use crate::train::{resume, word_vectors};
 use anyhow::{Context, Result, ensure};
 use candle_core::{Device, Tensor};
 use orator_dataset::config::{ComputeDevice, GanConfig, GanSettings, to_stored};
 use orator_formats::checkpoint;
+use orator_formats::word_vectors::WordVectors;
 use orator_nn::gan::discriminator::{Discriminator, motion};
 use orator_nn::gan::generator::Generator;
 use orator_nn::gan::speaker_layer::SPEAKER;
-use orator_nn::ops::resize;
+use orator_nn::gan::words::WORDS;
 use orator_nn::params::{Params, open_device};
 use orator_nn::weights::Contents;
 use rand::Rng;
@@ -30,6 +31,7 @@ const ADAM_G: &str = "adam.generator.";
 const ADAM_D: &str = "adam.discriminator.";
 /// Seed modifier that makes dropout independent of the other random numbers of a step.
 const DROPOUT: u64 = 0x6472_6f70;
+const WORD_DROPOUT: u64 = 0x776f_7264;
 /// Largest gradient norm of each network; larger gradients are clipped.
 pub const MAX_NORM: f64 = 10.0;
 
@@ -101,7 +103,7 @@ impl GanTrainer {
         let discriminator = Discriminator::new(&mut discriminator_params, speakers.n_features())?;
         let adam = adam::Config { max_norm: Some(MAX_NORM), ..adam::Config::default() };
         let decaying = adam::Config { weight_decay: settings.weight_decay, ..adam };
-        let share = |name: &str| if name.starts_with(SPEAKER) { 1.0 } else { settings.shared_rate };
+        let share = |name: &str| if is_of_speaker(name) { 1.0 } else { settings.shared_rate };
         Ok(Self {
             adam_g: Adam::with_rates(&generator_params, decaying, share)?,
             adam_d: Adam::new(&discriminator_params, adam)?,
@@ -206,18 +208,22 @@ impl GanTrainer {
     /// L1 error of the averaged generator (`ema_generator`) on a batch of windows.
     pub fn error(&self, batch: &WindowBatch) -> Result<f64> {
         let batch = batch.on(self.device())?;
-        let raw =
-            self.ema_generator().forward(&batch.mels, &batch.speakers, self.settings.window_frames, false)?.detach();
+        let (generator, n_frames) = (self.ema_generator(), self.settings.window_frames);
+        let encoded = generator.frames(&batch.mels, &batch.speakers, batch.words.as_ref(), n_frames, false)?;
+        let raw = generator.decode(&encoded, false)?.detach();
         number(&losses::l1(&self.speakers.poses(&raw, &batch.speakers)?, &batch.poses, &batch.mask)?)
     }
 
-    /// Raw poses of a batch in training mode, with dropout of whole channels of the encoded audio.
+    /// Raw poses of a batch in training mode, with dropout of words and of whole channels of the encoded audio.
     fn predict(&self, batch: &WindowBatch) -> Result<Tensor> {
         let (n_frames, dropout) = (self.settings.window_frames, self.settings.dropout);
+        let rng = &mut resume::step_rng(self.settings.seed ^ WORD_DROPOUT, self.step);
+        let n_indices = self.speakers.network().vocabulary;
+        let words = batch.words.as_ref().map(|words| words::dropped(words, n_indices, rng)).transpose()?;
+        let encoded = self.generator.frames(&batch.mels, &batch.speakers, words.as_ref(), n_frames, true)?;
         if dropout == 0.0 {
-            return Ok(self.generator.forward(&batch.mels, &batch.speakers, n_frames, true)?);
+            return Ok(self.generator.decode(&encoded, true)?);
         }
-        let encoded = resize::linear(&self.generator.encode(&batch.mels, &batch.speakers, true)?, n_frames)?;
         let (n_windows, _, n_channels) = encoded.dims3()?;
         let mut rng = resume::step_rng(self.settings.seed ^ DROPOUT, self.step);
         let factor = |_| if rng.random_bool(dropout) { 0.0 } else { 1.0 / (1.0 - dropout) as f32 };
@@ -282,6 +288,7 @@ impl GanTrainer {
             let is_default = [
                 ("channels", self.settings.channels == defaults.channels),
                 ("bone_loss", self.settings.bone_loss == defaults.bone_loss),
+                ("words", self.settings.words == defaults.words),
             ];
             is_default.iter().filter(|(_, is_default)| *is_default).for_each(|(key, _)| {
                 stored.shift_remove(*key);
@@ -290,18 +297,33 @@ impl GanTrainer {
         Ok(facts)
     }
 
+    /// Initialises the word embeddings, from `vectors` if given.
+    pub fn initialise_words(&self, vectors: Option<&WordVectors>) -> Result<()> {
+        let Some(words) = &self.speakers.all()[0].words else { return Ok(()) };
+        word_vectors::initialise(&self.generator_params, WORDS, &words.vocabulary, vectors)?;
+        self.set_tensors(BTreeMap::new())
+    }
+
+    /// Tensors of the generator of the last step.
+    pub fn generator_tensors(&self) -> Result<BTreeMap<String, Tensor>> {
+        Ok(self.generator_params.tensors()?)
+    }
+
+    /// Replaces tensors of the generator, also in its average.
+    pub fn set_tensors(&self, tensors: BTreeMap<String, Tensor>) -> Result<()> {
+        let mut all = self.generator_tensors()?;
+        all.extend(tensors);
+        self.generator_params.load(&all)?;
+        self.ema.iter().try_for_each(|(_, ema)| ema.load(&all))
+    }
+
     /// Copies the weights of another model's generator, and those of its discriminator if the checkpoint has one. The
-    /// tensors of the speaker layer come from `layer`; `None` leaves them as they are.
+    /// tensors of the speaker layer come from `layer`; `None` leaves them as they are, like those of the words.
     pub fn initialise_from(&self, other: &Contents, layer: Option<&BTreeMap<String, Tensor>>) -> Result<()> {
-        let is_of_speakers = |name: &String| name.starts_with(SPEAKER);
         let mut generator = other.part(GENERATOR);
-        generator.retain(|name, _| !is_of_speakers(name));
-        generator.extend(self.generator_params.tensors()?.into_iter().filter(|(name, _)| is_of_speakers(name)));
+        generator.retain(|name, _| !is_of_speaker(name));
         generator.extend(layer.into_iter().flatten().map(|(name, tensor)| (name.clone(), tensor.clone())));
-        self.generator_params.load(&generator)?;
-        if let Some((_, ema)) = &self.ema {
-            ema.load(&generator)?;
-        }
+        self.set_tensors(generator)?;
         let discriminator = other.part(DISCRIMINATOR);
         if !discriminator.is_empty() {
             self.discriminator_params.load(&discriminator)?;
@@ -324,6 +346,11 @@ impl GanTrainer {
         (self.step, self.best) = (stored.step, stored.best);
         Ok(())
     }
+}
+
+/// Whether a tensor is not shared by the speakers: that of the speaker layer and of the words.
+fn is_of_speaker(name: &str) -> bool {
+    name.starts_with(SPEAKER) || name.strip_prefix(WORDS).is_some_and(|rest| rest.starts_with('.'))
 }
 
 impl TrainerState {

@@ -9,12 +9,13 @@ use super::score::Validation;
 use super::step::{GanTrainer, Losses, TrainerState};
 use super::validate::ValidationIntervals;
 use super::windows::{JoinedWindows, WindowBatch, WindowLoader, needed};
-use super::{augment, speakers};
+use super::{augment, speakers, words};
 pub use crate::generate::model::BEST;
 use crate::generate::model::SpeakerMetadata;
 use crate::generate::normalisation::Normalisation;
 use crate::train::epochs::{self, EpochSchedule, StepReport, TrainingOutcome, ValidatedStep, ValidatedTraining};
 use crate::train::resume::{self, sample_windows};
+use crate::train::word_vectors::WORD_DIM;
 use crate::train::{log, no_window};
 use anyhow::{Context, Result, ensure};
 use orator_base::stage::progress::Progress;
@@ -23,6 +24,7 @@ use orator_base::text::counted;
 use orator_dataset::config::{ComputeDevice, GanConfig, GanSettings};
 use orator_dataset::{Dataset, Split};
 use orator_formats::checkpoint;
+use orator_formats::word_vectors::WordVectors;
 use orator_nn::cpu::spin_pool::with_spinning_workers;
 use orator_nn::gan::generator::FRAMES_MULTIPLE;
 use orator_nn::params::open_device;
@@ -44,21 +46,27 @@ pub fn train(
     folder: &Path,
     progress: &dyn Progress,
 ) -> Result<TrainingOutcome<Validation>> {
-    train_with_callback(&[dataset], requested, None, folder, progress, &mut |_| ())
+    train_with_callback(&[dataset], requested, None, None, folder, progress, &mut |_| ())
 }
 
 /// Like [`train`], for one speaker or several, a dataset each; calls `validated` after each validation, when its log
 /// line and checkpoint have been written. `from`: checkpoint, or folder of checkpoints, that a new training is
-/// initialised from; a resumed training ignores it.
+/// initialised from; a resumed training ignores it. `vectors` initialise the word embeddings; without them they are
+/// random.
 pub fn train_with_callback(
     datasets: &[&Dataset],
     requested: &GanConfig,
     from: Option<&Path>,
+    vectors: Option<&WordVectors>,
     folder: &Path,
     progress: &dyn Progress,
     validated: &mut dyn FnMut(ValidatedStep),
 ) -> Result<TrainingOutcome<Validation>> {
     check(requested)?;
+    ensure!(
+        vectors.is_none() || requested.words,
+        "gan.words is false, so the network does not read words: set gan.words = true, or omit --words"
+    );
     speakers::check(datasets)?;
     // Shared lock: `generate` may load the model during training; `forget` may not remove it.
     let _model = FolderLock::shared(folder)?;
@@ -86,19 +94,26 @@ pub fn train_with_callback(
             (settings, datasets.iter().map(normal).collect::<Result<Vec<_>>>()?)
         }
     };
+    let words = match &resumed {
+        Some((stored, _)) => stored.speaker.words.clone(),
+        None => settings.words.then(|| words::vocabulary(datasets, vectors, progress)).transpose()?,
+    };
+    let vocabulary = words.as_ref().map(|words| &words.vocabulary);
     let normalised_datasets: Vec<(&Dataset, Normalisation)> = datasets.iter().copied().zip(normals).collect();
     let loaders: Vec<WindowLoader> = normalised_datasets
         .iter()
         .map(|(dataset, normal)| {
-            WindowLoader::load(dataset, Split::Train, normal, settings.window_frames, settings.stride_frames)
+            WindowLoader::load(dataset, Split::Train, normal, settings.window_frames, settings.stride_frames)?
+                .with_words(vocabulary)
         })
         .collect::<Result<_>>()?;
     let n_windows: usize = loaders.iter().map(WindowLoader::len).sum();
     let dirs = datasets.iter().map(|dataset| dataset.dir().display().to_string()).collect::<Vec<_>>().join(", ");
     progress.say(&format!("{} of {dirs}; writing checkpoints to {}", counted(n_windows, "window"), folder.display()));
-    let held_out = ValidationIntervals::load(&normalised_datasets, &settings, progress)?;
+    let held_out = ValidationIntervals::load(&normalised_datasets, vocabulary, &settings, progress)?;
     let metadata = |((dataset, normal), loader): (&(&Dataset, Normalisation), &WindowLoader)| {
-        speakers::metadata(dataset, normal, loader, &settings, datasets.len())
+        let metadata = speakers::metadata(dataset, normal, loader, &settings, datasets.len())?;
+        anyhow::Ok(metadata.with_words(words.clone(), vectors.map_or(WORD_DIM, WordVectors::dim)))
     };
     let speakers: Vec<SpeakerMetadata> = match &resumed {
         Some((stored, _)) => stored.speakers(),
@@ -107,8 +122,11 @@ pub fn train_with_callback(
     let loader = JoinedWindows::new(loaders);
     let mut trainer = match &pretrained_model {
         None => GanTrainer::new(speakers, settings)?,
-        Some(pretrained_model) => pretrained_model.trainer(speakers, settings, &loader)?,
+        Some(pretrained_model) => pretrained_model.trainer(speakers, settings, vectors, &loader)?,
     };
+    if resumed.is_none() && pretrained_model.is_none() {
+        trainer.initialise_words(vectors)?;
+    }
     if let Some((stored, contents)) = &resumed {
         trainer.load(stored, contents)?;
         // A process killed before removing the oldest checkpoint leaves one too many.
@@ -116,13 +134,7 @@ pub fn train_with_callback(
     }
     if resumed.is_none() {
         let material = TrainingMaterial::measure(datasets, window_frames);
-        if let Some(warning) = recipe::mean_pose_warning(&material).filter(|_| pretrained_model.is_none()) {
-            progress.say(&warning);
-        }
-        let secs_a_step = secs_a_step(&trainer, &loader)?;
-        recipe::lines(&trainer.settings, &material, secs_a_step)?.iter().for_each(|line| progress.say(line));
-        let few = no_window::motion_warning(material.train_secs).filter(|_| pretrained_model.is_none());
-        few.iter().for_each(|warning| progress.say(warning));
+        report_settings(&trainer, &loader, &material, pretrained_model.is_some(), progress)?;
     }
     let settings = trainer.settings.clone();
     let batch = |step: usize| {
@@ -143,6 +155,24 @@ pub fn train_with_callback(
         Ok((outcome, training.waiting.as_secs_f64() / training.stepping.as_secs_f64().max(1e-9)))
     })?;
     Ok(TrainingOutcome { n_examples: loader.len(), n_parameters: trainer.n_parameters(), waiting, ..outcome })
+}
+
+/// Reports the settings of a new training, and warnings about little material.
+fn report_settings(
+    trainer: &GanTrainer,
+    loader: &JoinedWindows,
+    material: &TrainingMaterial,
+    is_pretrained: bool,
+    progress: &dyn Progress,
+) -> Result<()> {
+    if let Some(warning) = recipe::mean_pose_warning(material).filter(|_| !is_pretrained) {
+        progress.say(&warning);
+    }
+    let secs_a_step = secs_a_step(trainer, loader)?;
+    recipe::lines(&trainer.settings, material, secs_a_step)?.iter().for_each(|line| progress.say(line));
+    let few = no_window::motion_warning(material.train_secs).filter(|_| !is_pretrained);
+    few.iter().for_each(|warning| progress.say(warning));
+    Ok(())
 }
 
 /// Seconds per step on this machine, measured on a temporary copy of the networks; `None` for trainings of few steps.
@@ -340,7 +370,8 @@ mod tests {
             last.fetch_max(step, Ordering::Relaxed);
             anyhow::ensure!(step != 6, "step 6 cannot be read");
             let tensor = || Tensor::full(step as f32, 1, &Device::Cpu);
-            Ok(WindowBatch { mels: tensor()?, poses: tensor()?, mask: tensor()?, speakers: vec![step as u32] })
+            let speakers = vec![step as u32];
+            Ok(WindowBatch { mels: tensor()?, poses: tensor()?, mask: tensor()?, speakers, words: None })
         };
         let taken = prefetch(10, &batch, |batches| {
             // A step may be repeated or skipped.

@@ -9,6 +9,7 @@ use super::score::{self, Validation};
 use super::step::GanTrainer;
 use super::windows::{WindowBatch, WindowLoader, needed};
 use crate::generate::normalisation::{N_FEATURES, Normalisation};
+use crate::generate::seq2seq::architecture::Vocabulary;
 use crate::metrics::distribution::frechet;
 use crate::train::no_window;
 use anyhow::{Context, Result};
@@ -36,16 +37,19 @@ pub struct ValidationIntervals {
 
 impl ValidationIntervals {
     /// Intervals of the validation splits, evenly spaced if there are many. For a dataset without a validation window
-    /// those of its training split are used, which is reported. Speaker indices follow the order of `datasets`.
+    /// those of its training split are used, which is reported. Speaker indices follow the order of `datasets`; word
+    /// indices are those of `vocabulary`.
     pub fn load(
         datasets: &[(&Dataset, Normalisation)],
+        vocabulary: Option<&Vocabulary>,
         settings: &GanSettings,
         progress: &dyn Progress,
     ) -> Result<Self> {
         let mut all: Option<Self> = None;
         for (speaker, (dataset, normal)) in (0..).zip(datasets) {
             let max_frames = MAX_FRAMES / datasets.len();
-            let own = Self::of_speaker(dataset, settings, normal, speaker, max_frames, progress)?;
+            let mut own = Self::of_speaker((dataset, normal), vocabulary, settings, max_frames, progress)?;
+            own.pieces.iter_mut().for_each(|piece| piece.speakers = vec![speaker]);
             all = Some(match all {
                 None => own,
                 Some(mut all) => {
@@ -60,10 +64,9 @@ impl ValidationIntervals {
     }
 
     fn of_speaker(
-        dataset: &Dataset,
+        (dataset, normal): (&Dataset, &Normalisation),
+        vocabulary: Option<&Vocabulary>,
         settings: &GanSettings,
-        normal: &Normalisation,
-        speaker: u32,
         max_frames: usize,
         progress: &dyn Progress,
     ) -> Result<Self> {
@@ -76,14 +79,14 @@ impl ValidationIntervals {
             split = Split::Train;
             loader = WindowLoader::load(dataset, split, normal, n_frames, n_frames)?;
         }
+        let loader = loader.with_words(vocabulary)?;
         let longest = PIECE.max(n_frames);
         let parts: Vec<_> = loader.parts(longest).into_iter().filter(|part| part.1.len() >= n_frames).collect();
         let all: usize = parts.iter().map(|part| part.1.len()).sum();
         let n = (parts.len() * max_frames).div_ceil(all.max(max_frames)).min(parts.len());
         let chosen = (0..n).map(|i| parts[i * parts.len() / n].clone());
-        let piece =
-            |(interval, frames)| anyhow::Ok(WindowBatch { speakers: vec![speaker], ..loader.part(interval, frames)? });
-        let pieces: Vec<WindowBatch> = chosen.map(piece).collect::<Result<_>>()?;
+        let pieces: Vec<WindowBatch> =
+            chosen.map(|(interval, frames)| loader.part(interval, frames)).collect::<Result<_>>()?;
         let mut masks = Vec::new();
         for piece in &pieces {
             masks.push(visible_joints(features(&piece.mask, 0)?.view()));
@@ -107,13 +110,15 @@ impl ValidationIntervals {
             let n_padded = piece.poses.dim(2)?.next_multiple_of(FRAMES_MULTIPLE);
             let Some(speaker) = piece.speakers.first().map(|speaker| *speaker as usize) else { continue };
             let normal = &speakers[speaker].normalisation;
-            let raw = generator.forward(&piece.mels, &piece.speakers, n_padded, false)?.detach();
+            let encoded = generator.frames(&piece.mels, &piece.speakers, piece.words.as_ref(), n_padded, false)?;
+            let raw = generator.decode(&encoded, false)?.detach();
             let poses = trainer.speakers.poses(&raw, &piece.speakers)?;
             let batch = &WindowBatch {
                 mels: piece.mels.clone(),
                 poses: self.blocks(&piece.poses)?,
                 mask: self.blocks(&piece.mask)?,
                 speakers: piece.speakers.clone(),
+                words: None,
             };
             let poses = self.blocks(&poses.narrow(2, 0, piece.poses.dim(2)?)?)?;
             for (n, (of, sums)) in normal.channels.iter().zip(&mut angles).enumerate() {

@@ -4,6 +4,8 @@ use super::augment::{self, WindowChange, WindowRows};
 use super::interval_rows::{IntervalRows, TrainingIntervals};
 use crate::generate::generator::mel_frames;
 use crate::generate::normalisation::{N_FEATURES, Normalisation};
+use crate::generate::seq2seq::architecture::{NumberedWord, Vocabulary};
+use crate::generate::word_input::WordFrameList;
 use crate::train::no_window::NeededFrames;
 use anyhow::{Context, Result, ensure};
 use candle_core::{Device, Tensor};
@@ -15,6 +17,7 @@ use orator_base::types::sound::SAMPLE_RATE;
 use orator_base::types::time::FrameRate;
 use orator_dataset::{Dataset, Split};
 use orator_nn::gan::generator::FRAMES_MULTIPLE;
+use orator_nn::gan::words::WordFrames;
 use rayon::prelude::*;
 use std::ops::Range;
 
@@ -30,6 +33,8 @@ pub struct WindowLoader<'d> {
     intervals: TrainingIntervals<'d>,
     /// Interval and first frame of every window.
     starts: Vec<(usize, usize)>,
+    /// Words of every interval, for a network with word input.
+    words: Option<Vec<Vec<NumberedWord>>>,
 }
 
 pub struct WindowBatch {
@@ -41,6 +46,8 @@ pub struct WindowBatch {
     pub mask: Tensor,
     /// Speaker index of each window, [B].
     pub speakers: Vec<u32>,
+    /// Words at the frames, for a network with word input.
+    pub words: Option<WordFrames>,
 }
 
 /// Description of a window of `n_frames` frames, for messages about missing windows.
@@ -52,7 +59,10 @@ impl WindowBatch {
     pub fn on(&self, device: &Device) -> Result<Self> {
         let on = |tensor: &Tensor| tensor.to_device(device);
         let (mels, poses, mask) = (on(&self.mels)?, on(&self.poses)?, on(&self.mask)?);
-        Ok(Self { mels, poses, mask, speakers: self.speakers.clone() })
+        let words = self.words.as_ref().map(|words| {
+            Ok::<_, anyhow::Error>(WordFrames { numbers: on(&words.numbers)?, times: on(&words.times)?, added: None })
+        });
+        Ok(Self { mels, poses, mask, speakers: self.speakers.clone(), words: words.transpose()? })
     }
 }
 
@@ -86,7 +96,25 @@ impl<'d> WindowLoader<'d> {
             (0..n_windows).map(move |window| (i, window * stride))
         };
         let starts = (0..intervals.n_intervals()).flat_map(of_interval).collect();
-        Ok(Self { fps, n_frames, n_features: normal.n_features(), normal: normal.clone(), intervals, starts })
+        let (n_features, normal, words) = (normal.n_features(), normal.clone(), None);
+        Ok(Self { fps, n_frames, n_features, normal, intervals, starts, words })
+    }
+
+    /// Adds the words of the intervals to the windows, as indices of `vocabulary`; `None`: no word input.
+    pub fn with_words(mut self, vocabulary: Option<&Vocabulary>) -> Result<Self> {
+        self.words = vocabulary.map(|vocabulary| self.intervals.words(vocabulary)).transpose()?;
+        Ok(self)
+    }
+
+    /// Words at `n_frames` frames of windows, each with its interval, first frame and frames per window frame.
+    fn words_of(&self, windows: &[(usize, f64, f64)], n_frames: usize) -> Result<Option<WordFrames>> {
+        let Some(words) = &self.words else { return Ok(None) };
+        let mut frames = WordFrameList::default();
+        for (interval, first, speed) in windows {
+            let secs = (0..n_frames).map(|t| (first + t as f64 * speed) / self.fps.per_sec());
+            frames.push(&words[*interval], self.fps, secs);
+        }
+        frames.frames(None).map(Some)
     }
 
     /// Normalised poses [features, T] and masks [48 or more, T] (joints, then angles), in the order of the intervals;
@@ -119,6 +147,8 @@ impl<'d> WindowLoader<'d> {
         let lowest = (0..n_padded).map(source).min().unwrap_or(first);
         let rows = self.intervals.rows(interval, frames.clone(), lowest..(first + n_padded).min(last + 1))?;
         let IntervalRows { features, mask, mels, first_frame, first_mel } = &*rows;
+        let words =
+            self.words_of(&[(interval, frames.start as f64, 1.0)], frames.len().next_multiple_of(FRAMES_MULTIPLE))?;
         let source = |k: usize| source(k) - first_mel;
         let frames = frames.start - first_frame..frames.end - first_frame;
         let sound = Array2::from_shape_fn((mel::N_MELS, n_padded), |(band, k)| mels[[band, source(k)]]);
@@ -129,7 +159,7 @@ impl<'d> WindowLoader<'d> {
             let (rows, columns) = of.dim();
             Ok(Tensor::from_vec(of.into_raw_vec_and_offset().0, (1, rows, columns), &Device::Cpu)?)
         };
-        Ok(WindowBatch { mels: tensor(sound)?, poses: tensor(poses)?, mask: tensor(mask)?, speakers: vec![0] })
+        Ok(WindowBatch { mels: tensor(sound)?, poses: tensor(poses)?, mask: tensor(mask)?, speakers: vec![0], words })
     }
 
     pub fn fps(&self) -> FrameRate {
@@ -156,6 +186,12 @@ impl<'d> WindowLoader<'d> {
         );
         let both: Vec<_> = which.iter().zip(changes).collect();
         let changed = |(i, change): &(&usize, &WindowChange)| self.changed(self.starts[**i], change);
+        let window = |(i, change): &(&usize, &WindowChange)| {
+            let (interval, start) = self.starts[**i];
+            let (first, speed) = self.changed_frames(interval, start, change);
+            (interval, first, speed)
+        };
+        let windows: Vec<(usize, f64, f64)> = both.iter().map(window).collect();
         let rows: Vec<WindowRows> = both.par_iter().map(changed).collect::<Result<_>>()?;
         let tensor = |of: fn(&WindowRows) -> &Array2<f32>| {
             let values: Vec<f32> = rows.iter().flat_map(|rows| of(rows).iter().copied()).collect();
@@ -167,17 +203,24 @@ impl<'d> WindowLoader<'d> {
             poses: tensor(|r| &r.poses)?,
             mask: tensor(|r| &r.mask)?,
             speakers: vec![0; which.len()],
+            words: self.words_of(&windows, self.n_frames)?,
         })
+    }
+
+    /// First frame of an augmented window that starts near frame `start` of an interval, and frames per window frame.
+    fn changed_frames(&self, interval: usize, start: usize, change: &WindowChange) -> (f64, f64) {
+        let (last, n) = (self.intervals.n_frames(interval) - 1, self.n_frames);
+        // The window must not be longer than the interval.
+        let speed = change.speed.min(last as f64 / (n - 1).max(1) as f64);
+        let latest = last as f64 - (n - 1) as f64 * speed;
+        ((start as f64 + change.shift_secs * self.fps.per_sec()).clamp(0.0, latest), speed)
     }
 
     /// Augmented window that starts near frame `start` of an interval.
     fn changed(&self, (interval, start): (usize, usize), change: &WindowChange) -> Result<WindowRows> {
         let (last, last_mel) = (self.intervals.n_frames(interval) - 1, self.intervals.n_mels(interval) - 1);
         let n = self.n_frames;
-        // The window must not be longer than the interval.
-        let speed = change.speed.min(last as f64 / (n - 1).max(1) as f64);
-        let latest = last as f64 - (n - 1) as f64 * speed;
-        let first = (start as f64 + change.shift_secs * self.fps.per_sec()).clamp(0.0, latest);
+        let (first, speed) = self.changed_frames(interval, start, change);
         let at = |t: usize| first + t as f64 * speed;
         let first_mel = first * (f64::from(SAMPLE_RATE) / mel::HOP as f64) / self.fps.per_sec();
         let n_mels = mel_frames(self.fps, n);
@@ -222,6 +265,8 @@ impl<'d> WindowLoader<'d> {
             "invalid windows {which:?}: expected indices below {}",
             self.len()
         );
+        let window = |i: &usize| (self.starts[*i].0, self.starts[*i].1 as f64, 1.0);
+        let windows: Vec<(usize, f64, f64)> = which.iter().map(window).collect();
         let n_mels = mel_frames(self.fps, self.n_frames);
         let (mut mels, mut poses, mut mask) = (Vec::new(), Vec::new(), Vec::new());
         let read = |i: &usize| {
@@ -246,6 +291,7 @@ impl<'d> WindowLoader<'d> {
             poses: tensor(poses, self.n_features, self.n_frames)?,
             mask: tensor(mask, self.n_features, self.n_frames)?,
             speakers: vec![0; which.len()],
+            words: self.words_of(&windows, self.n_frames)?,
         })
     }
 }
@@ -298,11 +344,18 @@ impl<'d> JoinedWindows<'d> {
 
 fn joined(parts: &[WindowBatch]) -> Result<WindowBatch> {
     let of = |tensor: fn(&WindowBatch) -> &Tensor| Tensor::cat(&parts.iter().map(tensor).collect::<Vec<_>>(), 0);
+    let words: Option<Vec<&WordFrames>> = parts.iter().map(|part| part.words.as_ref()).collect();
+    let words = words.map(|words| -> Result<WordFrames> {
+        let of =
+            |tensor: fn(&WordFrames) -> &Tensor| Tensor::cat(&words.iter().map(|of| tensor(of)).collect::<Vec<_>>(), 0);
+        Ok(WordFrames { numbers: of(|words| &words.numbers)?, times: of(|words| &words.times)?, added: None })
+    });
     Ok(WindowBatch {
         mels: of(|part| &part.mels)?,
         poses: of(|part| &part.poses)?,
         mask: of(|part| &part.mask)?,
         speakers: parts.iter().flat_map(|part| part.speakers.iter().copied()).collect(),
+        words: words.transpose()?,
     })
 }
 

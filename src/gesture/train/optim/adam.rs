@@ -1,6 +1,5 @@
-//! Adam (Kingma & Ba 2015), optionally AMSGrad (Reddi et al. 2018), as a candle optimiser with moments that can be
-//! saved and gradient norm clipping. Each tensor is updated in one pass over its memory, bit for bit the same for any
-//! number of threads.
+//! Adam (Kingma & Ba 2015), or AMSGrad (Reddi et al. 2018), as a candle optimiser with moments that can be saved and
+//! gradient norm clipping. Each tensor is updated in one pass, bit for bit the same for any number of threads.
 
 use super::adam_fallback::{self, AdamScalars};
 use anyhow::{Context, ensure};

@@ -37,8 +37,7 @@ impl CaptureFolder {
     /// Lists a folder. `hold_out`: names (without extension) of the captures to validate on.
     ///
     /// # Errors
-    /// Motion without sound, sound without motion, no capture, none left to train on, a held-out name that does not
-    /// exist.
+    /// Motion without sound, sound without motion, no capture, none left to train on, an unknown held-out name.
     pub fn open(dir: &Path, hold_out: &[String], mapping: JointMapping) -> Result<Self> {
         let entries = std::fs::read_dir(dir).with_context(|| format!("cannot list {}", dir.display()))?;
         let paths = entries.map(|entry| Ok(entry?.path())).collect::<Result<Vec<PathBuf>>>()?;

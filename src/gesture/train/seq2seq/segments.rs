@@ -1,8 +1,7 @@
 //! Poses, audio features and words of an uninterrupted stretch of motion, and batches of its segments: previous poses,
-//! audio features and words as input, and the poses to predict as target. The previous poses of some segments are
-//! replaced by poses that the network predicts, as in generation for all segments but the first (scheduled sampling,
-//! Bengio et al. 2015): trained on real previous poses only, a network learns to copy them and depends too little on
-//! the audio.
+//! audio features and words as input, poses to predict as target. The previous poses of some segments are replaced by
+//! poses that the network predicts, as in generation for all segments but the first (scheduled sampling, Bengio et al.
+//! 2015): trained on real previous poses only, a network learns to copy them and depends too little on the audio.
 
 use crate::generate::seq2seq::architecture::{self, NumberedWord};
 use crate::generate::seq2seq::metadata::SequenceMetadata;
@@ -37,8 +36,7 @@ pub struct SegmentBatch {
 }
 
 impl SegmentBatch {
-    /// Predicted poses with the values of `real` wherever the target is not known, so that the loss and its gradient
-    /// are zero there.
+    /// Predicted poses with the values of `real` where the target is unknown, so that loss and gradient are zero there.
     pub fn completed(&self, predicted: &Tensor) -> candle_core::Result<Tensor> {
         (predicted * &self.known)? + &self.filled
     }

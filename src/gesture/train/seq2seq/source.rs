@@ -1,5 +1,4 @@
-//! Training data of the sequence networks: a dataset of this program, or a folder of captures. Both become pose
-//! sequences.
+//! Data of the sequence networks: a dataset of this program, or a folder of captures. Both become pose sequences.
 
 use super::captures::CaptureFolder;
 use super::segments::{PoseSequence, SequenceSplits};

@@ -8,13 +8,14 @@ use super::source::TrainingSource;
 use super::step::{SequenceLosses, SequenceState, SequenceTrainer};
 use super::validate::{SequenceValidation, ValidationSegments};
 pub use crate::generate::model::BEST;
-use crate::generate::seq2seq::architecture::{self, PADDING, UNKNOWN, Vocabulary, network_config};
+use crate::generate::seq2seq::architecture::{self, Vocabulary, network_config};
 use crate::generate::seq2seq::metadata::SequenceMetadata;
 use crate::train::epochs::{self, EpochSchedule, StepReport, TrainingOutcome, ValidatedStep, ValidatedTraining};
 use crate::train::log;
 use crate::train::no_window::{self, NeededFrames};
 use crate::train::resume::{self, sample_windows, step_rng};
-use anyhow::{Context, Result, ensure};
+use crate::train::word_vectors::{self, WORD_DIM};
+use anyhow::{Result, ensure};
 use candle_core::{Device, Tensor};
 use orator_base::stage::progress::Progress;
 use orator_base::stage::workdir::{self, FolderLock};
@@ -25,16 +26,11 @@ use orator_formats::checkpoint;
 use orator_formats::word_vectors::WordVectors;
 use orator_nn::cpu::spin_pool::with_spinning_workers;
 use orator_nn::seq2seq::config::Config;
-use orator_nn::seq2seq::encoders::set_word_vectors;
 use orator_nn::weights::Contents;
 use std::path::Path;
 
-/// Dimension of the word embeddings if no word vectors are given.
-const WORD_DIM: usize = 100;
-
-/// Trains to the last step of `requested`, resuming from the newest checkpoint in `folder` if there is one; then the settings
-/// of that checkpoint apply, and differences are reported. `vectors` initialise the word embeddings; without them they
-/// are random.
+/// Trains to the last step of `requested`, resuming from the newest checkpoint in `folder` if there is one; then its
+/// settings apply, and differences are reported. `vectors` initialise the word embeddings; else they are random.
 ///
 /// # Errors
 /// Data that cannot be read, with the name of the file; no segment to train on; a checkpoint of other data; another
@@ -189,28 +185,11 @@ fn initialise(
         dataset: source.hash()?,
     };
     let trainer = SequenceTrainer::new(metadata, settings)?;
-    initialise_words(&trainer, vectors)?;
+    if let Some(encoder) = architecture::word_encoder(trainer.metadata.architecture) {
+        word_vectors::initialise(trainer.params(), encoder, &trainer.metadata.vocabulary, vectors)?;
+    }
     initialise_scales(&trainer, &splits.train)?;
     Ok((trainer, splits))
-}
-
-/// Initialises the word embeddings: zeros for padding, ones for the unknown word, and the given vectors for all others.
-fn initialise_words(trainer: &SequenceTrainer, vectors: Option<&WordVectors>) -> Result<()> {
-    let SequenceMetadata { architecture, vocabulary, network, .. } = &trainer.metadata;
-    let Some(encoder) = architecture::word_encoder(*architecture) else { return Ok(()) };
-    let found = trainer.params().trainables().find(|(name, _)| *name == format!("{encoder}.embedding.weight"));
-    let (_, table) = found.context("the network has no word embedding")?;
-    let mut rows = table.to_vec2::<f32>()?;
-    rows[PADDING as usize] = vec![0.0; network.word];
-    rows[UNKNOWN as usize] = vec![1.0; network.word];
-    if let Some(vectors) = vectors {
-        for word in vocabulary.words() {
-            rows[vocabulary.number(word) as usize] = vectors.vector(vectors.index(word))?;
-        }
-    }
-    let weights: Vec<f32> = rows.concat();
-    let table = Tensor::from_vec(weights, (vocabulary.n_indices(), network.word), table.device())?;
-    Ok(set_word_vectors(trainer.params(), encoder, &table)?)
 }
 
 /// Standard deviation of the noise that is added to poses, as a share of that of the data (published value).
@@ -300,8 +279,7 @@ impl ValidatedTraining for SequenceTraining<'_> {
     }
 }
 
-/// Newest checkpoint and its state, with the settings of the resumed training. Reports where these differ from
-/// `requested`.
+/// Newest checkpoint, its state and the settings of the resumed training. Reports where these differ from `requested`.
 fn resume(
     source: TrainingSource,
     requested: &Seq2seqConfig,

@@ -1,5 +1,4 @@
-//! Validation of a network on held-out segments, each with its real previous poses, in comparison with a constant mean
-//! pose.
+//! Validation of a network on held-out segments, each with its real previous poses, compared with a constant mean pose.
 
 use super::segments::{SegmentBatch, SegmentLoader};
 use crate::train::gan::losses::number;

@@ -44,8 +44,8 @@ pub fn run(
     if let Some(positions) = learned.rows.iter().find_map(|row| row.positions) {
         text += &format!(
             "positions: share of {} whose wrist is nearest to the target of the word at the end of its stroke (95 % \
-             interval); isolated: {} without another such word within 5 s; chance: {:.0} %. Speeds are compared only \
-             where no word moves the hand.\n",
+             interval); isolated: {} without another such word within 5 s; chance: {:.0} %. With the first rule, speeds \
+             are compared only where no word moves the hand.\n",
             counted(positions.all.n_words, "word"),
             counted(positions.isolated.n_words, "word"),
             100.0 * PositionShare::CHANCE
@@ -55,12 +55,13 @@ pub fn run(
              of the rule without variation; PCK, energy (mean squared joint speed relative to the ground truth) and\n\
              L1 (normalised): against the ground truth; pauses: energy in frames where the rule moves neither wrist,\n\
              which the audio does not determine.";
-    if let (Some(met), true) = (learned.targets_met, has_words) {
+    if let (Some(met), true) = (learned.targets_met, learned.has_word_targets) {
         text += &format!(
-            "\ntargets: positions {:.0} % (a network of the words of a segment: {:.0} % of the isolated words); with \
-             mismatched or without words within {:.0} percentage points of chance; speed {} where no word moves the \
-             hand: {}",
+            "\ntargets: positions {:.0} % (GAN {:.0} %, a network of the words of a segment {:.0} % of the isolated \
+             words); with mismatched or without words within {:.0} percentage points of chance, or below if words are \
+             audible; speed of beats {}: {}",
             100.0 * learned::MIN_POSITIONS,
+            100.0 * learned::MIN_GAN_POSITIONS,
             100.0 * learned::MIN_ISOLATED_POSITIONS,
             100.0 * learned::MAX_FROM_CHANCE,
             learned::MIN_BEATS,

@@ -103,7 +103,7 @@ enum DemoVerb {
         habits: u64,
         /// Folder of recorded speech to use instead of synthetic speech: NAME.wav with NAME.tsv (start, end, word),
         /// in the split that NAME begins with. The gestures follow the second rule (version 3), based on loud
-        /// syllables, phrases and eight words.
+        /// syllables, phrases and 40 words.
         #[arg(long, value_name = "DIR", conflicts_with_all = ["hours", "words", "habits"])]
         speech: Option<PathBuf>,
         /// Random seed of the speech and of the variation of the speaker.

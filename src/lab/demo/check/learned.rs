@@ -62,6 +62,9 @@ pub struct Learned {
     pub ridge_strengths: [[f64; 2]; 2],
     /// Whether the generator reaches the targets; `None`: no generator.
     pub targets_met: Option<bool>,
+    /// Whether these are the targets for words.
+    #[serde(skip)]
+    pub has_word_targets: bool,
     /// First clip, for the plot.
     #[serde(skip)]
     pub first: Option<traces::TraceClip>,
@@ -75,9 +78,12 @@ pub const MIN_SHARE_OF_LIFTED: f64 = 0.8;
 pub const MIN_PCK: f64 = 1.5;
 pub const ENERGY: std::ops::RangeInclusive<f64> = 0.7..=1.3;
 
-/// Targets for a rule with words: share of correct positions of all words, and of isolated words for the network that
-/// reads the words of a segment; largest deviation from chance of a network without word input; correlation on beats.
+/// Targets for a rule with words: share of correct positions of all words for the contextual network and for the GAN,
+/// and of isolated words for the network that reads the words of a segment; largest deviation from chance of a network
+/// without word input; correlation on beats. With the second rule, whose words are audible, the interval with the words
+/// of another clip must be below that with the own words.
 pub const MIN_POSITIONS: f64 = 0.8;
+pub const MIN_GAN_POSITIONS: f64 = 0.85;
 pub const MIN_ISOLATED_POSITIONS: f64 = 0.7;
 pub const MAX_FROM_CHANCE: f64 = 0.1;
 pub const MIN_BEATS: f64 = 0.6;
@@ -181,12 +187,16 @@ pub fn measure(
         rows.push(row("rule without words", each(&|test| test.rule_without_words(fps))));
     }
     let n_frames: usize = tests.iter().map(|test| test.sample.n_frames()).sum();
+    let reads_words = speaker.is_some_and(|speaker| speaker.speaker.reads_words());
+    let has_word_targets = judge.has_words() || (reads_words && judge.is_by_speech());
     Ok(Learned {
         n_clips: tests.len(),
         secs: fps.secs(n_frames),
-        targets_met: speaker.map(|speaker| {
-            if judge.has_words() { word_targets_met(&rows, speaker) } else { targets_met(&rows, truth.is_some()) }
+        targets_met: speaker.map(|speaker| match has_word_targets {
+            true => word_targets_met(&rows, speaker, judge.is_by_speech()),
+            false => targets_met(&rows, truth.is_some()),
         }),
+        has_word_targets,
         rows,
         ridge_strengths: baselines.ridges.each_ref().map(|ridge| ridge.strengths),
         first,
@@ -206,19 +216,22 @@ fn targets_met(rows: &[LearnedRow], of_videos: bool) -> bool {
         && ENERGY.contains(&poses.energy)
 }
 
-/// Whether the generator's row reaches the targets for words.
-fn word_targets_met(rows: &[LearnedRow], speaker: &EvaluatedCheckpoint) -> bool {
+/// Whether the generator's row reaches the targets for words, which may be audible.
+fn word_targets_met(rows: &[LearnedRow], speaker: &EvaluatedCheckpoint, are_audible: bool) -> bool {
     let Some((row, positions)) = rows.first().and_then(|row| Some((row, row.positions?))) else { return false };
     let is_chance = |share: PositionShare| (share.share() - PositionShare::CHANCE).abs() <= MAX_FROM_CHANCE;
     let others = rows.iter().find(|row| row.predictor == OTHER_WORDS).and_then(|row| row.positions);
     let uses_words = match speaker.speaker.architecture() {
         Some(Architecture::Contextual) => positions.all.share() >= MIN_POSITIONS,
         Some(Architecture::Words) => positions.isolated.share() >= MIN_ISOLATED_POSITIONS,
+        None if speaker.speaker.reads_words() => positions.all.share() >= MIN_GAN_POSITIONS,
         _ => return is_chance(positions.all),
     };
-    uses_words
-        && others.is_some_and(|others| is_chance(others.all))
-        && row.speed_correlation.iter().all(|correlation| *correlation >= MIN_BEATS)
+    let Some(others) = others.filter(|_| uses_words) else { return false };
+    if are_audible {
+        return others.all.interval()[1] < positions.all.interval()[0];
+    }
+    is_chance(others.all) && row.speed_correlation.iter().all(|correlation| *correlation >= MIN_BEATS)
 }
 
 impl TestClip {
@@ -260,10 +273,18 @@ impl Judge<'_> {
         self.tests.iter().filter_map(|test| test.clip).any(|clip| clip.rule == RULE_OF_WORDS)
     }
 
+    /// Whether the clips follow the second rule, whose words are audible.
+    fn is_by_speech(&self) -> bool {
+        self.tests.iter().all(|test| test.clip.is_none() && is_by_speech(&test.sample))
+    }
+
     fn positions(&self, predicted: &[Array3<f32>]) -> WordPositions {
         let mut positions = WordPositions::default();
         for (joints, test) in predicted.iter().zip(self.tests) {
-            test.clip.iter().for_each(|clip| positions.count(clip, joints.view(), self.fps));
+            match &test.clip {
+                Some(clip) => positions.count(clip, joints.view(), self.fps),
+                None => positions.count_speech(&test.sample, joints.view(), self.fps),
+            }
         }
         positions
     }
@@ -295,7 +316,7 @@ impl Judge<'_> {
                 pauses: pauses.relative_to(&reference_pauses),
                 l1: errors.0 / f64::max(errors.1, 1.0),
             }),
-            positions: self.has_words().then(|| self.positions(predicted)),
+            positions: (self.has_words() || self.is_by_speech()).then(|| self.positions(predicted)),
         }
     }
 

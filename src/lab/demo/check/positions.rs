@@ -1,10 +1,15 @@
 //! Checks whether words with gestures move their hand to the right position, and which frames belong to them.
 
 use ndarray::{Array2, ArrayView3};
+use orator_base::math::vec3::Vec3;
 use orator_base::types::time::FrameRate;
+use orator_dataset::Sample;
+use orator_formats::transcript::Word;
 use orator_test_support::rule::dataset::SpokenClip;
 use orator_test_support::rule::rule::WRISTS;
 use orator_test_support::rule::rule::{HOLD, RETURN, RuleGestures, STROKE, WORD_DELAY};
+use orator_test_support::rule::speech_dataset;
+use orator_test_support::rule::speech_gestures::{self, SpeechGestures};
 use orator_test_support::rule::words::{N_TARGETS, WordGesture, gesture};
 use serde::Serialize;
 
@@ -51,21 +56,43 @@ impl PositionShare {
 }
 
 impl WordPositions {
-    /// Counts the words of a clip for predicted joints [T, 49, 3], metres, relative to the neck.
+    /// Counts the words of a clip of the first rule for predicted joints [T, 49, 3], metres, relative to the neck.
     pub fn count(&mut self, clip: &SpokenClip, predicted: ArrayView3<f32>, fps: FrameRate) {
         let (speech, words) = (clip.speech(), clip.words());
         let rule = RuleGestures::of_habits(&clip.habits(), &speech, &words);
+        let stroke = |word: &Word| gesture(&word.word).map(|gesture| (word.start_secs, gesture));
+        let strokes: Vec<(f64, WordGesture)> = words.iter().filter_map(stroke).collect();
+        self.add(&strokes, WORD_DELAY + STROKE, |of, secs| rule.wrist_at(of, secs), predicted, fps);
+    }
+
+    /// Counts the words of a clip of the second rule.
+    pub fn count_speech(&mut self, sample: &Sample, predicted: ArrayView3<f32>, fps: FrameRate) {
+        let events = speech_dataset::events(sample);
+        let rule = SpeechGestures::new(&events);
         let strokes: Vec<(f64, WordGesture)> =
-            words.iter().filter_map(|word| gesture(&word.word).map(|gesture| (word.start_secs, gesture))).collect();
+            events.words.iter().map(|(start, target)| (*start, WordGesture { hand: 0, target: *target })).collect();
+        let delay = speech_gestures::WORD_DELAY + speech_gestures::STROKE;
+        self.add(&strokes, delay, |of, secs| rule.wrist_at(of.target, secs), predicted, fps);
+    }
+
+    /// Adds the strokes of words, each with the start of its word in seconds, `delay` seconds before its end; `wrist_at`
+    /// is the position of the wrist at a target.
+    fn add(
+        &mut self,
+        strokes: &[(f64, WordGesture)],
+        delay: f64,
+        wrist_at: impl Fn(WordGesture, f64) -> Vec3,
+        predicted: ArrayView3<f32>,
+        fps: FrameRate,
+    ) {
         for (n, (start, own)) in strokes.iter().enumerate() {
-            let end = start + WORD_DELAY + STROKE;
-            let t = (end * fps.per_sec()).round() as usize;
+            let t = ((start + delay) * fps.per_sec()).round() as usize;
             if t >= predicted.shape()[0] {
                 continue;
             }
             let wrist: [f64; 3] = std::array::from_fn(|k| f64::from(predicted[[t, WRISTS[own.hand], k]]));
             let distance = |target: &usize| -> f64 {
-                let at = rule.wrist_at(WordGesture { target: *target, ..*own }, fps.secs(t));
+                let at = wrist_at(WordGesture { target: *target, ..*own }, fps.secs(t));
                 (0..3).map(|k| (wrist[k] - at[k]).powi(2)).sum()
             };
             let nearest = (0..N_TARGETS).min_by(|a, b| distance(a).total_cmp(&distance(b)));

@@ -182,8 +182,7 @@ impl SoundTrack {
         Rational(1, self.sound.rate as i32)
     }
 
-    /// Passes the next frame of samples to the encoder if it ends before `until` seconds; returns false if there is
-    /// none.
+    /// Passes the next frame to the encoder if it ends before `until` seconds; returns false if there is none.
     fn send(&mut self, until: f64) -> Result<bool> {
         let n_until = (until * f64::from(self.sound.rate)).min(self.sound.samples.len() as f64) as usize;
         // Only the last frame may be shorter.
@@ -226,8 +225,7 @@ fn open_video([width, height]: [usize; 2], fps: FrameRate, crf: u32) -> Result<e
     context.set_flags(codec::Flags::GLOBAL_HEADER | codec::Flags::BITEXACT);
     let (factor, crf) = (f64::from(crf), crf.to_string());
     let options: &[(&str, &str)] = match x264 {
-        // The SIMD code of libx264 reads beyond the edge of very narrow images, so that their bytes would vary
-        // between runs.
+        // The SIMD code of libx264 reads beyond the edge of very narrow images: their bytes would vary between runs.
         Some(_) if width < 128 => &[("preset", "veryfast"), ("crf", &crf), ("x264-params", "no-asm=1")],
         // Its macroblock tree reads uninitialised memory at any width.
         Some(_) => &[("preset", "veryfast"), ("crf", &crf), ("x264-params", "mbtree=0")],

@@ -31,8 +31,7 @@ impl GruSizes {
         self.hidden.next_multiple_of(COLUMNS)
     }
 
-    /// Number of weights: those of the input [3 H, I] and of the state [3 H, H], and both biases [3 H]; the rows are
-    /// reset, update, candidate.
+    /// Number of weights: input [3 H, I], state [3 H, H], both biases [3 H]; the rows are reset, update, candidate.
     pub fn n_weights(&self) -> usize {
         3 * self.hidden * (self.input + self.hidden + 2)
     }
@@ -93,8 +92,7 @@ impl<T: Scalar> ForwardCell<T> {
         }
     }
 
-    /// Computes one step for as many rows as `previous` has states. Input rows are `stride` values apart; `gates` and
-    /// `next` are overwritten.
+    /// One step for the rows of `previous`. Input rows are `stride` values apart; `gates` and `next` are overwritten.
     pub fn step(&self, x: &[T], stride: usize, previous: &[T], gates: &mut [T], next: &mut [T]) {
         let width = self.sizes.width();
         let n = previous.len() / width;

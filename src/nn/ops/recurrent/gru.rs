@@ -13,8 +13,7 @@ use candle_core::{Result, Shape, Tensor};
 use rand::Rng;
 
 /// A layer with its weights, named as in PyTorch: `<name>.weight_ih_l0` [3 H, I], `.weight_hh_l0` [3 H, H],
-/// `.bias_ih_l0` and `.bias_hh_l0` [3 H], with the suffix `_reverse` for the reverse direction; rows are reset,
-/// update, candidate.
+/// `.bias_ih_l0` and `.bias_hh_l0` [3 H], with `_reverse` for the reverse direction; rows are reset, update, candidate.
 pub struct Gru {
     /// Four tensors per direction.
     weights: Vec<Tensor>,
@@ -41,8 +40,7 @@ impl Gru {
         Ok(Self { weights, hidden })
     }
 
-    /// Returns all states of a sequence [B, T, I], starting from zeros: [B, T, directions * H]; training applies
-    /// dropout with rate `p`.
+    /// All states of a sequence [B, T, I], from zeros: [B, T, directions * H]; training applies dropout with rate `p`.
     pub fn forward(&self, x: &Tensor, p: f64, mode: &mut Mode) -> Result<Tensor> {
         self.run(x, false, drop_mask(p, mode))
     }
@@ -142,8 +140,7 @@ impl GruOp {
         if last { (time == s.n_steps - 1).then(|| at(0)) } else { Some(at(time)) }
     }
 
-    /// Numbers of values saved for a direction of a chunk of `n` rows: gates of every step; states of every step and
-    /// the initial one.
+    /// Numbers of values saved for a direction of `n` rows: gates of every step; states of every step and the initial.
     fn saved_len(&self, direction: usize, n: usize, s: &PassSizes) -> [usize; 2] {
         let (steps, width) = (self.steps(direction, s), s.cell.width());
         [steps * n * 4 * width, (steps + 1) * n * width]

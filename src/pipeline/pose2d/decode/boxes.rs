@@ -10,8 +10,7 @@ pub fn overlap(a: &PersonBox, b: &PersonBox) -> f32 {
     if both > 0.0 && either > 0.0 { both / either } else { 0.0 }
 }
 
-/// Non-maximum suppression: boxes by descending score, without those that overlap a better one by more than
-/// `max_overlap`.
+/// Non-maximum suppression: boxes, best first, without those that overlap a better one by more than `max_overlap`.
 pub fn non_max_suppression(mut boxes: Vec<PersonBox>, max_overlap: f32) -> Vec<PersonBox> {
     boxes.sort_by(|a, b| b.score.total_cmp(&a.score));
     let mut accepted: Vec<PersonBox> = Vec::new();

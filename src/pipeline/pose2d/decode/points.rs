@@ -1,7 +1,6 @@
 //! Outputs with one position per keypoint. SimCC (Li et al. 2022): x and y are two classifications over sub-pixel bins
-//! (RTMPose, RTMW, DWPose). Regression: one row of values per point, x and y first, in px of the input,
-//! then, in rows of three, depth, and one score
-//! for all points (MediaPipe's hand and face).
+//! (RTMPose, RTMW, DWPose). Regression: one row of values per point, x and y first, in px of the input, then, in rows
+//! of three, depth, and one score for all points (MediaPipe's hand and face).
 
 use anyhow::{Result, bail, ensure};
 
@@ -74,36 +73,4 @@ pub fn depths(landmarks: &[f32], n_points: usize) -> Option<Vec<f64>> {
 /// Score 0..1 from an output that is a probability or a logit.
 pub fn regression_score(number: f32, is_logit: bool) -> f32 {
     if is_logit { 1.0 / (1.0 + (-number).exp()) } else { number }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn simcc_positions_are_the_peaks() {
-        let mut x = vec![0.0; 2 * 384];
-        let mut y = vec![0.0; 2 * 512];
-        (x[101], y[77]) = (0.8, 0.6);
-        (x[384 + 3], y[512 + 500]) = (0.2, f32::NAN);
-        let points = simcc((&[1, 2, 384], &x), (&[1, 2, 512], &y), 2.0).unwrap();
-        assert_eq!(points[0], [50.5, 38.5, f64::from(0.6_f32)]);
-        assert_eq!(points[1], [1.5, 0.0, 0.0]);
-        assert!(simcc((&[1, 2, 384], &x), (&[1, 3, 512], &y), 2.0).is_err());
-        assert!(simcc((&[2, 384], &x), (&[1, 2, 512], &y), 2.0).is_err());
-    }
-
-    #[test]
-    fn regression_accepts_rows_of_any_length() {
-        let rows = [1.0, 2.0, 9.0, 3.0, 4.0, 9.0];
-        assert_eq!(regression(&rows, 0.5, 2).unwrap(), [[1.0, 2.0, 0.5], [3.0, 4.0, 0.5]]);
-        assert_eq!((depths(&rows, 2), depths(&rows, 3)), (Some(vec![9.0, 9.0]), None));
-        assert_eq!(depths(&[1.0, 2.0, 0.0, 3.0, 4.0, 0.0], 2), None);
-        assert_eq!(regression(&rows, f32::NAN, 2).unwrap(), [[0.0; 3]; 2]);
-        assert!(
-            regression(&rows, 0.5, 4).is_err()
-                && regression(&rows, 0.5, 0).is_err()
-                && regression(&rows, 0.5, 6).is_err()
-        );
-    }
 }

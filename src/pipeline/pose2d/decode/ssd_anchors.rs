@@ -12,8 +12,7 @@ pub struct Detection {
     pub points: Vec<[f64; 2]>,
 }
 
-/// Anchor centres as shares of the input side: layers of equal stride share a grid, with two anchors per cell and
-/// layer, row-major.
+/// Anchor centres as shares of the input side: equal strides share a grid, two anchors per cell and layer, row-major.
 pub fn anchors(size: usize, strides: &[usize]) -> Vec<[f64; 2]> {
     let mut centres = Vec::new();
     for layers in strides.chunk_by(|a, b| a == b) {
@@ -95,36 +94,4 @@ fn average(overlapping: &[Detection]) -> Detection {
         [along(0), along(1)]
     };
     Detection { score: overlapping[0].score, points: (0..overlapping[0].points.len()).map(point).collect() }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn anchors_match_those_of_the_models() {
-        assert_eq!(anchors(192, &[8, 16, 16, 16]).len(), 2016);
-        assert_eq!(anchors(224, &[8, 16, 32, 32, 32]).len(), 2254);
-        let palm = anchors(192, &[8, 16, 16, 16]);
-        assert_eq!((palm[0], palm[1], palm[2]), ([0.5 / 24.0; 2], [0.5 / 24.0; 2], [1.5 / 24.0, 0.5 / 24.0]));
-        assert_eq!(palm[24 * 24 * 2 + 6], [1.5 / 12.0, 0.5 / 12.0]);
-    }
-
-    #[test]
-    fn overlapping_detections_are_averaged() {
-        let anchors = anchors(32, &[16]);
-        let mut rows = vec![0.0; anchors.len() * 6];
-        let mut logits = vec![-50.0; anchors.len()];
-        for (at, (dx, logit)) in [(0, (0.0, 2.0)), (1, (1.0, 2.0)), (6, (0.0, 0.5))] {
-            rows[at * 6..at * 6 + 6].copy_from_slice(&[dx, 0.0, 10.0, 8.0, dx + 2.0, 3.0]);
-            logits[at] = logit;
-        }
-        let found = decode(&rows, &logits, &anchors, 32, 0.5, 0.3).unwrap();
-        assert_eq!(found.len(), 2);
-        assert_eq!(found[0].points, [[3.5, 4.0], [13.5, 12.0], [10.5, 11.0]]);
-        assert!((found[1].points[2][0] - 26.0).abs() < 1e-9 && (found[1].points[2][1] - 27.0).abs() < 1e-9);
-        rows[0] = f32::NAN;
-        assert_eq!(decode(&rows, &logits, &anchors, 32, 0.5, 0.3).unwrap().len(), 2);
-        assert!(decode(&rows[6..], &logits, &anchors, 32, 0.5, 0.3).is_err());
-    }
 }

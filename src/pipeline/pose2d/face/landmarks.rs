@@ -1,17 +1,14 @@
-//! Measurements on the 468 points of MediaPipe's face mesh. The lip opening uses distances in space, so that head
-//! rotation does not change it.
+//! Measurements on the 468 points of MediaPipe's face mesh. The lip opening is in space, independent of head rotation.
 
 use orator_base::math::vec3;
 use orator_media::opencv::warp::Region;
 
-/// Number of landmarks.
 pub const N_LANDMARKS: usize = 468;
 /// Outer corners of the eyes, right first.
 const EYES: [usize; 2] = [33, 263];
 /// Points in the middle of the inner upper lip, each paired with one of the lower lip.
 const UPPER_LIP: [usize; 3] = [82, 13, 312];
 const LOWER_LIP: [usize; 3] = [87, 14, 317];
-/// Tip of the nose.
 pub const NOSE_TIP: usize = 1;
 /// Side of the face square relative to the face size (MediaPipe's face_landmark_landmarks_to_roi).
 const CROP_SCALE: f64 = 1.5;
@@ -63,8 +60,7 @@ pub fn region(points: &[FacePoint]) -> Region {
 mod tests {
     use super::*;
 
-    /// A face 100 px wide and 140 px high around (200, 100), eyes 60 px apart, lips `open` px apart, rotated by
-    /// `angle`.
+    /// A face 100 px wide and 140 px high around (200, 100), eyes 60 px and lips `open` px apart, rotated by `angle`.
     fn face(open: f64, angle: f64) -> Vec<FacePoint> {
         let mut points: Vec<FacePoint> = (0..N_LANDMARKS)
             .map(|k| {

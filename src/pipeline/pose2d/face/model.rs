@@ -9,7 +9,6 @@ use orator_media::opencv::warp::Region;
 use orator_onnx::{Decode, ModelEntry, Runtime};
 use std::path::Path;
 
-/// A detected face.
 pub struct DetectedFace {
     /// The 468 landmarks.
     pub points: Vec<FacePoint>,
@@ -17,7 +16,6 @@ pub struct DetectedFace {
     pub score: f64,
 }
 
-/// Face model with its decoder.
 pub struct FaceModel {
     pub input: ModelInput,
     decode: Decode,

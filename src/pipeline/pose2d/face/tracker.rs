@@ -10,8 +10,7 @@ use orator_media::opencv::warp::Region;
 
 /// Least presence score of a face.
 const MIN_SCORE: f64 = 0.5;
-/// Largest distance of the face's nose from the body's, in sides of the square; beyond it the face is another
-/// person's.
+/// Largest distance of the face's nose from the body's, in sides of the square; beyond it the face is another person's.
 const MAX_NOSE_DISTANCE: f64 = 0.15;
 
 /// Tracking state: region for the next frame and landmarks of the last.

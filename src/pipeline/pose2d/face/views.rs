@@ -11,8 +11,7 @@ use orator_base::types::image::Image;
 use orator_media::opencv::warp::{self, Region};
 use serde::{Deserialize, Serialize};
 
-/// Largest `landmarks::turn` of a frontal view, and of a nearly frontal one; beyond that the face shape is not
-/// accurate enough.
+/// Largest `landmarks::turn` of a frontal view, and of a nearly frontal one; beyond it the face shape is inaccurate.
 const FRONTAL: f64 = 0.1;
 const NEARLY_FRONTAL: f64 = 0.15;
 /// Largest number of stored views, and least number of (most frontal) views for a portrait, if available.
@@ -24,7 +23,6 @@ const CELLS: [usize; 2] = [10, 6];
 const PICTURE_PX: usize = 128;
 const PICTURE_SCALE: f64 = 1.15;
 
-/// A view of the face in one frame.
 #[derive(Serialize, Deserialize)]
 struct FaceView {
     /// `landmarks::turn`, at least `FRONTAL`.

@@ -14,7 +14,6 @@ use orator_base::types::pose2d::coco;
 use orator_dataset::config::Pose2dConfig;
 use orator_media::opencv::warp::Region;
 
-/// Elbow and wrist of the left and right arm.
 const ARMS: [(usize, usize); 2] = [(coco::L_ELBOW, coco::L_WRIST), (coco::R_ELBOW, coco::R_WRIST)];
 /// Bones that bound the body width from below, and the ratios of body width to bone and to trunk length. They are low,
 /// so that the shoulders decide in a frontal view: on rendered persons an arm bone measures up to 1.14 and the trunk
@@ -43,21 +42,18 @@ const MIN_SIDE_PROBABILITY: f64 = 0.3;
 const N_PROMPT_SEARCHES: u32 = 3;
 /// Largest number of doublings of the pause.
 const MAX_DOUBLINGS: u32 = 2;
-/// An arm whose wrist moved by more than this since the last unsuccessful search, in body widths, is searched at
-/// once.
+/// An arm whose wrist moved by more than this since the last unsuccessful search, in body widths, is searched at once.
 const MIN_WRIST_MOVEMENT: f64 = 0.15;
 
 /// Backoff after unsuccessful searches.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct SearchPause {
     n_failed: u32,
-    /// Frame of the next search.
     next: usize,
 }
 
 impl SearchPause {
-    /// Records an unsuccessful search in frame `now`: a pause of `shortest` frames, doubled by each failure beyond
-    /// `prompt`.
+    /// Records a failed search in frame `now`: a pause of `shortest` frames, doubled by each failure beyond `prompt`.
     fn fail(&mut self, now: usize, shortest: usize, prompt: u32) {
         self.n_failed = self.n_failed.saturating_add(1);
         let doublings = self.n_failed.saturating_sub(prompt).min(MAX_DOUBLINGS);
@@ -90,7 +86,6 @@ impl HandTracker {
         Self { model, palm, tracks: [HandTrack::default(); 2], palm_pause: SearchPause::default(), n_frames: 0 }
     }
 
-    /// Resets tracks and pauses.
     pub fn reset(&mut self) {
         self.tracks = [HandTrack::default(); 2];
         (self.palm_pause, self.n_frames) = (SearchPause::default(), 0);

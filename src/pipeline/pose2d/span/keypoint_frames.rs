@@ -12,7 +12,6 @@ use serde::{Deserialize, Serialize};
 pub struct KeypointFrames(Vec<(Pose2d, f64)>);
 
 impl KeypointFrames {
-    /// Adds a frame and the time of its source frame.
     pub fn push(&mut self, pose: Pose2d, source_secs: f64) {
         self.0.push((pose, source_secs));
     }
@@ -23,7 +22,6 @@ impl KeypointFrames {
         self.0.extend(next.0.into_iter().map(|(pose, secs)| (renumbered(pose), secs)));
     }
 
-    /// Number of frames.
     pub fn n_frames(&self) -> usize {
         self.0.len()
     }

@@ -1,6 +1,5 @@
 //! Processing of a span: its frames at the dataset rate pass in order through a `Chain`, which restarts at each shot.
-//! Repeated frames reuse the previous result. To follow the active speaker, a `TalkerSearch` processes the complete
-//! span first.
+//! Repeated frames reuse the previous result. To follow the active speaker, a `TalkerSearch` processes the span first.
 
 use super::PoseSpan;
 use super::video_frames::VideoFrames;
@@ -18,8 +17,7 @@ use std::time::Instant;
 /// Number of frames after which the estimate of the processing time is reported.
 const ESTIMATE_AFTER_FRAMES: usize = 150;
 
-/// Estimates the poses in the frames of `video`. `talkers` are the active speakers of its shots, if they were
-/// searched.
+/// Estimates the poses in the frames of `video`. `talkers` are the active speakers of its shots, if they were searched.
 ///
 /// # Errors
 /// A video that cannot be read; a model that fails.

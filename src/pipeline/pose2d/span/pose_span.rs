@@ -21,8 +21,7 @@ use std::path::Path;
 #[derive(Default, Serialize, Deserialize)]
 pub struct PoseSpan {
     pub frames: KeypointFrames,
-    /// Number of shots with several people, and of those in which the active speaker is followed; `None`: the largest
-    /// person is.
+    /// Number of shots with several people, and of those that follow the active speaker; `None`: the largest person is.
     pub followed: Option<[usize; 2]>,
     pub portrait: PortraitViews,
     /// Width and height of the picture, px.
@@ -57,7 +56,6 @@ impl PoseSpan {
         workdir::write_file(&Artifact::PoseSpan.within(folder), &rmp_serde::to_vec(self)?)
     }
 
-    /// Appends the following span.
     pub fn append(&mut self, next: Self) {
         let pair = self.last.as_ref().zip(next.first.as_ref());
         let is_same = pair.is_some_and(|(last, first)| is_same_person(last, first));

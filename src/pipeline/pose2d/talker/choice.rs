@@ -1,5 +1,4 @@
-//! Choice of the active speaker of a shot: the mouth whose opening correlates best with the voice, if that is
-//! significant.
+//! Choice of the active speaker of a shot: the mouth that correlates best with the voice, if significantly.
 
 use crate::lip_sync::LipVoiceMatch;
 use orator_base::audio::openness::Openness;
@@ -7,11 +6,9 @@ use orator_base::types::time::FrameRate;
 
 /// Least confidence of a match; lower than for an audio offset, because there are only a few candidates.
 const MIN_CONFIDENCE: f64 = 0.9;
-/// Least margin of the best match over the second, in correlations times square root of seconds (`SoundOffset`
-/// documents their distribution).
+/// Least margin of the best over the second, in correlations times root of seconds (distribution: `SoundOffset`).
 const MIN_MARGIN: f64 = 0.15;
 
-/// Audio features of a shot.
 pub struct ShotVoice<'a> {
     pub voice: &'a Openness,
     pub fps: FrameRate,

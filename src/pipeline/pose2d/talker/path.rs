@@ -23,8 +23,7 @@ impl TalkerPath {
         self.0.last().map(|(_, person)| person)
     }
 
-    /// Index of the detection at frame `idx` that matches the path; `None` if none does, or the path does not cover
-    /// the frame.
+    /// Index of the detection at frame `idx` that matches the path; `None` if none does or the path lacks the frame.
     pub fn find(&self, idx: usize, found: impl Iterator<Item = PersonBox>) -> Option<usize> {
         let after = self.0.partition_point(|(at, _)| *at < idx);
         let neighbours = self.0[after.saturating_sub(1)..].iter().take(2);

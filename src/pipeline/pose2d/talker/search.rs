@@ -1,6 +1,5 @@
-//! Mouth tracks of all people in a shot: people are detected every few frames and associated by overlap; while two or
-//! more are visible, the face model measures each mouth in every frame. Only one value per frame and person and the
-//! detected boxes are kept.
+//! Mouth tracks of people in a shot: people are detected every few frames and associated by overlap; while several are
+//! visible, the face model measures each mouth per frame. Only a value per frame and person and the boxes are kept.
 
 use super::choice::{self, MouthOpening, ShotVoice};
 use super::path::{MIN_OVERLAP, TalkerPath};
@@ -33,7 +32,6 @@ pub struct TalkerSearch {
     several: bool,
 }
 
-/// Result for a shot.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ShotTalker {
     /// More than one person was visible.

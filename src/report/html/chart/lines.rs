@@ -45,8 +45,7 @@ impl LineChart {
         self.points().next().is_none()
     }
 
-    /// Ranges of the axes: first to last step including the marked one, and 0 (or the smallest value below it) to the
-    /// largest value.
+    /// Ranges of the axes: first to last step with the marked one, and 0 (or the smallest value below) to the largest.
     fn ranges(&self) -> [[f64; 2]; 2] {
         let levels = self.levels.iter().map(|level| level.value).filter(|value| value.is_finite());
         let range_of = |values: &mut dyn Iterator<Item = f64>, low: f64| {
@@ -115,8 +114,7 @@ impl LineChart {
     }
 }
 
-/// Curve of `values` on an axis from 0 to `max`; a script moves the dot from the step `marked` to the positions in
-/// `data-xs` and `data-ys`.
+/// Curve of `values` from 0 to `max`; a script moves the dot from step `marked` to those in `data-xs` and `data-ys`.
 pub fn curve(label: &str, values: &[f64], max: f64, marked: usize) -> Node {
     const WIDTH: f64 = 300.0;
     const HEIGHT: f64 = 56.0;

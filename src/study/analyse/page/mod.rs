@@ -1,5 +1,4 @@
-//! HTML page of an analysis: conclusions, charts, all statistics with their registration status, exclusions, the
-//! methods paragraph.
+//! Page of an analysis: conclusions, charts, statistics with registration status, exclusions, the methods paragraph.
 
 mod charts;
 mod page;

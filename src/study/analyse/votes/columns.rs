@@ -112,8 +112,7 @@ fn shown(header: &[String]) -> String {
 /// Rows with line numbers, or the reason why a row cannot be read.
 pub type NumberedRows = Vec<(u64, std::result::Result<RowCells, String>)>;
 
-/// Reads the rows of delimited text. Rows that are not UTF-8 or whose number of cells differs from the header are
-/// returned with the reason.
+/// Reads the rows of delimited text. Rows that are not UTF-8 or of another number of cells are returned with a reason.
 ///
 /// # Errors
 /// The text is UTF-16, binary or empty, required columns are missing, or there are too many rows.

@@ -1,5 +1,4 @@
-//! Reads a file of votes: CSV or JSON Lines, from this or another program. Unusable rows are reported with their line
-//! and the reason.
+//! Reads a file of votes: CSV or JSON Lines, of any program. Unusable rows are reported with line and reason.
 
 use super::columns::{ColumnNames, delimited_rows, json_rows};
 use super::row::{check, vote};

@@ -11,7 +11,6 @@ pub const MAX_ROWS: usize = 2_000_000;
 /// Default condition names for tables that do not name them.
 const NATURAL: &str = "natural";
 const GENERATED: &str = "generated";
-/// Maximum length of a name, characters.
 const MAX_NAME_CHARS: usize = 200;
 
 #[derive(Clone, Debug, PartialEq)]

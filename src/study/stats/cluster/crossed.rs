@@ -1,7 +1,6 @@
-//! Mean score with a standard error that accounts for sampling both participants and clips: crossed variance components
-//! and a t distribution with Satterthwaite's degrees of freedom. Assumes that participants and clips are independent
-//! samples, and that votes which share neither are independent. At least two of both are required; the t approximation
-//! needs about 20 of each.
+//! Mean score with a standard error that accounts for sampling participants and clips: crossed variance components and
+//! a t distribution with Satterthwaite's degrees of freedom. Assumes independent samples of participants and clips, and
+//! that votes sharing neither are independent. At least two of both are required; the t approximation needs about 20.
 
 use super::super::estimate::{StatisticsError, StudentEstimate, at_least};
 use super::votes::{CLIP, ClipVote, PAIR, PARTICIPANT, VoteGroups, scores};
@@ -15,8 +14,7 @@ pub fn crossed_estimate(votes: &[ClipVote]) -> Result<StudentEstimate, Statistic
     estimate(&[votes], &[1.0])
 }
 
-/// Difference of the means of `first` and `second`. Participants and clips may occur in both; their common effects then
-/// cancel.
+/// Difference of means of `first` and `second`. Participants and clips may occur in both; common effects then cancel.
 ///
 /// # Errors
 /// A cell has fewer than two participants or clips, a score is not finite, or the estimated variance is 0.
@@ -61,8 +59,7 @@ impl CrossedVariance {
     }
 
     /// Degrees of freedom of the total variance (Satterthwaite 1946) from mean squares of participants, clips and
-    /// residual with degrees of freedom `of`. The expected mean squares of participants and of clips both contain the
-    /// residual.
+    /// residual with degrees of freedom `of`. The expected ones of participants and clips contain the residual.
     fn degrees_of_freedom(&self, of: [f64; 3]) -> f64 {
         let [participants, clips, votes] = self.parts;
         let share = |part: f64, freedom: f64| part * part / freedom;

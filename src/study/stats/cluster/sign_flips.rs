@@ -19,8 +19,7 @@ pub(in super::super) fn rng_of_draw(seed: u64, draw: u64) -> ChaCha8Rng {
 }
 
 /// Two-sided p value of the hypothesis that the population mean over participants and clips is `expected`. The
-/// deviations from `expected` are flipped jointly for all votes of a participant, or of a clip if there are fewer
-/// clips.
+/// deviations from `expected` are flipped jointly for all votes of a participant, or of a clip if those are fewer.
 ///
 /// # Errors
 /// There are fewer than two participants or clips, `n_draws` is 0, or a score or `expected` is not finite.
@@ -50,8 +49,7 @@ pub fn sign_flip_p(votes: &[ClipVote], expected: f64, n_draws: usize, seed: u64)
 }
 
 /// Trials of a participant, or of a participant and a condition, for which the plan fixes how often the real film is on
-/// the left and randomises in which trials. If sides were drawn independently per trial, `BinomialCount::test` is the
-/// exact test.
+/// the left and randomises when. If sides were drawn independently per trial, `BinomialCount::test` is the exact test.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct SideBlock {
     trials: u64,
@@ -144,8 +142,7 @@ mod tests {
         block
     }
 
-    /// Two blocks of three trials with one and two real films on the left: compares with the enumeration of all nine
-    /// assignments.
+    /// Two blocks of three trials with one and two real films on the left: compared with all nine assignments.
     #[test]
     fn p_is_the_share_of_all_assignments() {
         let (first, second) = ([true, false, false], [true, true, false]);

@@ -8,7 +8,6 @@ use orator_base::math::rotation::Rotation;
 use orator_base::math::vec3::Vec3;
 use orator_formats::bvh::write::BvhClip;
 
-/// Name of the animation.
 pub const TAKE: &str = "Gesture";
 /// Maximum change of the angles of a static joint, degrees; a static joint has a single key.
 const STATIC_DEGREES: f64 = 1e-5;

@@ -10,7 +10,6 @@ const CREATOR: &str = concat!("orator ", env!("CARGO_PKG_VERSION"));
 /// Frame rates with a `TimeMode` of their own; other rates are given as a number of frames per second.
 const RATES: [(u32, i32); 8] = [(120, 1), (100, 2), (60, 3), (50, 4), (48, 5), (30, 6), (25, 10), (24, 11)];
 const CUSTOM_RATE: i32 = 14;
-/// Id of the document.
 const DOCUMENT: i64 = 1;
 
 /// Objects of a file and their connections.
@@ -24,7 +23,6 @@ pub struct FbxObjects {
 }
 
 impl FbxObjects {
-    /// Creates an empty list of objects.
     pub fn new() -> Self {
         Self { objects: Vec::new(), connections: Vec::new(), counts: Vec::new(), next: DOCUMENT + 1 }
     }
@@ -53,7 +51,6 @@ impl FbxObjects {
         self.connections.push(FbxNode::new("C", vec!["OO".into(), child.into(), parent.into()]));
     }
 
-    /// Connects an object to a property of another.
     pub fn connect_property(&mut self, child: i64, parent: i64, property: &str) {
         let values = vec!["OP".into(), child.into(), parent.into(), property.into()];
         self.connections.push(FbxNode::new("C", values));
@@ -121,7 +118,6 @@ pub fn ticks(fps: FrameRate, frame: usize) -> i64 {
     ((frame as i128 * den * TICKS + num / 2) / num) as i64
 }
 
-/// List of properties of an object.
 pub fn properties(list: impl IntoIterator<Item = FbxNode>) -> FbxNode {
     FbxNode::new("Properties70", vec![]).with(list)
 }

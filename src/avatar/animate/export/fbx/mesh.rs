@@ -6,7 +6,6 @@ use crate::animate::avatar::AvatarMesh;
 use orator_base::math::rotation::Rotation;
 use orator_base::math::vec3::Vec3;
 
-/// Joints to which a mesh is bound.
 #[derive(Clone, Copy, Debug)]
 pub struct BoundBones<'a> {
     /// Model id of each joint of the file.
@@ -17,7 +16,6 @@ pub struct BoundBones<'a> {
     pub rest: &'a [(Rotation, Vec3)],
 }
 
-/// Adds a part of the avatar; returns the id of its model.
 pub fn add(objects: &mut FbxObjects, part: &AvatarMesh, bones: BoundBones) -> i64 {
     let name = format!("{:?}", part.material);
     let at_origin = [("Lcl Translation", 0.0), ("Lcl Rotation", 0.0), ("Lcl Scaling", 1.0)];

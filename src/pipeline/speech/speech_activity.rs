@@ -1,16 +1,17 @@
 //! Speech activity: the speech model's probabilities per window are converted to speech segments by hysteresis, and
-//! these to the share of speech around each frame. Memory: one value per 32 ms window.
+//! these to the share of speech around each frame, or to the time ranges that are transcribed. Memory: one value per
+//! 32 ms window.
 
 use crate::sound;
 use anyhow::{Context, Result, ensure};
 use orator_base::types::time::FrameRate;
 use orator_onnx::speech::{SpeechModel, WINDOW};
+use std::ops::Range;
 use std::path::Path;
 
 /// Window around a frame in seconds: about a sentence with its pauses.
 const WINDOW_SECS: f64 = 4.0;
-/// Hysteresis thresholds: speech starts at the first probability and ends below the second (Silero's defaults, as are
-/// the next two).
+/// Hysteresis thresholds: speech starts at the first probability and ends below the second (Silero's, as the next two).
 const START_PROBABILITY: f32 = 0.5;
 const END_PROBABILITY: f32 = 0.35;
 /// Longest silence within speech, and shortest speech, in seconds.
@@ -26,6 +27,25 @@ const RATE: u32 = orator_base::types::sound::SAMPLE_RATE;
 pub fn shares(path: &Path, model: &mut SpeechModel, fps: FrameRate, n_frames: usize) -> Result<Vec<f32>> {
     let probabilities = if path.exists() { probabilities(path, model)? } else { Vec::new() };
     Ok(shares_of(&is_speech(&probabilities), fps, n_frames))
+}
+
+/// Ranges with speech in the audio file `path`, seconds; the last window may be longer than the audio.
+///
+/// # Errors
+/// Those of `shares`.
+pub fn ranges(path: &Path, model: &mut SpeechModel) -> Result<Vec<Range<f64>>> {
+    Ok(ranges_of(&is_speech(&probabilities(path, model)?)))
+}
+
+fn ranges_of(speech: &[bool]) -> Vec<Range<f64>> {
+    let secs = |window: usize| (window * WINDOW) as f64 / f64::from(RATE);
+    let mut start = 0;
+    let ranges = speech.chunk_by(|a, b| a == b).map(|run| {
+        let range = secs(start)..secs(start + run.len());
+        start += run.len();
+        (run[0], range)
+    });
+    ranges.filter_map(|(is_speech, range)| is_speech.then_some(range)).collect()
 }
 
 /// Speech probability of every window of 512 samples of a wav file, read as a stream.
@@ -44,8 +64,7 @@ pub fn probabilities(path: &Path, model: &mut SpeechModel) -> Result<Vec<f32>> {
     Ok(probabilities)
 }
 
-/// Windows with speech: from a probability of 0.5 until it stays below 0.35 for 0.1 s; segments shorter than 0.25 s
-/// are dropped.
+/// Windows with speech: from a probability of 0.5 until it stays below 0.35 for 0.1 s; those below 0.25 s are dropped.
 fn is_speech(probabilities: &[f32]) -> Vec<bool> {
     let windows = |secs: f64| (secs * f64::from(RATE) / WINDOW as f64).round() as usize;
     let (hangover, shortest) = (windows(HANGOVER_SECS), windows(MIN_SPEECH_SECS));
@@ -121,6 +140,14 @@ mod tests {
         // Claps are too short to be speech.
         assert_eq!(n_speech(&[(0.9, 4), (0.0, 10), (0.9, 6), (0.0, 10), (0.9, 3)]), 0);
         assert_eq!(is_speech(&[]), [false; 0]);
+    }
+
+    #[test]
+    fn ranges_are_in_seconds() {
+        // Windows of 32 ms; the claps are too short to be speech.
+        let speech = is_speech(&segments(&[(0.0, 100), (0.9, 100), (0.0, 50), (0.9, 4), (0.0, 50), (0.9, 25)]));
+        assert_eq!(ranges_of(&speech), [3.2..6.4, 9.728..10.528]);
+        assert!(ranges_of(&[false; 9]).is_empty() && ranges_of(&[]).is_empty());
     }
 
     #[test]

@@ -1,8 +1,8 @@
 //! Compares statistics with scipy, statsmodels and krippendorff (`fixtures/reference/study_stats.py`).
 
-use super::estimate::{StudentEstimate, holm};
-use super::proportion::{BinomialCount, Equivalence};
-use super::rank::{MeasurementScale, alpha, friedman, median_interval, signed_rank};
+use orator_study::stats::estimate::{StudentEstimate, holm};
+use orator_study::stats::proportion::{BinomialCount, Equivalence};
+use orator_study::stats::rank::{MeasurementScale, alpha, friedman, median_interval, signed_rank};
 use serde::de::DeserializeOwned;
 use serde_json::Value;
 
@@ -16,7 +16,6 @@ fn of<T: DeserializeOwned>(case: &Value, name: &str) -> T {
     serde_json::from_value(case[name].clone()).unwrap()
 }
 
-/// Asserts that the computed values are near those with these names in the case.
 fn assert_near<const N: usize>(case: &Value, names: [&str; N], found: [f64; N], relative: f64, min_scale: f64) {
     for (found, name) in found.into_iter().zip(names) {
         let expected: f64 = of(case, name);

@@ -1,16 +1,14 @@
 //! Simulation of workers that claim units in a folder that shows changes late, as a network file system does.
 
-use super::claims::{Claim, ClaimOptions, Claims, NextUnit, UnitEnd};
-use super::heartbeat::{BeatWatch, Heartbeat};
-use super::shared_folder::{DiskFolder, SharedFolder};
 use anyhow::Result;
+use orator_cluster::claims::{Claim, ClaimOptions, Claims, NextUnit, UnitEnd};
+use orator_cluster::heartbeat::{BeatWatch, DEAD_AFTER, Heartbeat};
+use orator_cluster::shared_folder::{DiskFolder, SharedFolder};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::cell::{Cell, RefCell};
 use std::collections::BTreeMap;
 use std::time::Duration;
-
-const DEAD_AFTER: Duration = Duration::from_secs(180);
 
 /// Files on the server, each with its versions and their times.
 type Files = BTreeMap<String, Vec<(Duration, Vec<u8>)>>;

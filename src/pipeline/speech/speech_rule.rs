@@ -7,6 +7,7 @@ use orator_dataset::config::{Settings, SpeechRule};
 use orator_dataset::info::ModelUsed;
 use orator_onnx::speech::SpeechModel;
 use orator_onnx::{ModelEntry, ModelError, ModelRequest, ModelRole, ModelState, ModelStore, Runtime};
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 /// Speech model of a configuration, located but not opened.
@@ -71,14 +72,25 @@ impl SpeechDetector {
         })
     }
 
+    /// Ranges with speech in the audio file `path`, seconds.
+    ///
+    /// # Errors
+    /// Those of `shares`.
+    pub fn ranges(&self, path: &Path) -> Result<Vec<Range<f64>>> {
+        speech_activity::ranges(path, &mut self.open()?)
+    }
+
+    fn open(&self) -> Result<SpeechModel> {
+        let runtime = Runtime::load(&self.library, &self.models)?;
+        Ok(SpeechModel::open(&runtime, &self.entry, &self.models)?)
+    }
+
     /// Share of speech around each frame, from the audio file `path`.
     ///
     /// # Errors
     /// A model that cannot be opened or fails; a file that cannot be read.
     pub fn shares(&self, path: &Path, fps: FrameRate, n_frames: usize) -> Result<Vec<f32>> {
-        let runtime = Runtime::load(&self.library, &self.models)?;
-        let mut model = SpeechModel::open(&runtime, &self.entry, &self.models)?;
-        speech_activity::shares(path, &mut model, fps, n_frames)
+        speech_activity::shares(path, &mut self.open()?, fps, n_frames)
     }
 
     /// Description of the model for `info.json`.

@@ -1,0 +1,15 @@
+//! Numbers, rotations, motion, sound features and texts of the base crate.
+
+mod gaussian;
+mod hand;
+mod loudness;
+mod mel;
+mod mfcc;
+mod openness;
+mod order;
+mod overall;
+mod resample;
+mod rotation;
+mod text;
+mod time;
+mod units;

@@ -1,0 +1,13 @@
+//! Layers and networks against plain arithmetic and finite differences.
+
+mod adversarial;
+mod conv2d;
+mod conv_norm;
+mod decoder;
+mod networks;
+mod params;
+mod predict;
+mod score_maps;
+mod spin_pool;
+mod transformer;
+mod weights;
