@@ -20,7 +20,7 @@ const DENIED: &[c_long] = calls![
     SYS_pidfd_send_signal SYS_tkill SYS_rt_sigqueueinfo SYS_rt_tgsigqueueinfo SYS_kcmp SYS_process_madvise
     SYS_process_mrelease SYS_migrate_pages SYS_move_pages
     // Networks and other sockets; io_uring submits calls that seccomp cannot filter.
-    SYS_socket SYS_socketpair SYS_connect SYS_bind SYS_listen SYS_accept SYS_accept4 SYS_sendto SYS_sendmsg SYS_sendmmsg
+    SYS_socket SYS_socketpair SYS_connect SYS_bind SYS_listen SYS_accept SYS_accept4 SYS_sendmsg SYS_sendmmsg
     SYS_io_uring_setup SYS_io_uring_enter SYS_io_uring_register
     // Memory and messages shared by name or number, and memory not counted by `RLIMIT_DATA`.
     SYS_shmget SYS_shmat SYS_shmctl SYS_semget SYS_semctl SYS_semop SYS_semtimedop SYS_msgget SYS_msgctl SYS_msgsnd
@@ -57,6 +57,10 @@ const DENIED_LEGACY: &[c_long] = &[];
 pub(crate) fn restrict() -> Result<(), Error> {
     let mut rules: BTreeMap<i64, Vec<SeccompRule>> =
         DENIED.iter().chain(DENIED_NEWER).chain(DENIED_LEGACY).map(|call| (*call, Vec::new())).collect();
+    // Messages with an address. Without one, `sendto` writes to a connected socket, such as the socket pair by which the
+    // handler of Ctrl-C and SIGTERM wakes its thread.
+    let address = SeccompCondition::new(4, SeccompCmpArgLen::Qword, SeccompCmpOp::Ne, 0)?;
+    rules.entry(libc::SYS_sendto).or_default().push(SeccompRule::new(vec![address])?);
     let mut deny = |call: c_long, argument: u8, op: SeccompCmpOp, value: u64| {
         let condition = SeccompCondition::new(argument, SeccompCmpArgLen::Dword, op, value)?;
         rules.entry(call).or_default().push(SeccompRule::new(vec![condition])?);

@@ -4,8 +4,11 @@
 use crate::fixtures::clips;
 use crate::fixtures::untrained::{generate, write_untrained_speaker};
 use orator_formats::wav;
+use rustix::process::{Pid, Signal, kill_process};
 use serde_json::Value;
 use std::path::Path;
+use std::process::{Command, Stdio};
+use std::time::Duration;
 
 /// A folder with two valid audio files, an invalid one, and a speaker.
 fn folder() -> tempfile::TempDir {
@@ -98,5 +101,29 @@ fn a_table_names_its_motions_and_speakers() {
         let output = generate(dir, args);
         let errors = String::from_utf8_lossy(&output.stderr).into_owned();
         assert!(output.status.code() == Some(1) && errors.contains(expected), "{args}: {errors}");
+    }
+}
+
+#[test]
+fn a_signal_ends_a_restricted_process() {
+    let folder = folder();
+    let dir = folder.path();
+    for n in 0..500 {
+        std::fs::copy(dir.join("talks/a.wav"), dir.join(format!("talks/{n}.wav"))).unwrap();
+    }
+    for (signal, code) in [(Signal::INT, 130), (Signal::TERM, 143)] {
+        let out = format!("made-{code}");
+        let mut command = Command::new(env!("CARGO_BIN_EXE_orator"));
+        command.args(["generate", "--checkpoint", "host.safetensors", "--audio-folder", "talks", "--out-folder", &out]);
+        let child = command.args(["--format", "npy"]).current_dir(dir).stderr(Stdio::piped()).spawn().unwrap();
+        let n_motions = || std::fs::read_dir(dir.join(&out)).map_or(0, Iterator::count);
+        while n_motions() == 0 {
+            std::thread::sleep(Duration::from_millis(5));
+        }
+        kill_process(Pid::from_child(&child), signal).unwrap();
+        let output = child.wait_with_output().unwrap();
+        let errors = String::from_utf8_lossy(&output.stderr);
+        assert!(output.status.code() == Some(code) && errors.contains("stopped; completed"), "{errors}");
+        assert!(n_motions() < 500);
     }
 }
