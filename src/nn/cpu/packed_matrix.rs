@@ -13,6 +13,8 @@ pub const COLUMNS: usize = 16;
 /// Matrix [depth, columns], stored as consecutive panels of columns.
 pub struct PackedMatrix<T> {
     data: Vec<T>,
+    /// Start of the first panel in `data`, on a cache line.
+    start: usize,
     /// First column and number of vectors of each panel.
     panels: Vec<(usize, usize)>,
     kernel: TileKernel<T>,
@@ -25,15 +27,16 @@ impl<T: Scalar> PackedMatrix<T> {
     pub fn new(depth: usize, n_columns: usize, element: impl Fn(usize, usize) -> T) -> Self {
         let (kernel, width) = (T::kernel(), n_columns.next_multiple_of(COLUMNS));
         let panels = panels(&kernel, width);
-        let mut data = vec![T::zero(); depth * width];
+        let mut data = vec![T::zero(); depth * width + LANES];
+        let start = aligned(data.as_ptr());
         for &(first, n_vectors) in &panels {
             let n = n_vectors * kernel.lanes;
             let inside = n.min(n_columns.saturating_sub(first));
-            for (row, to) in data[depth * first..][..depth * n].chunks_exact_mut(n).enumerate() {
+            for (row, to) in data[start + depth * first..][..depth * n].chunks_exact_mut(n).enumerate() {
                 to[..inside].iter_mut().enumerate().for_each(|(i, to)| *to = element(row, first + i));
             }
         }
-        Self { data, panels, kernel, depth, width }
+        Self { data, start, panels, kernel, depth, width }
     }
 
     /// Number of columns, including the padding.
@@ -45,7 +48,7 @@ impl<T: Scalar> PackedMatrix<T> {
     pub fn get(&self, row: usize, column: usize) -> T {
         let panel = self.panels.partition_point(|(first, _)| *first <= column).saturating_sub(1);
         let (first, n_vectors) = self.panels[panel];
-        self.data[self.depth * first + row * n_vectors * self.kernel.lanes + column - first]
+        self.data[self.start + self.depth * first + row * n_vectors * self.kernel.lanes + column - first]
     }
 
     /// Adds the products of `n_rows` rows of `left` with the matrix to the rows of `to`, which have at least `width`
@@ -66,7 +69,7 @@ impl<T: Scalar> PackedMatrix<T> {
         let none = TileSteps { n: 1, left: 0, right: 0 };
         for &(first, n_vectors) in &self.panels {
             let columns = n_vectors * self.kernel.lanes;
-            let right = self.data[self.depth * first..].as_ptr();
+            let right = self.data[self.start + self.depth * first..].as_ptr();
             for row in (0..n_rows).step_by(MAX_ROWS) {
                 let n = MAX_ROWS.min(n_rows - row);
                 let to = std::array::from_fn(|i| to.wrapping_add((row + i.min(n - 1)) * to_stride + first));

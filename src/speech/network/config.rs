@@ -68,7 +68,8 @@ impl WhisperConfig {
     pub(super) fn read(dir: &Path, weights: &WeightFile) -> Result<Self> {
         let sizes = |name: &str, n: usize| {
             let shape = weights.shape(name)?;
-            ensure!(shape.len() == n && !shape.contains(&0), "{name} has shape {shape:?}, expected {n} axes");
+            let has_axes = shape.len() == n && !shape.contains(&0);
+            ensure!(has_axes, "{}: {name} has shape {shape:?}, expected {n} axes", weights.path().display());
             Ok(shape)
         };
         let embedding = sizes("decoder/embeddings/weight", 2)?;
@@ -83,11 +84,15 @@ impl WhisperConfig {
             let heads: HeadCount = json(&dir.join("config.json"))?;
             (heads.encoder_attention_heads, heads.decoder_attention_heads)
         };
-        ensure!(n_mels == N_MELS, "the network has {n_mels} mel bands; supported are networks with {N_MELS}");
+        ensure!(
+            n_mels == N_MELS,
+            "{}: the network has {n_mels} mel bands; supported are networks with {N_MELS}",
+            weights.path().display()
+        );
         ensure!(
             (1..=width).contains(&n_heads) && encoder_heads == n_heads && width.is_multiple_of(n_heads * COLUMNS),
-            "{}: {n_heads} heads do not fit a network of width {width}: expected heads of a multiple of {COLUMNS} values",
-            if is_ctranslate2 { "model.bin" } else { "config.json" }
+            "{}: {n_heads} heads do not fit a network of width {width}, expected heads of a multiple of {COLUMNS} values",
+            weights.path().display()
         );
         let n_layers =
             |part: &str| (0..).take_while(|i| weights.has(&format!("{part}/layer_{i}/ffn/linear_0/weight"))).count();

@@ -142,7 +142,8 @@ impl FeedForward {
         let hidden = weights.shape(&format!("{first}/weight"))?.first().copied().unwrap_or_default();
         ensure!(
             hidden > 0 && hidden.is_multiple_of(COLUMNS),
-            "{first}/weight has {hidden} outputs, expected a multiple of {COLUMNS}"
+            "{}: {first}/weight has {hidden} outputs, expected a multiple of {COLUMNS}",
+            weights.path().display()
         );
         Ok(Self {
             norm: LayerNorm::read(weights, &format!("{name}/layer_norm"), width)?,

@@ -92,6 +92,10 @@ impl WeightFile {
         Ok(Self { path, file, is_ctranslate2, variables })
     }
 
+    pub(super) fn path(&self) -> &Path {
+        &self.path
+    }
+
     pub(super) fn is_ctranslate2(&self) -> bool {
         self.is_ctranslate2
     }
