@@ -20,8 +20,8 @@ use std::time::Instant;
 const SENTENCES: &str = include_str!("../../../fixtures/reference/spoken_sentences.txt");
 const VOICES: [&str; 4] = ["en-us", "en-us+f2", "en-gb+m3", "en-gb-x-rp+f4"];
 const MODEL: &str = "whisper-tiny-en";
-const GERMAN: &str = "Guten Abend. Heute m\u{f6}chte ich \u{fc}ber das Wetter sprechen. In den Bergen liegt noch Schnee, \
-    aber im Tal bl\u{fc}hen schon die B\u{e4}ume. Morgen wird es regnen, und am Sonntag scheint wieder die Sonne.";
+const GERMAN: &str = "Guten Abend. Heute sprechen wir von dem Wetter. In den Bergen liegt noch Schnee, aber im Tal ist \
+    es schon warm. Morgen kommt der Regen, und am Sonntag scheint wieder die Sonne.";
 const RATE: u32 = 16_000;
 
 fn is_long() -> bool {
