@@ -9,7 +9,7 @@ pub struct Tokenizer {
     /// UTF-8 bytes of each text token, by its number; a character may be divided between tokens.
     bytes: Vec<Vec<u8>>,
     sot: u32,
-    sot_prev: u32,
+    start_of_previous: u32,
     eot: u32,
     translate: u32,
     transcribe: u32,
@@ -37,7 +37,7 @@ impl Tokenizer {
             id.with_context(|| format!("expected the special token {}", names.join(" or ")))
         };
         let eot = special(&["<|endoftext|>"])?;
-        let [sot, sot_prev] = [special(&["<|startoftranscript|>"])?, special(&["<|startofprev|>"])?];
+        let [sot, start_of_previous] = [special(&["<|startoftranscript|>"])?, special(&["<|startofprev|>"])?];
         let [translate, transcribe] = [special(&["<|translate|>"])?, special(&["<|transcribe|>"])?];
         let no_speech = special(&["<|nospeech|>", "<|nocaptions|>"])?;
         let no_timestamps = special(&["<|notimestamps|>"])?;
@@ -50,7 +50,7 @@ impl Tokenizer {
                 *bytes = text.chars().flat_map(token_bytes).collect();
             }
         }
-        Ok(Self { encoder, bytes, sot, sot_prev, eot, translate, transcribe, no_speech, no_timestamps })
+        Ok(Self { encoder, bytes, sot, start_of_previous, eot, translate, transcribe, no_speech, no_timestamps })
     }
 
     /// Tokens of a text, without special tokens.
@@ -90,8 +90,8 @@ impl Tokenizer {
     }
 
     /// Start of the text that precedes the window.
-    pub fn sot_prev(&self) -> u32 {
-        self.sot_prev
+    pub fn start_of_previous(&self) -> u32 {
+        self.start_of_previous
     }
 
     /// End of the text; all lower numbers are text.

@@ -100,15 +100,17 @@ mod tests {
     fn unaligned_words_are_interpolated_between_their_neighbours() {
         let at =
             |start_secs, end_secs| Some(RecognisedWord { word: String::new(), start_secs, end_secs, probability: 0.5 });
-        let found = [None, at(1.0, 1.5), None, None, at(2.5, 3.1), None];
-        let text = AlignedText { times: Vec::new(), words: ["a", "b", "c", "-", "e", "f"].map(str::to_owned).into() };
+        let found = [at(0.0, 0.2), at(0.2, 0.4), None, at(1.0, 1.5), None, None, at(2.5, 3.1), None];
+        let words = ["a", "b", "c", "d", "e", "-", "f", "g"].map(str::to_owned).into();
+        let text = AlignedText { times: Vec::new(), words };
         let (words, unaligned) = text.with_times(&found, 3.0).unwrap();
         let times: Vec<_> = words.iter().map(|word| (word.start_secs, word.end_secs)).collect();
-        assert_eq!(times, [(0.0, 1.0), (1.0, 1.5), (1.5, 2.0), (2.0, 2.5), (2.5, 3.0), (3.0, 3.0)]);
-        assert_eq!(unaligned, [0, 2, 5]);
+        assert_eq!(times[..4], [(0.0, 0.2), (0.2, 0.4), (0.4, 1.0), (1.0, 1.5)]);
+        assert_eq!(times[4..], [(1.5, 2.0), (2.0, 2.5), (2.5, 3.0), (3.0, 3.0)]);
+        assert_eq!(unaligned, [2, 4, 7]);
         assert!(unaligned.iter().all(|&n| words[n].source == WordSource::Interpolated));
-        assert_eq!((words[1].source, words[1].confidence), (WordSource::Aligned, Some(0.5)));
+        assert_eq!((words[3].source, words[3].confidence), (WordSource::Aligned, Some(0.5)));
         let error = text.with_times(&[None, at(1.0, 1.5)], 3.0).unwrap_err().to_string();
-        assert!(error.starts_with("only 1 of 5 words match"), "{error}");
+        assert!(error.starts_with("only 1 of 7 words match"), "{error}");
     }
 }

@@ -13,13 +13,14 @@ use orator_base::stage::workdir;
 use orator_base::text::{counted, length, percent};
 use orator_base::types::sound::SAMPLE_RATE;
 use orator_dataset::config::Settings;
-use orator_formats::transcript::{SpokenSegment, TranscriptFormat, Word, WordSource};
+use orator_formats::transcript::{SpokenSegment, TranscriptFormat, Word};
 use orator_formats::wav::WavRanges;
 use orator_media::ffmpeg::origin;
 use orator_onnx::{AUTO, ModelStore};
 use orator_pipeline::sound;
 use orator_pipeline::speech::speech_rule::SpeechDetector;
-use orator_speech::{Recognised, RecognisedWord, Recogniser, RecogniserOptions};
+use orator_pipeline::transcribe::{spoken, steps_of};
+use orator_speech::{Recognised, Recogniser, RecogniserOptions};
 use serde_json::{Value, json};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -35,7 +36,7 @@ const SHOWN: usize = 8;
 /// them), .srt, .vtt (also with word times) or .TextGrid (a tier of words).
 ///
 /// With --text the words are given, and their times are found. A word that does not match the audio is marked in .json:
-/// `source` is `interpolated`, `score` is 0. A text is rejected if less than a quarter of its words match.
+/// `source` is `interpolated`, `score` is 0. A text is rejected unless more than half of its words match.
 ///
 /// Exit code 2: one of several files failed.
 #[derive(clap::Args)]
@@ -244,36 +245,28 @@ impl Transcriber<'_> {
         let secs = n_samples as f64 / f64::from(SAMPLE_RATE);
         let label = input.file_name().unwrap_or_default().to_string_lossy().into_owned();
         let task = self.ui.begin(&label, secs.ceil() as u64);
-        let mut n_reported = 0;
-        let mut progress = |secs: f64| {
-            let steps = (secs as u64).saturating_sub(n_reported);
-            task.advance(steps);
-            n_reported += steps;
-        };
+        let mut progress = steps_of(task);
         let mut source = |range: Range<usize>| ranges.read(range);
         let language = Some(self.settings.transcribe.language.as_str()).filter(|code| !code.is_empty());
-        let (mut segments, language, unaligned) = match self.text {
+        let (segments, language, unaligned) = match self.text {
             None => {
                 let options = RecogniserOptions { language: language.map(str::to_owned), beam: self.beam };
                 let found = self.recogniser.recognise(&mut source, n_samples, &speech, &options, &mut progress)?;
                 let Recognised { language, language_probability, segments } = found;
-                let segments = segments.into_iter().map(|segment| SpokenSegment {
-                    start_secs: segment.start_secs,
-                    end_secs: segment.end_secs,
-                    text: segment.text.trim().to_owned(),
-                    words: segment.words.into_iter().map(recognised).collect(),
-                });
-                (segments.collect::<Vec<_>>(), (language, language_probability), Vec::new())
+                (spoken(segments, zero_secs), (language, language_probability), Vec::new())
             }
             Some(text) => {
                 let (words, within) = (text.words(), text.within(zero_secs));
                 let found = self.recogniser.align(&mut source, n_samples, words, &within, language, &mut progress)?;
-                let (words, unaligned) = text.with_times(&found, secs)?;
+                let (mut words, unaligned) = text.with_times(&found, secs)?;
+                for word in &mut words {
+                    word.start_secs += zero_secs;
+                    word.end_secs += zero_secs;
+                }
                 (sentences(&words), (language.unwrap_or_default().to_owned(), 1.0), unaligned)
             }
         };
-        drop(task);
-        shift(&mut segments, zero_secs);
+        drop(progress);
         let words: Vec<&Word> = segments.iter().flat_map(|segment| &segment.words).collect();
         workdir::write_file(out, format.write(&segments, &language.0, zero_secs + secs).as_bytes())?;
         Ok(WrittenTranscript {
@@ -284,23 +277,6 @@ impl Transcriber<'_> {
             speech_secs: speech.iter().map(|range| range.end - range.start).fold(0.0, |sum, secs| sum + secs),
             times_real_time: secs / started.elapsed().as_secs_f64().max(1e-6),
         })
-    }
-}
-
-fn recognised(word: RecognisedWord) -> Word {
-    let RecognisedWord { word, start_secs, end_secs, probability } = word;
-    Word { word, start_secs, end_secs, source: WordSource::Given, confidence: Some(f64::from(probability)) }
-}
-
-/// Moves times from the clock of the audio to that of the file.
-fn shift(segments: &mut [SpokenSegment], secs: f64) {
-    for segment in segments {
-        segment.start_secs += secs;
-        segment.end_secs += secs;
-        for word in &mut segment.words {
-            word.start_secs += secs;
-            word.end_secs += secs;
-        }
     }
 }
 

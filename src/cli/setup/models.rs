@@ -14,7 +14,7 @@ use orator_pipeline::transcribe::TranscribeStage;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 
-/// List, fetch, add and check models: ONNX, and Whisper for `orator transcribe`.
+/// List, fetch, add and check models: ONNX, and Whisper for speech.
 #[derive(clap::Args)]
 pub struct Args {
     #[command(subcommand)]

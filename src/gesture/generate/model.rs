@@ -290,6 +290,7 @@ mod tests {
             ("/speaker/normalisation/std/3", 0),
         ] {
             let mut facts = contents.facts.clone();
+            facts["speaker"]["network"]["vocabulary"] = 0.into();
             *facts.pointer_mut(pointer).unwrap() = value.into();
             let wrong = Contents { facts, tensors: contents.tensors.clone() };
             assert!(build(&wrong).is_err(), "{pointer} {value}");

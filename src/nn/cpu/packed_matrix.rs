@@ -9,6 +9,8 @@ use std::ops::Range;
 
 /// Columns are padded with zeros to a multiple of this number.
 pub const COLUMNS: usize = 16;
+/// Maximum number of columns of a tile.
+const MAX_COLUMNS: usize = 64;
 
 /// Matrix [depth, columns], stored as consecutive panels of columns.
 pub struct PackedMatrix<T> {
@@ -20,11 +22,18 @@ pub struct PackedMatrix<T> {
     kernel: TileKernel<T>,
     depth: usize,
     width: usize,
+    /// Number of consecutive products that are summed on their own.
+    block: usize,
 }
 
 impl<T: Scalar> PackedMatrix<T> {
     /// Packs a matrix; `element(row, column)` returns its elements.
     pub fn new(depth: usize, n_columns: usize, element: impl Fn(usize, usize) -> T) -> Self {
+        Self::with_block(depth, n_columns, depth.max(1), element)
+    }
+
+    /// Packs a matrix whose products are summed in blocks of `block`, at least 1, which rounds less for large depths.
+    pub fn with_block(depth: usize, n_columns: usize, block: usize, element: impl Fn(usize, usize) -> T) -> Self {
         let (kernel, width) = (T::kernel(), n_columns.next_multiple_of(COLUMNS));
         let panels = panels(&kernel, width);
         let mut data = vec![T::zero(); depth * width + LANES];
@@ -36,7 +45,7 @@ impl<T: Scalar> PackedMatrix<T> {
                 to[..inside].iter_mut().enumerate().for_each(|(i, to)| *to = element(row, first + i));
             }
         }
-        Self { data, start, panels, kernel, depth, width }
+        Self { data, start, panels, kernel, depth, width, block }
     }
 
     /// Number of columns, including the padding.
@@ -67,22 +76,36 @@ impl<T: Scalar> PackedMatrix<T> {
         );
         let (left, to) = (left.as_ptr(), to.as_mut_ptr());
         let none = TileSteps { n: 1, left: 0, right: 0 };
+        let zeros = [T::zero(); MAX_COLUMNS];
+        let mut sums = [zeros; MAX_ROWS];
         for &(first, n_vectors) in &self.panels {
             let columns = n_vectors * self.kernel.lanes;
-            let right = self.data[self.start + self.depth * first..].as_ptr();
+            let panel = &self.data[self.start + self.depth * first..][..self.depth * columns];
             for row in (0..n_rows).step_by(MAX_ROWS) {
                 let n = MAX_ROWS.min(n_rows - row);
                 let to = std::array::from_fn(|i| to.wrapping_add((row + i.min(n - 1)) * to_stride + first));
-                let job = TileJob {
-                    rows: std::array::from_fn(|i| left.wrapping_add((row + i.min(n - 1)) * left_stride)),
-                    from: to.map(<*mut T>::cast_const),
-                    to,
-                    right,
-                    outer: none,
-                    inner: TileSteps { n: self.depth, left: 1, right: columns },
-                };
-                // SAFETY: the assert bounds the addresses of `left` and `to`; the panel holds `depth` rows of its columns.
-                unsafe { (self.kernel.run)(&job, n, n_vectors) };
+                for (i, right) in panel.chunks(self.block * columns).enumerate() {
+                    let from_step = |row: usize| left.wrapping_add(row * left_stride + i * self.block);
+                    let mut job = TileJob {
+                        rows: std::array::from_fn(|i| from_step(row + i.min(n - 1))),
+                        from: to.map(<*mut T>::cast_const),
+                        to,
+                        right: right.as_ptr(),
+                        outer: none,
+                        inner: TileSteps { n: right.len() / columns, left: 1, right: columns },
+                    };
+                    if i > 0 {
+                        job.from = [zeros.as_ptr(); MAX_ROWS];
+                        job.to = sums.each_mut().map(|row| row.as_mut_ptr());
+                    }
+                    // SAFETY: the assert bounds the addresses of `left` and `to`; the block holds its steps' columns.
+                    unsafe { (self.kernel.run)(&job, n, n_vectors) };
+                    for (to, sums) in to.iter().zip(&sums).take(if i > 0 { n } else { 0 }) {
+                        // SAFETY: as above.
+                        let to = unsafe { std::slice::from_raw_parts_mut(*to, columns) };
+                        to.iter_mut().zip(sums).for_each(|(to, sum)| *to += *sum);
+                    }
+                }
             }
         }
     }
@@ -227,7 +250,7 @@ impl WeightPanel {
                     (kernel.run)(&job, tile.len(), self.n_vectors);
                     continue;
                 }
-                let mut local = [[T::zero(); 64]; MAX_ROWS];
+                let mut local = [[T::zero(); MAX_COLUMNS]; MAX_ROWS];
                 for (local, from) in local.iter_mut().zip(&job.from).take(tile.len()) {
                     local.as_mut_ptr().copy_from_nonoverlapping(*from, self.n);
                 }
@@ -258,7 +281,7 @@ mod tests {
     fn products_are_added() {
         let element = |row: usize, column: usize| (row * 100 + column) as f64;
         for (depth, n_columns, n_rows) in [(5, 150, 13), (1, 3, 1), (7, 16, 6), (3, 65, 2)] {
-            let matrix = PackedMatrix::new(depth, n_columns, element);
+            let matrix = PackedMatrix::with_block(depth, n_columns, 3, element);
             let (left_stride, to_stride) = (depth + 2, matrix.width() + 3);
             let left: Vec<f64> = (0..n_rows * left_stride).map(|i| (i % 7) as f64).collect();
             let mut to = vec![1.0; n_rows * to_stride];

@@ -2,4 +2,4 @@
 
 pub mod stage;
 
-pub use stage::TranscribeStage;
+pub use stage::{TranscribeStage, spoken, steps_of};

@@ -5,7 +5,7 @@ use crate::sound;
 use crate::speech::speech_rule::SpeechDetector;
 use anyhow::{Context, Result};
 use orator_base::stage::artifacts::{Artifact, StageName};
-use orator_base::stage::progress::Progress;
+use orator_base::stage::progress::{Progress, Task};
 use orator_base::stage::{Input, Report, Stage, Unit};
 use orator_base::text::{counted, length};
 use orator_base::types::sound::SAMPLE_RATE;
@@ -88,12 +88,7 @@ impl TranscribeStage {
             return Ok(TranscribedAudio { found: None, speech_secs });
         }
         let task = progress.begin("", n_samples.div_ceil(SAMPLE_RATE as usize) as u64);
-        let mut n_reported = 0;
-        let mut advance = |secs: f64| {
-            let n_steps = (secs.max(0.0) as u64).saturating_sub(n_reported);
-            task.advance(n_steps);
-            n_reported += n_steps;
-        };
+        let mut advance = steps_of(task);
         let mut source = |samples: Range<usize>| wav.read(samples);
         let language = Some(self.settings.language.clone()).filter(|code| !code.is_empty());
         let options = RecogniserOptions { language, beam: BEAM };
@@ -155,8 +150,18 @@ impl Stage for TranscribeStage {
     }
 }
 
-/// Segments of a transcript; `start_secs` is the start of the audio in the video file.
-fn spoken(found: Vec<RecognisedSegment>, start_secs: f64) -> Vec<SpokenSegment> {
+/// Reports the seconds done so far as steps of a task, one a second.
+pub fn steps_of<'a>(task: Box<dyn Task + 'a>) -> impl FnMut(f64) + 'a {
+    let mut n_reported = 0;
+    move |secs: f64| {
+        let n_steps = (secs.max(0.0) as u64).saturating_sub(n_reported);
+        task.advance(n_steps);
+        n_reported += n_steps;
+    }
+}
+
+/// Segments of a transcript; `start_secs` is the start of the audio in the file, seconds.
+pub fn spoken(found: Vec<RecognisedSegment>, start_secs: f64) -> Vec<SpokenSegment> {
     let word = |word: RecognisedWord| Word {
         word: word.word,
         start_secs: start_secs + word.start_secs,

@@ -73,7 +73,7 @@ impl WindowDecoder<'_> {
         let n_prompt = previous.len().min((self.max_tokens / 2).saturating_sub(1));
         let mut prompt: Vec<u32> = previous[previous.len() - n_prompt..].to_vec();
         if !prompt.is_empty() {
-            prompt.insert(0, self.tokenizer.sot_prev());
+            prompt.insert(0, self.tokenizer.start_of_previous());
         }
         let (sot, request) = self.request.split_at(self.request.len().min(1));
         prompt.extend(sot);
@@ -187,7 +187,10 @@ mod tests {
         let previous: Vec<u32> = (0..500).map(|n| n % 250).collect();
         let (_, prompts) = decode(&[" a"], 0.0, &previous);
         assert_eq!(prompts[0].len(), 225);
-        assert_eq!((prompts[0][0], prompts[0][223], prompts[0][224]), (tokenizer.sot_prev(), 249, tokenizer.sot()));
+        assert_eq!(
+            (prompts[0][0], prompts[0][223], prompts[0][224]),
+            (tokenizer.start_of_previous(), 249, tokenizer.sot())
+        );
         assert_eq!(prompts[1][225..], [tokenizer.transcribe()]);
     }
 }

@@ -12,6 +12,8 @@ pub(super) const CHUNK: usize = 96;
 const SCORE_ROWS: usize = 48;
 /// Number of weights of a column block, which one thread multiplies.
 const BLOCK_WEIGHTS: usize = 256 * 1024;
+/// Number of products that are summed on their own: single sums of 2048 products would round too much.
+const SUM_BLOCK: usize = 128;
 
 pub(super) struct LayerNorm {
     gamma: Vec<f32>,
@@ -48,7 +50,7 @@ impl Linear {
         let block_columns = (BLOCK_WEIGHTS / n_in).max(1).next_multiple_of(4 * COLUMNS);
         let block = |first: usize| {
             let n = block_columns.min(n_out - first);
-            PackedMatrix::new(n_in, n, |row, column| weight[(first + column) * n_in + row])
+            PackedMatrix::with_block(n_in, n, SUM_BLOCK, |row, column| weight[(first + column) * n_in + row])
         };
         let blocks = (0..n_out).step_by(block_columns).map(block).collect();
         Self { blocks, block_columns, bias, n_in }
@@ -177,7 +179,7 @@ impl PackedHead {
     pub(super) fn new(rows: &[f32], stride: usize, key: usize, value: usize, dim: usize) -> Self {
         let n = rows.len() / stride;
         let keys = PackedMatrix::new(dim, n, |k, position| rows[position * stride + key + k]);
-        let values = PackedMatrix::new(n, dim, |position, k| rows[position * stride + value + k]);
+        let values = PackedMatrix::with_block(n, dim, SUM_BLOCK, |position, k| rows[position * stride + value + k]);
         Self { keys, values, n }
     }
 

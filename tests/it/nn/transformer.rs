@@ -1,6 +1,6 @@
 //! Layer norm, GELU and attention against their definitions.
 
-use orator_nn::cpu::transformer::{attend_heads, gelu, layer_norm};
+use orator_nn::cpu::transformer::{attend_heads, gelu, layer_norm, softmax};
 
 fn pattern(n: usize, rate: f64) -> Vec<f32> {
     (0..n).map(|i| (3.0 * (i as f64 * rate).sin()) as f32).collect()
@@ -41,4 +41,15 @@ fn attention_equals_its_definition_for_every_head() {
         let expected = sum / weights.iter().sum::<f64>();
         assert!((f64::from(*value) - expected).abs() < 1e-4, "{value}, expected {expected}");
     }
+}
+
+#[test]
+fn no_result_is_denormal() {
+    let falling: Vec<f32> = (0..160).map(|i| -(i as f32)).collect();
+    let (mut weights, mut values) = (falling.clone(), falling);
+    softmax(&mut weights, 160, 160);
+    gelu(&mut values);
+    let is_fast = |value: &f32| *value == 0.0 || value.is_normal();
+    assert!(weights.iter().chain(&values).all(is_fast), "{weights:?} {values:?}");
+    assert!((weights.iter().sum::<f32>() - 1.0).abs() < 1e-6 && weights[40] > 0.0);
 }

@@ -16,9 +16,9 @@ use std::path::Path;
 const FPS: FrameRate = FrameRate::new(15, 1);
 const SECS: f64 = 7.0;
 
-/// Prints and returns the area under the ROC curve of own voices against other voices, and the share of shifts that are
-/// estimated within one frame.
-fn measure(clips: &[TalkingClip]) -> [f64; 2] {
+/// Prints and returns the area under the ROC curve of own voices against other voices and the share of shifts that are
+/// estimated within one frame, then the shares of own and of other voices that the default of `min_own_voice` rejects.
+fn measure(clips: &[TalkingClip]) -> ([f64; 2], [f64; 2]) {
     let (mut own, mut other, mut errors) = (Vec::new(), Vec::new(), Vec::new());
     let mut of_frames = [Vec::new(), Vec::new()];
     for (index, clip) in clips.iter().enumerate() {
@@ -43,8 +43,7 @@ fn measure(clips: &[TalkingClip]) -> [f64; 2] {
         other.len(),
         errors.len()
     );
-    rejected("rendered persons", &of_frames[0], &of_frames[1]);
-    [area, share]
+    ([area, share], rejected("rendered persons", &of_frames[0], &of_frames[1]))
 }
 
 #[test]
@@ -81,7 +80,7 @@ fn the_speaking_person_is_tracked_and_voices_are_distinguished() {
         (middle, clip)
     });
     assert!(clips[0].0 + 150.0 < clips[1].0, "tracked at {} and {} px", clips[0].0, clips[1].0);
-    let [area, found] = measure(&clips.map(|(_, clip)| clip));
+    let ([area, found], _) = measure(&clips.map(|(_, clip)| clip));
     assert!(area > 0.9 && found == 1.0, "{area} {found}");
 }
 
@@ -97,6 +96,6 @@ fn voices_of_a_rendered_set_are_distinguished() {
             TalkingClip::read(&path, &audio, FPS.per_sec())
         })
         .collect();
-    let [area, found] = measure(&clips);
-    assert!(area > 0.85 && found > 0.95, "{area} {found}");
+    let (_, [own, others]) = measure(&clips);
+    assert!(own <= 0.1 && others >= 0.5, "{own} {others}");
 }

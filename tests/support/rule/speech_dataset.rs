@@ -20,6 +20,8 @@ use std::path::{Path, PathBuf};
 
 /// Version of the rule, stored under `rule` in the JSON of a sample.
 pub const RULE_OF_SPEECH: u32 = 3;
+/// Key, under `rule`, of the start and the target of the spoken words with gestures, if the words were recognised.
+const SPOKEN: &str = "spoken";
 const NAME: &str = "spoken";
 const FPS: FrameRate = FrameRate::new(15, 1);
 const SHARD_BYTES: u64 = 256 << 20;
@@ -29,9 +31,14 @@ pub fn is_by_speech(sample: &Sample) -> bool {
     sample.meta.pointer("/rule/rule").and_then(serde_json::Value::as_u64) == Some(u64::from(RULE_OF_SPEECH))
 }
 
-/// Events of a sample's speech, from its audio and words.
+/// Events of a sample's speech, from its audio and words; the spoken words if those of the sample were recognised.
 pub fn events(sample: &Sample) -> SpeechEvents {
-    SpeechEvents::detect(&sample.sound, sample.words.as_deref().unwrap_or_default())
+    let mut events = SpeechEvents::detect(&sample.sound, sample.words.as_deref().unwrap_or_default());
+    let spoken = sample.meta.pointer(&format!("/rule/{SPOKEN}")).cloned();
+    if let Some(Ok(spoken)) = spoken.map(serde_json::from_value) {
+        events.words = spoken;
+    }
+    events
 }
 
 /// Predictable part of a sample's motion: the rule without variation, for its audio and words.
@@ -39,7 +46,8 @@ pub fn predictable(sample: &Sample) -> orator_base::types::pose3d::Motion {
     SpeechGestures::new(&events(sample)).motion(sample.n_frames(), sample.motion.fps)
 }
 
-/// Speech in a folder: `NAME.wav` with `NAME.tsv`. The split is the one that the name begins with, else train.
+/// Speech in a folder: `NAME.wav` with `NAME.tsv`, and `NAME.json` if its words were recognised. The split is the one
+/// that the name begins with, else train.
 ///
 /// # Errors
 /// A folder without speech, or audio without words, with the name of the file.
@@ -90,17 +98,22 @@ fn spoken(file: &Path, seed: u64) -> Result<SpokenVideo> {
     ensure!(n_frames > 0, "{} is too short: expected at least one frame", file.display());
     sound.samples.truncate(sample_at(FPS, SAMPLE_RATE, n_frames));
     let transcript = Transcript::read(&file.with_extension("tsv"))?;
-    let words: Vec<_> = transcript.words.into_iter().filter(|word| word.end_secs <= sound.secs()).collect();
+    let mut words: Vec<_> = transcript.words.into_iter().filter(|word| word.end_secs <= sound.secs()).collect();
     let hash = blake3::hash(format!("{RULE_OF_SPEECH} {seed} {name}").as_bytes());
     let events = SpeechEvents::detect(&sound, &words);
     let gestures = SpeechGestures::varied(&events, &mut ChaCha8Rng::from_seed(*hash.as_bytes()));
+    let (recognised, mut rule) = (file.with_extension("json"), json!({ "rule": RULE_OF_SPEECH, "seed": seed }));
+    if recognised.is_file() {
+        words = Transcript::read(&recognised)?.words;
+        rule[SPOKEN] = json!(events.words);
+    }
     Ok(SpokenVideo {
         content: hash.to_hex().to_string(),
         motion: gestures.motion(n_frames, FPS),
         posture: Some(gestures.posture(n_frames, FPS)),
         sound,
         words: Some(words),
-        meta: json!({ "rule": { "rule": RULE_OF_SPEECH, "seed": seed } }),
+        meta: json!({ "rule": rule }),
         name,
     })
 }

@@ -101,9 +101,9 @@ enum DemoVerb {
         /// Variant of the rule: other vowels move the hands, after other delays; 0 is the original rule.
         #[arg(long, value_name = "N", default_value_t = 0)]
         habits: u64,
-        /// Folder of recorded speech to use instead of synthetic speech: NAME.wav with NAME.tsv (start, end, word),
-        /// in the split that NAME begins with. The gestures follow the second rule (version 3), based on loud
-        /// syllables, phrases and 40 words.
+        /// Folder of recorded speech to use instead of synthetic speech: NAME.wav with NAME.tsv (start, end, word) and,
+        /// if its words were recognised, NAME.json, in the split that NAME begins with. The gestures follow the second rule
+        /// (version 3), based on loud syllables, phrases and 40 words.
         #[arg(long, value_name = "DIR", conflicts_with_all = ["hours", "words", "habits"])]
         speech: Option<PathBuf>,
         /// Random seed of the speech and of the variation of the speaker.

@@ -79,6 +79,7 @@ fn values(row: &ConditionRow) -> [f64; COLUMNS.len()] {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::evaluate::people::hand_depth::HandDepth;
     use crate::evaluate::people::joints::{JointErrors, LiftedErrors};
     use crate::evaluate::people::{accepted, hands, head};
 
@@ -90,7 +91,7 @@ mod tests {
             n_clips: 1,
             points: Vec::new(),
             hands: hands::HandCounts { other_hand: 0.25, ..Default::default() },
-            hand_depth: Default::default(),
+            hand_depth: HandDepth::measure(&[]),
             head: head::HeadErrors::default(),
             seconds: accepted::AcceptedSeconds { precision: 0.5, ..Default::default() },
             mask: accepted::MaskCounts::default(),

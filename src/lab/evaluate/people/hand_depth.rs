@@ -13,8 +13,8 @@ use serde::Serialize;
 /// Joints of a hand, relative to its first: the knuckles of the four fingers.
 const KNUCKLES: [usize; 4] = [5, 9, 13, 17];
 
-/// Correlations over all detected hands with depth; 0 without any.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+/// Correlations over all detected hands with depth; NaN without any.
+#[derive(Clone, Copy, Debug, Serialize)]
 pub struct HandDepth {
     /// With the depth of the true hand's direction, and of the true forearm's.
     pub hand: f64,
@@ -39,7 +39,10 @@ impl HandDepth {
                 }
             }
         }
-        let with = |truth: &[f64]| correlation(aview1(&found_depths), aview1(truth));
+        let with = |truth: &[f64]| match truth {
+            [] => f64::NAN,
+            truth => correlation(aview1(&found_depths), aview1(truth)),
+        };
         Self { hand: with(&hands), forearm: with(&forearms) }
     }
 }
@@ -69,6 +72,7 @@ mod tests {
             assert!(f64::from(sign) * measured > 0.99, "{sign}: {measured}");
         }
         clip.keypoints.hand_depth = None;
-        assert_eq!(HandDepth::measure(&[&clip]), HandDepth::default());
+        let without = HandDepth::measure(&[&clip]);
+        assert!(without.hand.is_nan() && without.forearm.is_nan());
     }
 }
