@@ -88,8 +88,10 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
             report.failures.push(UnitFailure { speaker: None, unit: Some(name), stage, error, cause: None });
         }
     }
+    // `transcribe`, which few projects use, is longer than the other names.
+    let width = report.stages.keys().map(|stage| stage.as_str().len()).fold(8, usize::max);
     let counts = |(stage, n): (&StageName, &orator_pipeline::StageCounts)| {
-        format!("{stage:8} {} done, {} up to date, {} failed", n.done, n.up_to_date, n.failed)
+        format!("{stage:width$} {} done, {} up to date, {} failed", n.done, n.up_to_date, n.failed)
     };
     let mut lines: Vec<String> = report.stages.iter().map(counts).collect();
     let chosen = pipeline.videos(&selection.speakers)?;
@@ -97,7 +99,7 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
         let (speaker, n) = (&videos.speaker, counted(videos.passed_over.len(), "file"));
         lines.push(format!("{speaker}: passed over {n} without video: {}", first_three(&videos.passed_over)));
     }
-    lines.extend(report.datasets.iter().map(|dir| format!("dataset  {}", dir.display())));
+    lines.extend(report.datasets.iter().map(|dir| format!("{:width$} {}", StageName::Dataset, dir.display())));
     let n_failed = report.failures.len();
     if n_failed > 0 {
         lines.push(format!("{}; `orator status --why` prints the errors", counted(n_failed, "failure")));

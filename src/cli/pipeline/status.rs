@@ -123,7 +123,8 @@ fn text(report: &StatusReport, why: bool) -> String {
             _ => format!("{unit} {stage}: {state}: {reason}"),
         }));
         lines.push(String::new());
-        lines.extend(report.plan.iter().map(plan));
+        let width = report.plan.iter().map(|plan| plan.stage.as_str().len()).fold(8, usize::max);
+        lines.extend(report.plan.iter().map(|of| plan(of, width)));
     }
     lines.join("\n")
 }
@@ -151,12 +152,12 @@ fn consistency(total: &TimeBudget) -> String {
     }
 }
 
-/// What `orator run` would do for a stage, and why.
-fn plan(plan: &StagePlan) -> String {
+/// What `orator run` would do for a stage, and why; its name has `width` characters.
+fn plan(plan: &StagePlan, width: usize) -> String {
     let StagePlan { stage, up_to_date, would_run, reasons } = plan;
     let shown: Vec<&str> = reasons.iter().map(String::as_str).take(REASONS_SHOWN).collect();
     let more = reasons.len().saturating_sub(shown.len());
     let more = if more == 0 { String::new() } else { format!("; {}", counted(more, "other reason")) };
     let why = if *would_run == 0 { String::new() } else { format!(": {}{more}", shown.join("; ")) };
-    format!("{stage:8} {up_to_date} up to date, {would_run} to run{why}")
+    format!("{stage:width$} {up_to_date} up to date, {would_run} to run{why}")
 }
