@@ -1,7 +1,7 @@
 //! The speech-to-gesture generator (Ginosar et al. 2019, as used by Rebol et al. 2021) from log-mel spectrograms to
 //! poses. An audio encoder maps the spectrogram to one vector per pose frame; a UNet over time with additive skip
-//! connections maps these to motion. Fully convolutional: any number of frames; the UNet pads them internally. Its
-//! convolution blocks are also those of the discriminator.
+//! connections maps these to motion; words enter before its last layer (`words`). Fully convolutional: any number of
+//! frames; the UNet pads them internally. Its convolution blocks are also those of the discriminator.
 
 use super::speaker_layer::SpeakerLayer;
 use super::words::{WordFrames, WordLayer};
@@ -138,8 +138,8 @@ impl Generator {
         self.decode(&self.frames(mels, speakers, None, n_frames, train)?, train)
     }
 
-    /// Encodes `mels` and the words at the pose frames to the input of [`Self::decode`], [B, n_frames, width];
-    /// arguments as in [`Self::forward`]. Words are ignored by networks without word input.
+    /// Encodes `mels` and the words at the pose frames to the input of [`Self::decode`], [B, n_frames, width], or twice
+    /// the width with word input; arguments as in [`Self::forward`]. Words are ignored by networks without word input.
     pub fn frames(
         &self,
         mels: &Tensor,
@@ -154,7 +154,7 @@ impl Generator {
         self.with_words(resize::linear(&self.encode(mels, speakers, train)?, n_frames)?, words)
     }
 
-    /// Adds words to encoded audio at the pose frames, [B, T, width].
+    /// Appends words to encoded audio at the pose frames, [B, T, width], if there is word input.
     pub fn with_words(&self, encoded: Tensor, words: Option<&WordFrames>) -> Result<Tensor> {
         match &self.words {
             None => Ok(encoded),
@@ -176,7 +176,7 @@ impl Generator {
         }
     }
 
-    /// Decodes audio vectors at every pose frame, [B, T, width], to poses [B, n_out, T]. If T is not a multiple of
+    /// Decodes vectors at every pose frame, see [`Self::frames`], to poses [B, n_out, T]. If T is not a multiple of
     /// [`FRAMES_MULTIPLE`], zeros follow the audio vectors up to the next one and the poses there are dropped.
     pub fn decode(&self, x: &Tensor, train: bool) -> Result<Tensor> {
         let n_frames = x.dim(1)?;
@@ -184,7 +184,14 @@ impl Generator {
         if n_padding > 0 {
             return self.decode(&x.pad_with_zeros(1, 0, n_padding)?, train)?.narrow(2, 0, n_frames)?.contiguous();
         }
-        let mut x = through(&self.enter, x.clone(), train)?;
+        let (encoded, direct) = match self.words {
+            None => (x.clone(), None),
+            Some(_) => {
+                let width = x.dim(2)? / 2;
+                (x.narrow(2, 0, width)?.contiguous()?, Some(x.narrow(2, width, width)?))
+            }
+        };
+        let mut x = through(&self.enter, encoded, train)?;
         let mut skips = Vec::new();
         for block in &self.downs {
             let down = block.forward(&x, train)?;
@@ -193,7 +200,9 @@ impl Generator {
         for (block, skip) in self.ups.iter().zip(skips.iter().rev()) {
             x = block.forward(&resize::repeat_frames_and_add(&x, skip)?, train)?;
         }
-        resize::transposed(&self.last.forward(&through(&self.decoder, x, train)?)?)
+        let x = through(&self.decoder, x, train)?;
+        let x = direct.map_or(Ok(x.clone()), |direct| x + direct)?;
+        resize::transposed(&self.last.forward(&x)?)
     }
 }
 

@@ -51,6 +51,7 @@ pub fn gradients<T: Scalar>(s: &ConvSizes, x: &Operand<T>, weight: &Operand<T>, 
 }
 
 /// A convolution layer with padding "same": `<name>.weight` [O, C, K], Glorot uniform, and `<name>.bias` [O], zero.
+#[derive(Clone)]
 pub struct Conv {
     weight: Tensor,
     bias: Tensor,

@@ -76,7 +76,7 @@ impl Speech {
 }
 
 /// Creates a virtual environment with these packages in `dir`, as Python is run without PYTHONPATH; returns its Python.
-fn python_with(packages: &Path, dir: &Path) -> PathBuf {
+pub(crate) fn python_with(packages: &Path, dir: &Path) -> PathBuf {
     let environment = dir.join("environment");
     let created = Command::new("python3").args(["-m", "venv", "--without-pip"]).arg(&environment).status().unwrap();
     assert!(created.success(), "python3 -m venv");
@@ -85,7 +85,7 @@ fn python_with(packages: &Path, dir: &Path) -> PathBuf {
     environment.join("bin/python")
 }
 
-fn align(python: &Path, audio: &Path, text: &Path, out: &Path) -> Output {
+pub(crate) fn align(python: &Path, audio: &Path, text: &Path, out: &Path) -> Output {
     let mut command = Command::new(env!("CARGO_BIN_EXE_orator"));
     command.arg("align").args([audio, text]).arg("--out").arg(out);
     command.env("ORATOR_PYTHON", python).output().unwrap()

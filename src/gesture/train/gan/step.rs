@@ -32,6 +32,8 @@ const ADAM_D: &str = "adam.discriminator.";
 /// Seed modifier that makes dropout independent of the other random numbers of a step.
 const DROPOUT: u64 = 0x6472_6f70;
 const WORD_DROPOUT: u64 = 0x776f_7264;
+/// Factor of the learning rate of the word layer, which has no weight decay: a rare word is in few batches.
+const WORD_RATE: f64 = 5.0;
 /// Largest gradient norm of each network; larger gradients are clipped.
 pub const MAX_NORM: f64 = 10.0;
 
@@ -103,9 +105,13 @@ impl GanTrainer {
         let discriminator = Discriminator::new(&mut discriminator_params, speakers.n_features())?;
         let adam = adam::Config { max_norm: Some(MAX_NORM), ..adam::Config::default() };
         let decaying = adam::Config { weight_decay: settings.weight_decay, ..adam };
-        let share = |name: &str| if is_of_speaker(name) { 1.0 } else { settings.shared_rate };
+        let factors = |name: &str| match is_of_speaker(name) {
+            true if is_of_words(name) => [WORD_RATE, 0.0],
+            true => [1.0; 2],
+            false => [settings.shared_rate, 1.0],
+        };
         Ok(Self {
-            adam_g: Adam::with_rates(&generator_params, decaying, share)?,
+            adam_g: Adam::with_rates(&generator_params, decaying, factors)?,
             adam_d: Adam::new(&discriminator_params, adam)?,
             generator_params,
             generator,
@@ -349,8 +355,12 @@ impl GanTrainer {
 }
 
 /// Whether a tensor is not shared by the speakers: that of the speaker layer and of the words.
+fn is_of_words(name: &str) -> bool {
+    name.strip_prefix(WORDS).is_some_and(|rest| rest.starts_with('.'))
+}
+
 fn is_of_speaker(name: &str) -> bool {
-    name.starts_with(SPEAKER) || name.strip_prefix(WORDS).is_some_and(|rest| rest.starts_with('.'))
+    name.starts_with(SPEAKER) || is_of_words(name)
 }
 
 impl TrainerState {

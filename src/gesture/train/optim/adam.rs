@@ -48,8 +48,9 @@ pub struct Adam {
 struct AdamSlot {
     name: String,
     var: Var,
-    /// Factor of the learning rate for this tensor.
+    /// Factors of the learning rate and of the weight decay for this tensor.
     share: f64,
+    decay: f64,
     moments: MomentStorage,
 }
 
@@ -70,15 +71,17 @@ struct AdamMoments {
 impl Adam {
     /// Optimiser with zero moments for every trainable tensor (f32).
     pub fn new(params: &Params, config: Config) -> Result<Self> {
-        Self::with_rates(params, config, |_| 1.0)
+        Self::with_rates(params, config, |_| [1.0; 2])
     }
 
-    /// Like `new`, with a factor of the learning rate for each tensor by its name; a tensor of factor 0 is frozen.
-    pub fn with_rates(params: &Params, config: Config, share: impl Fn(&str) -> f64) -> Result<Self> {
+    /// Like `new`, with factors of the learning rate and of the weight decay for each tensor by its name; a tensor whose
+    /// learning rate has the factor 0 is frozen.
+    pub fn with_rates(params: &Params, config: Config, factors: impl Fn(&str) -> [f64; 2]) -> Result<Self> {
         let (names, vars): (Vec<&str>, Vec<Var>) = params.trainables().map(|(name, var)| (name, var.clone())).unzip();
         let mut adam = <Self as Optimizer>::new(vars, config)?;
         for (slot, name) in adam.slots.iter_mut().zip(names) {
-            (slot.name, slot.share) = (name.to_owned(), share(name));
+            slot.name = name.to_owned();
+            [slot.share, slot.decay] = factors(name);
         }
         Ok(adam)
     }
@@ -142,7 +145,7 @@ impl Optimizer for Adam {
     fn new(vars: Vec<Var>, config: Config) -> Result<Self> {
         let slot = |var: Var| -> Result<AdamSlot> {
             let moments = MomentStorage::zeros(&var, config.amsgrad)?;
-            Ok(AdamSlot { name: String::new(), var, share: 1.0, moments })
+            Ok(AdamSlot { name: String::new(), var, share: 1.0, decay: 1.0, moments })
         };
         let slots = vars.into_iter().map(slot).collect::<Result<_>>()?;
         Ok(Self { config, learning_rate: 1e-3, step: 0, norm: 0.0, slots })
@@ -191,7 +194,8 @@ impl Optimizer for Adam {
         };
         for (slot, gradient) in self.slots.iter_mut().zip(&gradients) {
             let Some(gradient) = gradient.as_ref().filter(|_| slot.share > 0.0) else { continue };
-            let keep = if slot.var.rank() > 1 { 1.0 - learning_rate * slot.share * weight_decay } else { 1.0 };
+            let keep =
+                if slot.var.rank() > 1 { 1.0 - learning_rate * slot.share * slot.decay * weight_decay } else { 1.0 };
             let rate = learning_rate * slot.share / (1.0 - beta1.powi(age));
             let scalars = AdamScalars { rate: rate as f32, keep: keep as f32, ..scalars };
             match &mut slot.moments {
@@ -342,7 +346,8 @@ mod tests {
         let tensors = shares.map(|(name, _)| params.trainable(name, &[2, 1], Init::Constant(1.0)));
         let tensors = tensors.into_iter().collect::<Result<Vec<_>>>()?;
         let share = |name: &str| shares.iter().find(|(of, _)| *of == name).map_or(f64::NAN, |(_, share)| *share);
-        let mut adam = Adam::with_rates(&params, Config::default(), share)?;
+        let config = Config { weight_decay: 0.5, ..Config::default() };
+        let mut adam = Adam::with_rates(&params, config, |name| [share(name), 0.0])?;
         let gradients = [1.0, -3.0, 0.2, 0.1];
         for gradient in gradients {
             let sum = tensors.iter().try_fold(Tensor::new(0f32, &Device::Cpu)?, |sum, w| sum + w.sum_all()?)?;
