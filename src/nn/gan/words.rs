@@ -1,12 +1,12 @@
 //! Word input of the generator: at each pose frame the embedding of the word that is spoken, and the times since its
 //! start and until its end. One convolution over two seconds maps them directly to the input of the last layer: where
-//! they were added to the encoded audio instead, or as well, networks trained on ten minutes of speech learned their
-//! windows by heart rather than the words. Small initial embeddings keep words apart from which no gesture follows.
+//! they were added to the encoded audio instead, or as well, networks memorised ten minutes of speech without learning
+//! the words. Initial embeddings are small, so that words without a gesture hardly disturb the others.
 
 use crate::ops::conv2d::Conv;
 use crate::params::{Init, Params};
 use crate::seq2seq::encoders::table_name;
-use candle_core::{DType, Module, Result, Tensor};
+use candle_core::{DType, Result, Tensor};
 use std::ops::Range;
 
 /// Name of the layer, whose tensors are `words.embedding.weight` and `words.output`.

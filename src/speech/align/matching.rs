@@ -193,6 +193,6 @@ mod tests {
             (of("abc", "abc"), of("abcd", "abxd"), of("abcd", "bcd"), of("a", "abcdef")),
             (1.0, 0.75, 0.75, 0.0)
         );
-        assert_eq!((of("", ""), of("kitten", "sittin")), (1.0, 1.0 - 2.0 / 6.0));
+        assert_eq!((of("", ""), of("window", "minnow")), (1.0, 1.0 - 2.0 / 6.0));
     }
 }

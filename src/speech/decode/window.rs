@@ -40,8 +40,7 @@ impl DecodedWindow {
     }
 
     fn is_improbable(&self) -> bool {
-        // Not a number is improbable, too.
-        !(self.mean_log_prob >= MIN_LOG_PROB)
+        self.mean_log_prob.is_nan() || self.mean_log_prob < MIN_LOG_PROB
     }
 
     pub(crate) fn is_silence(&self) -> bool {

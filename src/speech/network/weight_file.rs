@@ -236,7 +236,7 @@ impl<R: BufRead + Seek> IndexReader<R> {
                 other => bail!("{name} has the unknown number type {other}"),
             };
             let n_bytes = u64::from(self.u32()?);
-            self.add(&mut variables, name, StoredTensor { shape, number, start: self.at }, n_bytes)?;
+            add(&mut variables, name, StoredTensor { shape, number, start: self.at }, n_bytes)?;
             self.skip(n_bytes)?;
         }
         for _ in 0..self.u32()? {
@@ -269,28 +269,9 @@ impl<R: BufRead + Seek> IndexReader<R> {
             };
             let name = name.strip_prefix("model.").map_or_else(|| name.clone(), str::to_owned);
             let stored = StoredTensor { shape: entry.shape, number, start: self.at + start };
-            self.add(&mut variables, name, stored, end - start)?;
+            add(&mut variables, name, stored, end - start)?;
         }
         Ok(variables)
-    }
-
-    /// Adds a variable after comparing its shape with the number of bytes that it occupies.
-    fn add(
-        &self,
-        to: &mut BTreeMap<String, StoredTensor>,
-        name: String,
-        stored: StoredTensor,
-        n_bytes: u64,
-    ) -> Result<()> {
-        let size = stored.shape.iter().try_fold(stored.number.size(), |n, length| n.checked_mul(*length));
-        ensure!(
-            size.is_some_and(|size| size as u64 == n_bytes),
-            "{name} has {n_bytes} bytes, which is not the size of the shape {:?}",
-            stored.shape
-        );
-        ensure!(!to.contains_key(&name), "{name} occurs twice");
-        to.insert(name, stored);
-        Ok(())
     }
 
     fn bytes<const N: usize>(&mut self) -> Result<[u8; N]> {
@@ -321,4 +302,17 @@ impl<R: BufRead + Seek> IndexReader<R> {
         self.at += n_bytes;
         Ok(())
     }
+}
+
+/// Adds a variable after comparing its shape with the number of bytes that it occupies.
+fn add(to: &mut BTreeMap<String, StoredTensor>, name: String, stored: StoredTensor, n_bytes: u64) -> Result<()> {
+    let size = stored.shape.iter().try_fold(stored.number.size(), |n, length| n.checked_mul(*length));
+    ensure!(
+        size.is_some_and(|size| size as u64 == n_bytes),
+        "{name} has {n_bytes} bytes, which is not the size of the shape {:?}",
+        stored.shape
+    );
+    ensure!(!to.contains_key(&name), "{name} occurs twice");
+    to.insert(name, stored);
+    Ok(())
 }

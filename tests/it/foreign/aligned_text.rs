@@ -88,7 +88,7 @@ fn words_of_plain_text_are_aligned_to_the_audio() {
         1000.0 * p95,
         100.0 * mismatched
     );
-    assert!(median <= 0.06 && p95 <= 0.2 && mismatched <= 0.03, "{median} {p95} {mismatched}");
+    assert!(median <= 0.06 && p95 <= 0.2 && mismatched <= 0.07, "{median} {p95} {mismatched}");
     assert!(n_sentences < 100 || secs > 480.0, "{secs}");
 }
 

@@ -20,7 +20,7 @@ use std::time::Instant;
 const SENTENCES: &str = include_str!("../../../fixtures/reference/spoken_sentences.txt");
 const VOICES: [&str; 4] = ["en-us", "en-us+f2", "en-gb+m3", "en-gb-x-rp+f4"];
 const MODEL: &str = "whisper-tiny-en";
-const GERMAN: &str = "Guten Abend. Heute sprechen wir von dem Wetter. In den Bergen liegt noch Schnee, aber im Tal ist \
+const GERMAN: &str = "Guten Abend. Heute sprechen wir von dem Wetter. In den Bergen liegt noch Schnee, aber im Tal war \
     es schon warm. Morgen kommt der Regen, und am Sonntag scheint wieder die Sonne.";
 const RATE: u32 = 16_000;
 

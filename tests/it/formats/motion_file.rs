@@ -5,8 +5,8 @@ use ndarray_npy::WriteNpyExt as _;
 use orator_base::types::pose3d::Motion;
 use orator_base::types::skeleton::N_JOINTS;
 use orator_base::types::time::FrameRate;
+use orator_formats::joints_npz;
 use orator_formats::mocap::motion_file::{DEFAULT_FPS, read};
-use orator_formats::{joints_npz, npy};
 use std::fs::File;
 use std::path::Path;
 

@@ -7,6 +7,7 @@ pub mod block_metrics;
 pub mod interval_rows;
 pub mod losses;
 pub mod pretrained;
+mod rates;
 pub mod recipe;
 pub mod score;
 pub mod speakers;

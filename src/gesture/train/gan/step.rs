@@ -4,7 +4,7 @@ use super::losses::{self, number};
 use super::score::Validation;
 use super::speakers::SpeakerSet;
 use super::windows::WindowBatch;
-use super::{augment, average, words};
+use super::{augment, average, rates, words};
 use crate::generate::model::{BEST, GENERATOR, SpeakerMetadata};
 use crate::train::optim::adam::{self, Adam};
 use crate::train::{resume, word_vectors};
@@ -15,7 +15,6 @@ use orator_formats::checkpoint;
 use orator_formats::word_vectors::WordVectors;
 use orator_nn::gan::discriminator::{Discriminator, motion};
 use orator_nn::gan::generator::Generator;
-use orator_nn::gan::speaker_layer::SPEAKER;
 use orator_nn::gan::words::WORDS;
 use orator_nn::params::{Params, open_device};
 use orator_nn::weights::Contents;
@@ -32,8 +31,6 @@ const ADAM_D: &str = "adam.discriminator.";
 /// Seed modifier that makes dropout independent of the other random numbers of a step.
 const DROPOUT: u64 = 0x6472_6f70;
 const WORD_DROPOUT: u64 = 0x776f_7264;
-/// Factor of the learning rate of the word layer, which has no weight decay: a rare word is in few batches.
-const WORD_RATE: f64 = 5.0;
 /// Largest gradient norm of each network; larger gradients are clipped.
 pub const MAX_NORM: f64 = 10.0;
 
@@ -105,11 +102,7 @@ impl GanTrainer {
         let discriminator = Discriminator::new(&mut discriminator_params, speakers.n_features())?;
         let adam = adam::Config { max_norm: Some(MAX_NORM), ..adam::Config::default() };
         let decaying = adam::Config { weight_decay: settings.weight_decay, ..adam };
-        let factors = |name: &str| match is_of_speaker(name) {
-            true if is_of_words(name) => [WORD_RATE, 0.0],
-            true => [1.0; 2],
-            false => [settings.shared_rate, 1.0],
-        };
+        let factors = |name: &str| rates::factors(name, settings.shared_rate);
         Ok(Self {
             adam_g: Adam::with_rates(&generator_params, decaying, factors)?,
             adam_d: Adam::new(&discriminator_params, adam)?,
@@ -327,7 +320,7 @@ impl GanTrainer {
     /// tensors of the speaker layer come from `layer`; `None` leaves them as they are, like those of the words.
     pub fn initialise_from(&self, other: &Contents, layer: Option<&BTreeMap<String, Tensor>>) -> Result<()> {
         let mut generator = other.part(GENERATOR);
-        generator.retain(|name, _| !is_of_speaker(name));
+        generator.retain(|name, _| !rates::is_of_speaker(name));
         generator.extend(layer.into_iter().flatten().map(|(name, tensor)| (name.clone(), tensor.clone())));
         self.set_tensors(generator)?;
         let discriminator = other.part(DISCRIMINATOR);
@@ -352,15 +345,6 @@ impl GanTrainer {
         (self.step, self.best) = (stored.step, stored.best);
         Ok(())
     }
-}
-
-/// Whether a tensor is not shared by the speakers: that of the speaker layer and of the words.
-fn is_of_words(name: &str) -> bool {
-    name.strip_prefix(WORDS).is_some_and(|rest| rest.starts_with('.'))
-}
-
-fn is_of_speaker(name: &str) -> bool {
-    name.starts_with(SPEAKER) || is_of_words(name)
 }
 
 impl TrainerState {

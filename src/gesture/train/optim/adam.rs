@@ -49,8 +49,7 @@ struct AdamSlot {
     name: String,
     var: Var,
     /// Factors of the learning rate and of the weight decay for this tensor.
-    share: f64,
-    decay: f64,
+    factors: [f64; 2],
     moments: MomentStorage,
 }
 
@@ -80,8 +79,7 @@ impl Adam {
         let (names, vars): (Vec<&str>, Vec<Var>) = params.trainables().map(|(name, var)| (name, var.clone())).unzip();
         let mut adam = <Self as Optimizer>::new(vars, config)?;
         for (slot, name) in adam.slots.iter_mut().zip(names) {
-            slot.name = name.to_owned();
-            [slot.share, slot.decay] = factors(name);
+            (slot.name, slot.factors) = (name.to_owned(), factors(name));
         }
         Ok(adam)
     }
@@ -145,7 +143,7 @@ impl Optimizer for Adam {
     fn new(vars: Vec<Var>, config: Config) -> Result<Self> {
         let slot = |var: Var| -> Result<AdamSlot> {
             let moments = MomentStorage::zeros(&var, config.amsgrad)?;
-            Ok(AdamSlot { name: String::new(), var, share: 1.0, decay: 1.0, moments })
+            Ok(AdamSlot { name: String::new(), var, factors: [1.0; 2], moments })
         };
         let slots = vars.into_iter().map(slot).collect::<Result<_>>()?;
         Ok(Self { config, learning_rate: 1e-3, step: 0, norm: 0.0, slots })
@@ -193,10 +191,10 @@ impl Optimizer for Adam {
             keep: 1.0,
         };
         for (slot, gradient) in self.slots.iter_mut().zip(&gradients) {
-            let Some(gradient) = gradient.as_ref().filter(|_| slot.share > 0.0) else { continue };
-            let keep =
-                if slot.var.rank() > 1 { 1.0 - learning_rate * slot.share * slot.decay * weight_decay } else { 1.0 };
-            let rate = learning_rate * slot.share / (1.0 - beta1.powi(age));
+            let [share, decay] = slot.factors;
+            let Some(gradient) = gradient.as_ref().filter(|_| share > 0.0) else { continue };
+            let keep = if slot.var.rank() > 1 { 1.0 - learning_rate * share * decay * weight_decay } else { 1.0 };
+            let rate = learning_rate * share / (1.0 - beta1.powi(age));
             let scalars = AdamScalars { rate: rate as f32, keep: keep as f32, ..scalars };
             match &mut slot.moments {
                 MomentStorage::Cpu(moments) => slot.var.inplace_op2(gradient, &AdamUpdate { moments, scalars })?,
