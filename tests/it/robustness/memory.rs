@@ -131,14 +131,15 @@ fn long_audio_needs_memory_only_for_its_motion() {
     assert!(short > 10.0 && growth <= 2.2 * joints + 24.0, "{growth:.0} MiB more for {joints:.0} MiB of joints");
 }
 
-/// Peak resident memory in MiB of `orator transcribe` for `secs` of a tone, in every window of which the network
-/// recognises two words.
+/// Peak resident memory in MiB of `orator transcribe` with one thread (each needs memory of its own) for `secs` of a
+/// tone, in every window of which the network recognises two words.
 fn peak_of_transcribe(secs: f64) -> f64 {
     let dir = tempfile::tempdir().unwrap();
     write_recogniser(&dir.path().join("whisper"));
     wav::write(&dir.path().join("tone.wav"), &clips::tone(16_000, secs, 220.0)).unwrap();
     let mut command = Command::new(env!("CARGO_BIN_EXE_orator"));
     command.args(["transcribe", "tone.wav", "--model", "whisper", "--set", "models.dir=models", "--out", "words.json"]);
+    command.env("RAYON_NUM_THREADS", "1");
     peak_mib(command.current_dir(dir.path()).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap())
 }
 
