@@ -8,6 +8,7 @@ use super::kernel::{MAX_ROWS, TileSteps};
 use super::packed_matrix::{PackedWeights, StepBlock, WeightOrder};
 use super::spin_pool::parallel_for;
 use super::tensor::{Scalar, SharedOutputPtr, scratch, written};
+use super::winograd::{self, WinogradTiles};
 use std::ops::Range;
 
 /// Maximum number of input values that a task copies (but at least some rows), and number of summation steps whose
@@ -55,6 +56,9 @@ pub fn forward<T: Scalar>(
 ) -> Vec<T> {
     assert!(x.len() == s.len_in() && weight.len() == s.len_weight() && bias.len() == s.n_out);
     let pass = forward_pass(s);
+    if winograd::applies(s) {
+        return winograd::run(&pass, x, (weight, s.n_in * s.kernel_len(), s.kernel_len()), bias, finish);
+    }
     let panels = PackedWeights::pack(weight, &pass.order(s.n_in * s.kernel_len(), s.kernel_len()));
     let per_row = s.axes[1].n_out * s.n_out;
     // SAFETY: the chunks are disjoint and together cover every row of every output.
@@ -73,6 +77,10 @@ pub fn forward<T: Scalar>(
 }
 
 pub fn n_chunks(s: &ConvSizes) -> usize {
+    if winograd::applies(s) {
+        let row_len = s.axes[1].n_in * s.n_in + s.axes[1].n_out * s.n_out;
+        return WinogradTiles::new(s.batch, s.axes[0].n_out, row_len).n_parts();
+    }
     forward_pass(s).chunks().len()
 }
 
@@ -89,18 +97,25 @@ fn forward_pass(s: &ConvSizes) -> ConvPass {
 pub fn gradient_of_input<T: Scalar>(s: &ConvSizes, weight: &[T], grad: &[T]) -> Vec<T> {
     assert!(grad.len() == s.len_out() && weight.len() == s.len_weight());
     let zeros = vec![T::zero(); s.n_in];
+    let pass = |windows| ConvPass {
+        batch: s.batch,
+        n_from: s.n_out,
+        n_to: s.n_in,
+        windows,
+        kernel: s.axes.map(|axis| axis.kernel),
+    };
+    if winograd::applies(s)
+        && let ([rows], [columns]) = (&s.axes[0].backward()[..], &s.axes[1].backward()[..])
+    {
+        let weight = (weight, s.kernel_len(), s.n_in * s.kernel_len());
+        return winograd::run(&pass([rows.clone(), columns.clone()]), grad, weight, &zeros, |_, _| ());
+    }
     // SAFETY: the chunks of all phases are disjoint and together cover every position.
     unsafe {
         written(s.len_in(), |to: SharedOutputPtr<T>| {
             for rows in s.axes[0].backward() {
                 for columns in s.axes[1].backward() {
-                    let pass = ConvPass {
-                        batch: s.batch,
-                        n_from: s.n_out,
-                        n_to: s.n_in,
-                        windows: [rows.clone(), columns],
-                        kernel: s.axes.map(|axis| axis.kernel),
-                    };
+                    let pass = pass([rows.clone(), columns]);
                     let panels = PackedWeights::pack(weight, &pass.order(s.kernel_len(), s.n_in * s.kernel_len()));
                     let chunks = pass.chunks();
                     parallel_for(chunks.len(), |number| {
@@ -114,17 +129,17 @@ pub fn gradient_of_input<T: Scalar>(s: &ConvSizes, weight: &[T], grad: &[T]) -> 
 }
 
 /// One convolution over padded rows: forward, or one phase of the backward pass.
-struct ConvPass {
-    batch: usize,
-    n_from: usize,
-    n_to: usize,
-    windows: [AxisWindows; 2],
+pub(super) struct ConvPass {
+    pub(super) batch: usize,
+    pub(super) n_from: usize,
+    pub(super) n_to: usize,
+    pub(super) windows: [AxisWindows; 2],
     /// Size of the complete kernel.
-    kernel: [usize; 2],
+    pub(super) kernel: [usize; 2],
 }
 
 impl ConvPass {
-    fn order(&self, per_column: usize, per_channel: usize) -> WeightOrder {
+    pub(super) fn order(&self, per_column: usize, per_channel: usize) -> WeightOrder {
         let [rows, columns] = &self.windows;
         let kernel_offsets = rows
             .kernel_offsets
@@ -135,7 +150,7 @@ impl ConvPass {
     }
 
     /// Returns sample and window rows of each chunk of work, independent of the number of threads.
-    fn chunks(&self) -> Vec<(usize, Range<usize>)> {
+    pub(super) fn chunks(&self) -> Vec<(usize, Range<usize>)> {
         let [rows, columns] = &self.windows;
         let per_row = columns.receptive_field(columns.n) * self.n_from;
         let n_rows = ((CHUNK / per_row.max(1)).saturating_sub(rows.kernel_offsets.len()) / rows.step + 1)
@@ -151,7 +166,7 @@ impl ConvPass {
     ///
     /// # Safety
     /// `to` has room for the batch's results, and no other thread writes to those of these windows.
-    unsafe fn run<T: Scalar>(
+    pub(super) unsafe fn run<T: Scalar>(
         &self,
         from: &[T],
         panels: &PackedWeights<T>,
@@ -163,8 +178,17 @@ impl ConvPass {
         let [rows, columns] = &self.windows;
         let (width, n_from) = (columns.receptive_field(columns.n), self.n_from);
         let per_row = width * n_from;
-        scratch(rows.receptive_field(chunk.len()) * per_row, |padded: &mut [T]| {
-            self.copy(from, padded, b, chunk.start);
+        let first = rows.first + (chunk.start * rows.step) as isize;
+        let n_rows = rows.receptive_field(chunk.len());
+        let is_inside = width == columns.n_from && first >= 0 && first as usize + n_rows <= rows.n_from;
+        let copied = if is_inside && columns.first == 0 { 0 } else { n_rows * per_row };
+        scratch(copied, |padded: &mut [T]| {
+            let padded = if copied > 0 {
+                self.copy(from, padded, b, chunk.start);
+                &*padded
+            } else {
+                &from[(b * rows.n_from + first as usize) * per_row..]
+            };
             let positions = chunk.clone().flat_map(|row| (0..columns.n).map(move |column| (row, column)));
             let positions: Vec<(usize, usize)> = positions
                 .map(|(row, column)| {

@@ -24,3 +24,4 @@ pub mod tensor;
 pub mod transformer;
 pub mod vectorised;
 pub mod weight_gradient;
+pub mod winograd;
