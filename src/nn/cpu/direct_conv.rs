@@ -8,7 +8,7 @@ use super::kernel::{MAX_ROWS, TileSteps};
 use super::packed_matrix::{PackedWeights, StepBlock, WeightOrder};
 use super::spin_pool::parallel_for;
 use super::tensor::{Scalar, SharedOutputPtr, scratch, written};
-use super::winograd::{self, WinogradTiles};
+use super::winograd::{FilterTaps, WinogradPass, WinogradTiles};
 use std::ops::Range;
 
 /// Maximum number of input values that a task copies (but at least some rows), and number of summation steps whose
@@ -56,20 +56,21 @@ pub fn forward<T: Scalar>(
 ) -> Vec<T> {
     assert!(x.len() == s.len_in() && weight.len() == s.len_weight() && bias.len() == s.n_out);
     let pass = forward_pass(s);
-    if winograd::applies(s) {
-        return winograd::run(&pass, x, (weight, s.n_in * s.kernel_len(), s.kernel_len()), bias, finish);
-    }
-    let panels = PackedWeights::pack(weight, &pass.order(s.n_in * s.kernel_len(), s.kernel_len()));
+    let weights = PackedWeights::pack(weight, &pass.order(s.n_in * s.kernel_len(), s.kernel_len()));
     let per_row = s.axes[1].n_out * s.n_out;
     // SAFETY: the chunks are disjoint and together cover every row of every output.
     unsafe {
         written(s.len_out(), |to: SharedOutputPtr<T>| {
+            if let Some(taps) = FilterTaps::of(s) {
+                WinogradPass { pass: &pass, from: x, weights: &weights, begin: bias }.run(taps, to, finish);
+                return;
+            }
             let chunks = pass.chunks();
             parallel_for(chunks.len(), |number| {
                 let (b, rows) = chunks[number].clone();
                 let start = to.at((b * s.axes[0].n_out + rows.start) * per_row);
                 let n = rows.len() * per_row;
-                pass.run(x, &panels, bias, to, b, rows);
+                pass.run(x, &weights, bias, to, b, rows);
                 finish(number, std::slice::from_raw_parts_mut(start, n));
             });
         })
@@ -77,9 +78,8 @@ pub fn forward<T: Scalar>(
 }
 
 pub fn n_chunks(s: &ConvSizes) -> usize {
-    if winograd::applies(s) {
-        let row_len = s.axes[1].n_in * s.n_in + s.axes[1].n_out * s.n_out;
-        return WinogradTiles::new(s.batch, s.axes[0].n_out, row_len).n_parts();
+    if FilterTaps::of(s).is_some() {
+        return WinogradTiles::forward(s).n_parts();
     }
     forward_pass(s).chunks().len()
 }
@@ -97,30 +97,29 @@ fn forward_pass(s: &ConvSizes) -> ConvPass {
 pub fn gradient_of_input<T: Scalar>(s: &ConvSizes, weight: &[T], grad: &[T]) -> Vec<T> {
     assert!(grad.len() == s.len_out() && weight.len() == s.len_weight());
     let zeros = vec![T::zero(); s.n_in];
-    let pass = |windows| ConvPass {
-        batch: s.batch,
-        n_from: s.n_out,
-        n_to: s.n_in,
-        windows,
-        kernel: s.axes.map(|axis| axis.kernel),
-    };
-    if winograd::applies(s)
-        && let ([rows], [columns]) = (&s.axes[0].backward()[..], &s.axes[1].backward()[..])
-    {
-        let weight = (weight, s.kernel_len(), s.n_in * s.kernel_len());
-        return winograd::run(&pass([rows.clone(), columns.clone()]), grad, weight, &zeros, |_, _| ());
-    }
+    let taps = FilterTaps::of(s);
     // SAFETY: the chunks of all phases are disjoint and together cover every position.
     unsafe {
         written(s.len_in(), |to: SharedOutputPtr<T>| {
             for rows in s.axes[0].backward() {
                 for columns in s.axes[1].backward() {
-                    let pass = pass([rows.clone(), columns]);
-                    let panels = PackedWeights::pack(weight, &pass.order(s.kernel_len(), s.n_in * s.kernel_len()));
+                    let pass = ConvPass {
+                        batch: s.batch,
+                        n_from: s.n_out,
+                        n_to: s.n_in,
+                        windows: [rows.clone(), columns],
+                        kernel: s.axes.map(|axis| axis.kernel),
+                    };
+                    let weights = PackedWeights::pack(weight, &pass.order(s.kernel_len(), s.n_in * s.kernel_len()));
+                    if let Some(taps) = taps {
+                        let pass = WinogradPass { pass: &pass, from: grad, weights: &weights, begin: &zeros };
+                        pass.run(taps, to, |_, _| ());
+                        continue;
+                    }
                     let chunks = pass.chunks();
                     parallel_for(chunks.len(), |number| {
                         let (b, rows) = chunks[number].clone();
-                        pass.run(grad, &panels, &zeros, to, b, rows);
+                        pass.run(grad, &weights, &zeros, to, b, rows);
                     });
                 }
             }

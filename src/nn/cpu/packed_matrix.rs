@@ -217,14 +217,13 @@ impl<T: Scalar> PackedWeights<T> {
 }
 
 impl<T: Scalar> PackedWeights<T> {
-    /// Values of all steps of a panel.
-    pub fn steps(&self, panel: usize) -> &[T] {
-        let end = self.panels.get(panel + 1).map_or(self.end, |next| next.start);
-        &self.data[self.panels[panel].start..end]
+    /// Where all steps of a panel are in `data`.
+    pub fn steps(&self, panel: usize) -> Range<usize> {
+        self.panels[panel].start..self.panels.get(panel + 1).map_or(self.end, |next| next.start)
     }
 
     /// Zero weights of the same panels with a `share`-th of the steps.
-    pub fn resized(&self, share: usize) -> Self {
+    pub fn with_share(&self, share: usize) -> Self {
         let from = self.panels.first().map_or(0, |panel| panel.start);
         let n = (self.end - from) / share;
         let data = vec![T::zero(); n + LANES];
@@ -235,10 +234,6 @@ impl<T: Scalar> PackedWeights<T> {
 }
 
 impl WeightPanel {
-    pub fn start(&self) -> usize {
-        self.start
-    }
-
     /// Adds the products of one block of steps to the sums at every position, or to `begin`, one value per column, if
     /// the block is the first.
     ///

@@ -1,20 +1,17 @@
-//! Convolutions of three taps and stride 1 along the first axis by Winograd's minimal filtering F(4, 3) (Lavin & Gray
-//! 2016): a tile of four outputs takes six products instead of twelve. Inputs, weights and outputs pass through small
-//! linear transforms along that axis; the products are convolutions with a kernel of length 1 there.
+//! Convolutions along the first axis by Winograd's minimal filtering (Lavin & Gray 2016): a tile of four outputs of three
+//! taps takes six products instead of twelve, of two taps five instead of eight. Inputs, weights and outputs pass through
+//! small linear transforms; the products are shorter convolutions. A convolution of four taps and stride 2 is one of two
+//! taps over pairs of rows.
 
 use super::axis::ConvAxis;
 use super::direct_conv::{ConvPass, ConvSizes};
 use super::kernel::MAX_ROWS;
-use super::packed_matrix::{PackedWeights, WeightPanel};
+use super::packed_matrix::PackedWeights;
 use super::spin_pool::parallel_for;
-use super::tensor::{LANES, Scalar, SharedOutputPtr, scratch, written};
-use super::vectorised::vectorised;
+use super::tensor::{Scalar, SharedOutputPtr, scratch};
+use super::winograd_transforms::{LinearMap, TILE, ThreeTaps, Transposed, TwoTaps, transform};
 use std::ops::Range;
 
-/// Outputs of a tile, and the number of its products.
-const TILE: usize = 4;
-pub(super) const POINTS: usize = 6;
-pub(super) const TAPS: usize = 3;
 /// Number of tiles, and of channels on either side, below which the transforms cost more than they save.
 const MIN_TILES: usize = 24;
 const MIN_CHANNELS: usize = 32;
@@ -23,185 +20,29 @@ const PART: usize = 160 * 1024;
 const GROUP: usize = 1 << 20;
 /// Minimum number of parts of a pass, if its tiles are enough.
 const MIN_PARTS: usize = 8;
+/// Products of a tile of three taps.
+const MAX_POINTS: usize = 6;
 /// Values that a task transforms.
 const TASK: usize = 32 * 1024;
 
-/// Returns whether the convolution and its gradients are computed by this file.
-pub fn applies(s: &ConvSizes) -> bool {
-    let [rows, columns] = s.axes;
-    let is_fitting = rows.kernel == TAPS && rows.stride == 1 && columns.stride == 1;
-    is_fitting && s.batch * rows.n_out.div_ceil(TILE) >= MIN_TILES && s.n_in.min(s.n_out) >= MIN_CHANNELS
+/// Number of taps of a filter, after the rows of a stride have been taken together.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum FilterTaps {
+    Two,
+    Three,
 }
 
-vectorised!(
-    /// Transforms the six input rows of a tile.
-    transform_inputs = inputs_body(rows: [&[T]; POINTS], to: [&mut [T]; POINTS])
-);
-vectorised!(
-    /// Transforms the four rows of a gradient: the transpose of [`transform_sums`].
-    transform_gradients = gradients_body(rows: [&[T]; TILE], to: [&mut [T]; POINTS])
-);
-vectorised!(
-    /// Adds `begin` and the transformed sums of a tile: four output rows.
-    transform_sums = sums_body(sums: [&[T]; POINTS], begin: &[T], to: [&mut [T]; TILE])
-);
-
-vectorised!(
-    /// Transforms the taps of weights.
-    transform_taps = taps_body(taps: [&[T]; TAPS], to: [&mut [T]; POINTS])
-);
-vectorised!(
-    /// Gradients of the taps: the transpose of [`transform_taps`].
-    untransform_taps = untaps_body(points: [&[T]; POINTS], to: [&mut [T]; TAPS])
-);
-
-#[inline(always)]
-fn inputs_body<T: Scalar>(rows: [&[T]; POINTS], to: [&mut [T]; POINTS]) {
-    by_lanes(rows, to, |[a, b, c, d, e, f]| {
-        let (even, odd) = (e - c * 4.0, d - b * 4.0);
-        let (half_even, half_odd) = (e - c, (d - b) * 2.0);
-        let (first, last) = (a * 4.0 - c * 5.0 + e, b * 4.0 - d * 5.0 + f);
-        [first, even + odd, even - odd, half_even + half_odd, half_even - half_odd, last]
-    });
-}
-
-#[inline(always)]
-fn gradients_body<T: Scalar>(rows: [&[T]; TILE], to: [&mut [T]; POINTS]) {
-    by_lanes(rows, to, |[a, b, c, d]| {
-        let (even, odd, far_even, far_odd) = (a + c, b + d, a + c * 4.0, (b + d * 4.0) * 2.0);
-        [a, even + odd, even - odd, far_even + far_odd, far_even - far_odd, d]
-    });
-}
-
-#[inline(always)]
-fn sums_body<T: Scalar>(sums: [&[T]; POINTS], begin: &[T], to: [&mut [T]; TILE]) {
-    let [a, b, c, d, e, f] = sums;
-    by_lanes([a, b, c, d, e, f, begin], to, |[a, b, c, d, e, f, begin]| {
-        let (near_even, far_even, near_odd, far_odd) = (b + c, d + e, b - c, d - e);
-        let (even, odd) = (begin + near_even, begin + near_odd);
-        [even + a + far_even, odd + far_odd * 2.0, even + far_even * 4.0, odd + far_odd * 8.0 + f]
-    });
-}
-
-#[inline(always)]
-fn taps_body<T: Scalar>(taps: [&[T]; TAPS], to: [&mut [T]; POINTS]) {
-    by_lanes(taps, to, |[a, b, c]| {
-        let (near, near_odd) = ((a + c) * (-1.0 / 6.0), b * (1.0 / 6.0));
-        let (far, far_odd) = (a * (1.0 / 24.0) + c * (1.0 / 6.0), b * (1.0 / 12.0));
-        [a * 0.25, near - near_odd, near + near_odd, far + far_odd, far - far_odd, c]
-    });
-}
-
-#[inline(always)]
-fn untaps_body<T: Scalar>(points: [&[T]; POINTS], to: [&mut [T]; TAPS]) {
-    by_lanes(points, to, |[a, b, c, d, e, f]| {
-        let (near, far) = ((b + c) * (1.0 / 6.0), (d + e) * (1.0 / 24.0));
-        [a * 0.25 - near + far, (c - b) * (1.0 / 6.0) + (d - e) * (1.0 / 12.0), far * 4.0 - near + f]
-    });
-}
-
-/// A vector of columns.
-#[derive(Clone, Copy)]
-struct Lanes<T>([T; LANES]);
-
-macro_rules! lanes_operator {
-    ($trait:ident, $method:ident) => {
-        impl<T: Scalar> std::ops::$trait for Lanes<T> {
-            type Output = Self;
-
-            #[inline(always)]
-            fn $method(mut self, other: Self) -> Self {
-                (0..LANES).for_each(|i| self.0[i] = self.0[i].$method(other.0[i]));
-                self
-            }
-        }
-    };
-}
-lanes_operator!(Add, add);
-lanes_operator!(Sub, sub);
-
-impl<T: Scalar> std::ops::Mul<f64> for Lanes<T> {
-    type Output = Self;
-
-    #[inline(always)]
-    fn mul(mut self, factor: f64) -> Self {
-        let factor = T::from_f64(factor);
-        (0..LANES).for_each(|i| self.0[i] = self.0[i] * factor);
-        self
-    }
-}
-
-/// Calls `f` for each vector of columns of the rows `from`.
-#[inline(always)]
-fn by_lanes<T: Scalar, const M: usize, const N: usize>(
-    from: [&[T]; M],
-    mut to: [&mut [T]; N],
-    f: impl Fn([Lanes<T>; M]) -> [Lanes<T>; N],
-) {
-    let n_columns = from[0].len();
-    assert!(from.iter().all(|row| row.len() == n_columns) && to.iter().all(|row| row.len() == n_columns));
-    let n_complete = n_columns / LANES * LANES;
-    for at in (0..n_complete).step_by(LANES) {
-        let mut lanes = [Lanes([T::zero(); LANES]); M];
-        for (lanes, from) in lanes.iter_mut().zip(from) {
-            lanes.0.copy_from_slice(&from[at..at + LANES]);
-        }
-        for (lanes, to) in f(lanes).iter().zip(&mut to) {
-            to[at..at + LANES].copy_from_slice(&lanes.0);
-        }
-    }
-    if n_complete < n_columns {
-        let mut lanes = [Lanes([T::zero(); LANES]); M];
-        for (lanes, from) in lanes.iter_mut().zip(from) {
-            lanes.0[..n_columns - n_complete].copy_from_slice(&from[n_complete..]);
-        }
-        for (lanes, to) in f(lanes).iter().zip(&mut to) {
-            to[n_complete..].copy_from_slice(&lanes.0[..n_columns - n_complete]);
-        }
-    }
-}
-
-/// Rows of a tensor [B, rows, ...], in tiles: tile `t` of a sample starts at row `first + 4 t`.
-struct TileRows<'a, T> {
-    values: &'a [T],
-    zeros: &'a [T],
-    n_rows: usize,
-    first: isize,
-    /// Tiles per sample.
-    n_tiles: usize,
-}
-
-impl<T: Scalar> TileRows<'_, T> {
-    /// Rows of a tile of the batch; zeros outside the sample.
-    fn tile<const N: usize>(&self, tile: usize) -> [&[T]; N] {
-        let len = self.zeros.len();
-        let (b, first) = (tile / self.n_tiles, self.first + (tile % self.n_tiles * TILE) as isize);
-        std::array::from_fn(|i| match usize::try_from(first + i as isize) {
-            Ok(row) if row < self.n_rows => &self.values[(b * self.n_rows + row) * len..][..len],
-            _ => self.zeros,
-        })
-    }
-
-    /// Transforms tiles by `f`, to six matrices [tiles, row] that follow each other in `to`.
-    fn transform<const N: usize>(
-        &self,
-        tiles: Range<usize>,
-        to: &mut [T],
-        f: impl Fn([&[T]; N], [&mut [T]; POINTS]) + Sync,
-    ) {
-        let (len, start, n) = (self.zeros.len(), tiles.start, tiles.len());
-        assert!(to.len() == POINTS * n * len);
-        let per_task = (TASK / len).max(1);
-        let to = SharedOutputPtr::new(to);
-        parallel_for(n.div_ceil(per_task), |task| {
-            for tile in task * per_task..n.min((task + 1) * per_task) {
-                // SAFETY: only this task writes the rows of this tile.
-                let to = std::array::from_fn(|point| unsafe {
-                    std::slice::from_raw_parts_mut(to.at((point * n + tile) * len), len)
-                });
-                f(self.tile(start + tile), to);
-            }
-        });
+impl FilterTaps {
+    /// Filter of a convolution and its gradients; `None`: they are computed directly.
+    pub fn of(s: &ConvSizes) -> Option<Self> {
+        let [rows, columns] = s.axes;
+        let taps = match (rows.kernel, rows.stride, columns.stride) {
+            (3, 1, 1) => Self::Three,
+            (4, 2, _) => Self::Two,
+            _ => return None,
+        };
+        let is_large = rows.n_out >= TILE && s.batch * rows.n_out.div_ceil(TILE) >= MIN_TILES;
+        (is_large && s.n_in.min(s.n_out) >= MIN_CHANNELS).then_some(taps)
     }
 }
 
@@ -213,11 +54,15 @@ pub struct WinogradTiles {
 }
 
 impl WinogradTiles {
-    /// Partition for outputs of `n_rows` rows per sample, such that the transformed values of a part, `row_len` per tile
-    /// and point, fit in the second-level cache.
-    pub fn new(batch: usize, n_rows: usize, row_len: usize) -> Self {
-        let tiles = batch * n_rows.div_ceil(TILE);
-        Self::with_parts(batch, n_rows, (PART / (POINTS * row_len)).min(tiles.div_ceil(MIN_PARTS)))
+    /// Partition of a forward pass, whose transformed values fit in the second-level cache.
+    pub fn forward(s: &ConvSizes) -> Self {
+        let [rows, columns] = s.axes;
+        Self::of_pass(s.batch, rows.n_out, rows.stride * columns.n_in * s.n_in + columns.n_out * s.n_out)
+    }
+
+    fn of_pass(batch: usize, n_rows: usize, row_len: usize) -> Self {
+        let n = batch * n_rows.div_ceil(TILE);
+        Self::with_parts(batch, n_rows, (PART / (MAX_POINTS * row_len)).min(n.div_ceil(MIN_PARTS)))
     }
 
     /// Partition into parts of at most `at_most` tiles, but at least complete tiles of the kernel.
@@ -241,155 +86,269 @@ impl WinogradTiles {
     }
 }
 
-/// Runs a pass with this weight, whose element of column `o` and channel `c` starts at `per_column o + per_channel c`.
-/// `begin` and `finish` as in [`super::direct_conv::forward`].
-pub(super) fn run<T: Scalar>(
-    pass: &ConvPass,
-    from: &[T],
-    (weight, per_column, per_channel): (&[T], usize, usize),
-    begin: &[T],
-    finish: impl Fn(usize, &mut [T]) + Sync,
-) -> Vec<T> {
-    let [rows, columns] = &pass.windows;
-    let (from_len, to_len) = (columns.n_from * pass.n_from, columns.n_to * pass.n_to);
-    let panels = transform_weights(&PackedWeights::pack(weight, &pass.order(per_column, per_channel)));
-    let tiles = WinogradTiles::new(pass.batch, rows.n, from_len + to_len);
-    let (zeros, begin) = (vec![T::zero(); from_len.max(pass.n_to)], begin.repeat(columns.n_to));
-    let inputs = TileRows {
-        values: from,
-        zeros: &zeros[..from_len],
-        n_rows: rows.n_from,
-        first: rows.first,
-        n_tiles: tiles.per_sample,
-    };
-    let row = |tile: usize| tile / tiles.per_sample * rows.n + tile % tiles.per_sample * TILE;
-    let compute = |part: usize, to: SharedOutputPtr<T>, transformed: &mut [T], sums: &mut [T]| {
-        let tiles = tiles.part(part);
-        let n = tiles.len();
-        let (transformed, sums) = (&mut transformed[..POINTS * n * from_len], &mut sums[..POINTS * n * to_len]);
-        inputs.transform(tiles.clone(), transformed, transform_inputs);
-        let products = ConvPass {
-            batch: 1,
-            n_from: pass.n_from,
-            n_to: pass.n_to,
-            windows: [ConvAxis::valid(n, 1, 1).forward(), columns.clone()],
-            kernel: [1, pass.kernel[1]],
-        };
-        let of_points = transformed.chunks_exact(n * from_len).zip(sums.chunks_exact_mut(n * to_len));
-        for ((from, to), panels) in of_points.zip(&panels) {
-            // SAFETY: `to` has room for the sums of all tiles.
-            unsafe { products.run(from, panels, &zeros[..pass.n_to], SharedOutputPtr::new(to), 0, 0..n) };
-        }
-        let (at, end) = (row(tiles.start), row(tiles.end));
-        // SAFETY: the rows of a part follow each other, and only this task writes them.
-        let to = unsafe { std::slice::from_raw_parts_mut(to.at(at * to_len), (end - at) * to_len) };
-        let sums = |point: usize, tile: usize| &sums[(point * n + tile - tiles.start) * to_len..][..to_len];
-        write_rows(to, to_len, &begin, tiles.clone(), |tile| row(tile + 1) - row(tile), sums);
-        finish(part, to);
-    };
-    // SAFETY: the parts together cover every row of every sample.
-    unsafe {
-        written(pass.batch * rows.n * to_len, |to: SharedOutputPtr<T>| {
-            parallel_for(tiles.n_parts, |part| {
-                scratch(POINTS * tiles.largest() * from_len, |transformed: &mut [T]| {
-                    scratch(POINTS * tiles.largest() * to_len, |sums: &mut [T]| compute(part, to, transformed, sums));
-                });
-            });
-        })
-    }
+/// Rows of a tensor [B, rows, ...] in tiles: row `i` of phase `p` of tile `t` of a sample is `first + (4 t + i) phases +
+/// p`.
+struct TileRows<'a, T> {
+    values: &'a [T],
+    zeros: &'a [T],
+    n_rows: usize,
+    first: isize,
+    phases: usize,
+    /// Tiles per sample.
+    n_tiles: usize,
 }
 
-/// Writes the output rows of `tiles` to `to`, `n_rows` of each.
-fn write_rows<'a, T: Scalar>(
-    mut to: &mut [T],
-    len: usize,
-    begin: &[T],
-    tiles: Range<usize>,
-    n_rows: impl Fn(usize) -> usize,
-    sums: impl Fn(usize, usize) -> &'a [T],
-) {
-    fn all<T>(rows: &mut [T], len: usize) -> [&mut [T]; TILE] {
-        let (a, rows) = rows.split_at_mut(len);
-        let (b, rows) = rows.split_at_mut(len);
-        let (c, d) = rows.split_at_mut(len);
-        [a, b, c, d]
+impl<T: Scalar> TileRows<'_, T> {
+    /// Rows of a tile of the batch; zeros outside the sample.
+    fn tile<const N: usize>(&self, tile: usize, phase: usize) -> [&[T]; N] {
+        let (len, b, tile) = (self.zeros.len(), tile / self.n_tiles, tile % self.n_tiles);
+        std::array::from_fn(|i| {
+            let row = self.first + ((tile * TILE + i) * self.phases + phase) as isize;
+            match usize::try_from(row) {
+                Ok(row) if row < self.n_rows => &self.values[(b * self.n_rows + row) * len..][..len],
+                _ => self.zeros,
+            }
+        })
     }
-    for tile in tiles {
-        let rows;
-        (rows, to) = std::mem::take(&mut to).split_at_mut(n_rows(tile) * len);
-        let sums = std::array::from_fn(|point| sums(point, tile));
-        if rows.len() == TILE * len {
-            transform_sums(sums, begin, all(rows, len));
-            continue;
-        }
-        scratch(TILE * len, |complete: &mut [T]| {
-            transform_sums(sums, begin, all(complete, len));
-            rows.copy_from_slice(&complete[..rows.len()]);
+
+    /// Applies the transform `X` to tiles: matrices [tiles, phases, row] that follow each other in `to`.
+    fn transform<X: LinearMap<N, POINTS>, const N: usize, const POINTS: usize>(
+        &self,
+        tiles: Range<usize>,
+        to: &mut [T],
+    ) {
+        let (len, start, n) = (self.zeros.len(), tiles.start, tiles.len() * self.phases);
+        assert!(to.len() == POINTS * n * len);
+        let per_task = (TASK / len).max(1);
+        let to = SharedOutputPtr::new(to);
+        parallel_for(n.div_ceil(per_task), |task| {
+            for row in task * per_task..n.min((task + 1) * per_task) {
+                // SAFETY: only this task writes this row of the matrices.
+                let to = std::array::from_fn(|point| unsafe {
+                    std::slice::from_raw_parts_mut(to.at((point * n + row) * len), len)
+                });
+                transform::<T, X, N, POINTS>(self.tile(start + row / self.phases, row % self.phases), to);
+            }
         });
     }
 }
 
-/// Transforms packed weights: those of a point have a third of the steps.
-fn transform_weights<T: Scalar>(weights: &PackedWeights<T>) -> [PackedWeights<T>; POINTS] {
-    let mut points = std::array::from_fn(|_| weights.resized(TAPS));
+/// A pass, of which every row of windows reads `step` phases of `TAPS` rows each.
+#[derive(Clone, Copy)]
+pub(super) struct WinogradPass<'a, T> {
+    pub pass: &'a ConvPass,
+    pub from: &'a [T],
+    /// Packed in the order of the pass.
+    pub weights: &'a PackedWeights<T>,
+    pub begin: &'a [T],
+}
+
+impl<T: Scalar> WinogradPass<'_, T> {
+    /// Writes the outputs, as [`ConvPass::run`] for all windows; `finish` as in [`super::direct_conv::forward`], only for
+    /// passes that write every row.
+    ///
+    /// # Safety
+    /// `to` has room for the batch's results, and no other thread writes to those of these windows.
+    pub(super) unsafe fn run(&self, taps: FilterTaps, to: SharedOutputPtr<T>, finish: impl Fn(usize, &mut [T]) + Sync) {
+        // SAFETY: guaranteed by the caller.
+        unsafe {
+            match taps {
+                FilterTaps::Two => self.run_filter::<TwoTaps, 2, 5>(to, finish),
+                FilterTaps::Three => self.run_filter::<ThreeTaps, 3, 6>(to, finish),
+            }
+        }
+    }
+
+    unsafe fn run_filter<F, const TAPS: usize, const POINTS: usize>(
+        &self,
+        to: SharedOutputPtr<T>,
+        finish: impl Fn(usize, &mut [T]) + Sync,
+    ) where
+        F: LinearMap<POINTS, POINTS> + LinearMap<TAPS, POINTS> + LinearMap<POINTS, TILE>,
+    {
+        let [rows, columns] = &self.pass.windows;
+        let phases = rows.kernel_offsets.len() / TAPS;
+        let (from_len, to_len) = (columns.n_from * self.pass.n_from, columns.n * self.pass.n_to);
+        let weights = transform_weights::<T, F, TAPS, POINTS>(self.weights, phases);
+        let all_tiles = WinogradTiles::of_pass(self.pass.batch, rows.n, phases * from_len + to_len);
+        let zeros = vec![T::zero(); from_len.max(self.pass.n_to)];
+        let inputs = TileRows {
+            values: self.from,
+            zeros: &zeros[..from_len],
+            n_rows: rows.n_from,
+            first: rows.first,
+            phases,
+            n_tiles: all_tiles.per_sample,
+        };
+        let mut columns_of_products = columns.clone();
+        (columns_of_products.n_to, columns_of_products.to_first, columns_of_products.to_step) = (columns.n, 0, 1);
+        let compute = |part: usize, transformed: &mut [T], sums: &mut [T]| {
+            let tiles = all_tiles.part(part);
+            let n = tiles.len();
+            let transformed = &mut transformed[..POINTS * phases * n * from_len];
+            inputs.transform::<F, POINTS, POINTS>(tiles.clone(), transformed);
+            let products = ConvPass {
+                batch: 1,
+                n_from: self.pass.n_from,
+                n_to: self.pass.n_to,
+                windows: [ConvAxis::valid(n * phases, phases, phases).forward(), columns_of_products.clone()],
+                kernel: [phases, self.pass.kernel[1]],
+            };
+            let of_points = transformed.chunks_exact(phases * n * from_len).zip(sums.chunks_exact_mut(n * to_len));
+            for (point, ((from, to), weights)) in of_points.zip(&weights).enumerate() {
+                // The product at the point 1 is part of every output.
+                let begin = if point == 1 { self.begin } else { &zeros[..self.pass.n_to] };
+                // SAFETY: `to` has room for the sums of all tiles.
+                unsafe { products.run(from, weights, begin, SharedOutputPtr::new(to), 0, 0..n) };
+            }
+            for tile in tiles.clone() {
+                let sums = |point: usize| &sums[(point * n + tile - tiles.start) * to_len..][..to_len];
+                // SAFETY: only this task writes the rows of these tiles.
+                unsafe { self.write_tile::<F, POINTS>(tile, all_tiles.per_sample, std::array::from_fn(sums), to) };
+            }
+            if rows.to_step == 1 && columns.n == columns.n_to {
+                let row = |tile: usize| tile / all_tiles.per_sample * rows.n + tile % all_tiles.per_sample * TILE;
+                let (at, end) = (row(tiles.start) * to_len, row(tiles.end) * to_len);
+                // SAFETY: the rows of a part follow each other, and only this task writes them.
+                finish(part, unsafe { std::slice::from_raw_parts_mut(to.at(at), end - at) });
+            }
+        };
+        parallel_for(all_tiles.n_parts, |part| {
+            scratch(POINTS * phases * all_tiles.largest() * from_len, |transformed: &mut [T]| {
+                scratch(POINTS * all_tiles.largest() * to_len, |sums: &mut [T]| compute(part, transformed, sums));
+            });
+        });
+    }
+
+    /// Writes the output rows of a tile.
+    ///
+    /// # Safety
+    /// As for [`Self::run`].
+    unsafe fn write_tile<F: LinearMap<POINTS, TILE>, const POINTS: usize>(
+        &self,
+        tile: usize,
+        n_tiles: usize,
+        sums: [&[T]; POINTS],
+        to: SharedOutputPtr<T>,
+    ) {
+        let [rows, columns] = &self.pass.windows;
+        let (b, first) = (tile / n_tiles, tile % n_tiles * TILE);
+        let len = sums[0].len();
+        scratch(TILE * len, |outputs: &mut [T]| {
+            let mut four = outputs.chunks_exact_mut(len);
+            if let [Some(a), Some(b), Some(c), Some(d)] = std::array::from_fn(|_| four.next()) {
+                transform::<T, F, POINTS, TILE>(sums, [a, b, c, d]);
+            }
+            for (row, output) in (first..rows.n.min(first + TILE)).zip(outputs.chunks_exact(len)) {
+                let row = b * rows.n_to + rows.to_first + row * rows.to_step;
+                // Adjacent columns are copied together.
+                let width = if columns.to_step == 1 { len } else { self.pass.n_to };
+                for (column, output) in output.chunks_exact(width).enumerate() {
+                    let column = row * columns.n_to + columns.to_first + column * columns.to_step;
+                    // SAFETY: guaranteed by the caller.
+                    unsafe { to.at(column * self.pass.n_to).copy_from_nonoverlapping(output.as_ptr(), width) };
+                }
+            }
+        });
+    }
+}
+
+/// Transforms packed weights, whose steps are `TAPS` times `phases` rows: those of a point have one row per phase.
+fn transform_weights<T: Scalar, F: LinearMap<TAPS, POINTS>, const TAPS: usize, const POINTS: usize>(
+    weights: &PackedWeights<T>,
+    phases: usize,
+) -> [PackedWeights<T>; POINTS] {
+    let mut points = std::array::from_fn(|_| weights.with_share(TAPS));
     let of_points = points.each_mut().map(|point: &mut PackedWeights<T>| {
-        (SharedOutputPtr::new(&mut point.data), point.panels.iter().map(WeightPanel::start).collect::<Vec<_>>())
+        let starts: Vec<usize> = (0..point.panels.len()).map(|panel| point.steps(panel).start).collect();
+        (SharedOutputPtr::new(&mut point.data), starts)
     });
-    parallel_for(weights.panels.len(), |panel| {
-        let steps = weights.steps(panel);
-        let n = steps.len() / TAPS;
-        let taps = std::array::from_fn(|tap| &steps[tap * n..][..n]);
-        // SAFETY: the panels are disjoint parts of the data of each point.
-        let to = of_points
-            .each_ref()
-            .map(|(data, starts)| unsafe { std::slice::from_raw_parts_mut(data.at(starts[panel]), n) });
-        transform_taps(taps, to);
+    parallel_for(weights.panels.len() * phases, |task| {
+        let (panel, phase) = (task / phases, task % phases);
+        let steps = &weights.data[weights.steps(panel)];
+        let n = steps.len() / (TAPS * phases);
+        let taps = std::array::from_fn(|tap| &steps[(tap * phases + phase) * n..][..n]);
+        let to = of_points.each_ref().map(|(data, starts)| {
+            // SAFETY: the tasks write disjoint parts of the data of each point.
+            unsafe { std::slice::from_raw_parts_mut(data.at(starts[panel] + phase * n), n) }
+        });
+        transform::<T, F, TAPS, POINTS>(taps, to);
     });
     points
 }
 
-/// Transformed rows of an input and of the gradient of the output, and sizes of the products that add up to the
-/// transformed gradient of the weight.
-pub(super) struct GradientGroup<'a, T> {
+/// Transformed rows of some tiles of an input and of the gradient of the output, of one point after the other, and sizes
+/// of the products that add up to the gradient of the transformed weight.
+pub(super) struct GradientTiles<'a, T> {
     pub sizes: ConvSizes,
+    pub n_points: usize,
     pub x: &'a [T],
     pub grad: &'a [T],
 }
 
-/// Calls `add` with each group of tiles: for point p, `x` and `grad` have `len / 6` values from `p len / 6` on.
-pub(super) fn gradient_groups<T: Scalar>(s: &ConvSizes, x: &[T], grad: &[T], mut add: impl FnMut(GradientGroup<T>)) {
+/// Calls `add` with each group of tiles.
+pub(super) fn gradient_tiles<T: Scalar>(
+    taps: FilterTaps,
+    s: &ConvSizes,
+    operands: [&[T]; 2],
+    add: impl FnMut(GradientTiles<T>),
+) {
+    match taps {
+        FilterTaps::Two => gradient_tiles_of::<T, TwoTaps, 5>(s, operands, add),
+        FilterTaps::Three => gradient_tiles_of::<T, ThreeTaps, 6>(s, operands, add),
+    }
+}
+
+fn gradient_tiles_of<T: Scalar, F, const POINTS: usize>(
+    s: &ConvSizes,
+    [x, grad]: [&[T]; 2],
+    mut add: impl FnMut(GradientTiles<T>),
+) where
+    F: LinearMap<POINTS, POINTS> + LinearMap<POINTS, TILE>,
+{
     let [rows, columns] = s.axes;
+    let phases = rows.stride;
     let (x_len, grad_len) = (columns.n_in * s.n_in, columns.n_out * s.n_out);
-    let tiles = WinogradTiles::with_parts(s.batch, rows.n_out, GROUP / (POINTS * (x_len + grad_len)));
+    let at_most = GROUP / (POINTS * (phases * x_len + grad_len));
+    let all_tiles = WinogradTiles::with_parts(s.batch, rows.n_out, at_most);
     let zeros = vec![T::zero(); x_len.max(grad_len)];
-    let of = |values, len, n_rows, first| TileRows {
-        values,
-        zeros: &zeros[..len],
-        n_rows,
-        first,
-        n_tiles: tiles.per_sample,
-    };
-    let (inputs, gradients) = (of(x, x_len, rows.n_in, -(rows.pad as isize)), of(grad, grad_len, rows.n_out, 0));
-    scratch(POINTS * tiles.largest() * x_len, |x: &mut [T]| {
-        scratch(POINTS * tiles.largest() * grad_len, |grad: &mut [T]| {
-            for tiles in (0..tiles.n_parts).map(|part| tiles.part(part)) {
+    let n_tiles = all_tiles.per_sample;
+    let first = -(rows.pad as isize);
+    let inputs = TileRows { values: x, zeros: &zeros[..x_len], n_rows: rows.n_in, first, phases, n_tiles };
+    let zeros = &zeros[..grad_len];
+    let gradients = TileRows { values: grad, zeros, n_rows: rows.n_out, first: 0, phases: 1, n_tiles };
+    scratch(POINTS * phases * all_tiles.largest() * x_len, |x: &mut [T]| {
+        scratch(POINTS * all_tiles.largest() * grad_len, |grad: &mut [T]| {
+            for tiles in (0..all_tiles.n_parts).map(|part| all_tiles.part(part)) {
                 let n = tiles.len();
-                let (x, grad) = (&mut x[..POINTS * n * x_len], &mut grad[..POINTS * n * grad_len]);
-                inputs.transform(tiles.clone(), x, transform_inputs);
-                gradients.transform(tiles, grad, transform_gradients);
-                add(GradientGroup {
-                    sizes: ConvSizes { batch: 1, axes: [ConvAxis::valid(n, 1, 1), columns], ..*s },
-                    x,
-                    grad,
-                });
+                let (x, grad) = (&mut x[..POINTS * phases * n * x_len], &mut grad[..POINTS * n * grad_len]);
+                inputs.transform::<F, POINTS, POINTS>(tiles.clone(), x);
+                gradients.transform::<Transposed<F>, TILE, POINTS>(tiles, grad);
+                let axes = [ConvAxis::valid(n * phases, phases, phases), columns];
+                add(GradientTiles { sizes: ConvSizes { batch: 1, axes, ..*s }, n_points: POINTS, x, grad });
             }
         });
     });
 }
 
-/// Gradients of the taps from those of the transformed weight.
-pub(super) fn gradients_of_taps<T: Scalar>(points: [&[T]; POINTS]) -> [Vec<T>; TAPS] {
-    let mut taps = std::array::from_fn(|_| vec![T::zero(); points[0].len()]);
-    untransform_taps(points, taps.each_mut().map(|tap: &mut Vec<T>| &mut tap[..]));
-    taps
+/// Gradients of the rows of taps, [offsets of rows, ...], from those of the points, each [phases, ...].
+pub(super) fn gradients_of_taps<T: Scalar>(taps: FilterTaps, points: &[Vec<T>], phases: usize) -> Vec<T> {
+    fn of<T: Scalar, F: LinearMap<TAPS, POINTS>, const TAPS: usize, const POINTS: usize>(
+        points: &[Vec<T>],
+        phases: usize,
+    ) -> Vec<T> {
+        let n = points[0].len() / phases;
+        let mut gradients = vec![T::zero(); TAPS * phases * n];
+        for phase in 0..phases {
+            let points = std::array::from_fn(|point| &points[point][phase * n..][..n]);
+            let mut rows = gradients.chunks_exact_mut(n).skip(phase).step_by(phases);
+            let rows = std::array::from_fn(|_| rows.next().unwrap_or_default());
+            transform::<T, Transposed<F>, POINTS, TAPS>(points, rows);
+        }
+        gradients
+    }
+    match taps {
+        FilterTaps::Two => of::<T, TwoTaps, 2, 5>(points, phases),
+        FilterTaps::Three => of::<T, ThreeTaps, 3, 6>(points, phases),
+    }
 }

@@ -3,7 +3,7 @@
 use orator_nn::cpu::axis::ConvAxis;
 use orator_nn::cpu::direct_conv::{ConvSizes, forward, gradient_of_input, n_chunks};
 use orator_nn::cpu::weight_gradient::gradient_of_weight;
-use orator_nn::cpu::winograd;
+use orator_nn::cpu::winograd::FilterTaps;
 use std::sync::Mutex;
 
 /// Calls `f` with the indices of every product: input, weight, output.
@@ -42,14 +42,18 @@ fn largest_difference(a: &[f64], b: &[f64]) -> f64 {
 fn forward_and_gradients_are_those_of_the_definition() {
     let alone = ConvAxis::valid(1, 1, 1);
     let same = |n| ConvAxis::same(n, 3, 1);
+    let half = |n| ConvAxis::same(n, 4, 2);
     for (batch, n_in, n_out, axes) in [
         (13, 32, 40, [same(16), alone]),
         (3, 33, 32, [same(77), alone]),
         (13, 32, 32, [ConvAxis::valid(19, 3, 1), alone]),
         (9, 32, 35, [same(22), same(5)]),
+        (13, 32, 40, [half(32), alone]),
+        (5, 33, 32, [half(77), alone]),
+        (9, 32, 35, [half(23), half(7)]),
     ] {
         let s = ConvSizes { batch, n_in, n_out, axes };
-        assert!(winograd::applies(&s));
+        assert!(FilterTaps::of(&s).is_some());
         let (x, weight, bias) = (numbers(s.len_in(), 0.0), numbers(s.len_weight(), 1.0), numbers(n_out, 2.0));
         let grad = numbers(s.len_out(), 3.0);
         let mut expected: Vec<f64> = bias.iter().copied().cycle().take(s.len_out()).collect();
