@@ -9,10 +9,11 @@ use super::kernel::MAX_ROWS;
 use super::packed_matrix::PackedWeights;
 use super::spin_pool::parallel_for;
 use super::tensor::{Scalar, SharedOutputPtr, scratch};
-use super::winograd_transforms::{LinearMap, TILE, ThreeTaps, Transposed, TwoTaps, transform};
+use super::winograd_transforms::{Filter, Lanes, TILE, ThreeTaps, TwoTaps, transform};
 use std::ops::Range;
 
-/// Number of tiles, and of channels on either side, below which the transforms cost more than they save.
+/// Number of tiles (twice as many for two taps), and of channels on either side, below which the transforms cost more than
+/// they save.
 const MIN_TILES: usize = 24;
 const MIN_CHANNELS: usize = 32;
 /// Transformed values of a part, and of the groups of tiles of a weight's gradient.
@@ -36,12 +37,12 @@ impl FilterTaps {
     /// Filter of a convolution and its gradients; `None`: they are computed directly.
     pub fn of(s: &ConvSizes) -> Option<Self> {
         let [rows, columns] = s.axes;
-        let taps = match (rows.kernel, rows.stride, columns.stride) {
-            (3, 1, 1) => Self::Three,
-            (4, 2, _) => Self::Two,
+        let (taps, min_tiles) = match (rows.kernel, rows.stride, columns.stride) {
+            (3, 1, 1) => (Self::Three, MIN_TILES),
+            (4, 2, _) => (Self::Two, 2 * MIN_TILES),
             _ => return None,
         };
-        let is_large = rows.n_out >= TILE && s.batch * rows.n_out.div_ceil(TILE) >= MIN_TILES;
+        let is_large = rows.n_out >= TILE && s.batch * rows.n_out.div_ceil(TILE) >= min_tiles;
         (is_large && s.n_in.min(s.n_out) >= MIN_CHANNELS).then_some(taps)
     }
 }
@@ -111,11 +112,12 @@ impl<T: Scalar> TileRows<'_, T> {
         })
     }
 
-    /// Applies the transform `X` to tiles: matrices [tiles, phases, row] that follow each other in `to`.
-    fn transform<X: LinearMap<N, POINTS>, const N: usize, const POINTS: usize>(
+    /// Applies `map` to tiles: matrices [tiles, phases, row] that follow each other in `to`.
+    fn transform<const N: usize, const POINTS: usize>(
         &self,
         tiles: Range<usize>,
         to: &mut [T],
+        map: impl Fn([Lanes<T>; N]) -> [Lanes<T>; POINTS] + Sync,
     ) {
         let (len, start, n) = (self.zeros.len(), tiles.start, tiles.len() * self.phases);
         assert!(to.len() == POINTS * n * len);
@@ -127,7 +129,7 @@ impl<T: Scalar> TileRows<'_, T> {
                 let to = std::array::from_fn(|point| unsafe {
                     std::slice::from_raw_parts_mut(to.at((point * n + row) * len), len)
                 });
-                transform::<T, X, N, POINTS>(self.tile(start + row / self.phases, row % self.phases), to);
+                transform(self.tile(start + row / self.phases, row % self.phases), to, &map);
             }
         });
     }
@@ -159,13 +161,11 @@ impl<T: Scalar> WinogradPass<'_, T> {
         }
     }
 
-    unsafe fn run_filter<F, const TAPS: usize, const POINTS: usize>(
+    unsafe fn run_filter<F: Filter<TAPS, POINTS>, const TAPS: usize, const POINTS: usize>(
         &self,
         to: SharedOutputPtr<T>,
         finish: impl Fn(usize, &mut [T]) + Sync,
-    ) where
-        F: LinearMap<POINTS, POINTS> + LinearMap<TAPS, POINTS> + LinearMap<POINTS, TILE>,
-    {
+    ) {
         let [rows, columns] = &self.pass.windows;
         let phases = rows.kernel_offsets.len() / TAPS;
         let (from_len, to_len) = (columns.n_from * self.pass.n_from, columns.n * self.pass.n_to);
@@ -186,7 +186,7 @@ impl<T: Scalar> WinogradPass<'_, T> {
             let tiles = all_tiles.part(part);
             let n = tiles.len();
             let transformed = &mut transformed[..POINTS * phases * n * from_len];
-            inputs.transform::<F, POINTS, POINTS>(tiles.clone(), transformed);
+            inputs.transform(tiles.clone(), transformed, F::inputs);
             let products = ConvPass {
                 batch: 1,
                 n_from: self.pass.n_from,
@@ -204,7 +204,9 @@ impl<T: Scalar> WinogradPass<'_, T> {
             for tile in tiles.clone() {
                 let sums = |point: usize| &sums[(point * n + tile - tiles.start) * to_len..][..to_len];
                 // SAFETY: only this task writes the rows of these tiles.
-                unsafe { self.write_tile::<F, POINTS>(tile, all_tiles.per_sample, std::array::from_fn(sums), to) };
+                unsafe {
+                    self.write_tile::<F, TAPS, POINTS>(tile, all_tiles.per_sample, std::array::from_fn(sums), to)
+                };
             }
             if rows.to_step == 1 && columns.n == columns.n_to {
                 let row = |tile: usize| tile / all_tiles.per_sample * rows.n + tile % all_tiles.per_sample * TILE;
@@ -224,7 +226,7 @@ impl<T: Scalar> WinogradPass<'_, T> {
     ///
     /// # Safety
     /// As for [`Self::run`].
-    unsafe fn write_tile<F: LinearMap<POINTS, TILE>, const POINTS: usize>(
+    unsafe fn write_tile<F: Filter<TAPS, POINTS>, const TAPS: usize, const POINTS: usize>(
         &self,
         tile: usize,
         n_tiles: usize,
@@ -232,21 +234,24 @@ impl<T: Scalar> WinogradPass<'_, T> {
         to: SharedOutputPtr<T>,
     ) {
         let [rows, columns] = &self.pass.windows;
-        let (b, first) = (tile / n_tiles, tile % n_tiles * TILE);
-        let len = sums[0].len();
+        let (b, first, len, n_to) = (tile / n_tiles, tile % n_tiles * TILE, sums[0].len(), self.pass.n_to);
+        let at = |row: usize, column: usize| {
+            let row = b * rows.n_to + rows.to_first + (first + row) * rows.to_step;
+            // SAFETY: guaranteed by the caller.
+            unsafe { to.at((row * columns.n_to + columns.to_first + column * columns.to_step) * n_to) }
+        };
+        if columns.to_step == 1 && first + TILE <= rows.n {
+            // SAFETY: only this task writes these rows.
+            let four = std::array::from_fn(|row| unsafe { std::slice::from_raw_parts_mut(at(row, 0), len) });
+            return transform(sums, four, F::outputs);
+        }
         scratch(TILE * len, |outputs: &mut [T]| {
             let mut four = outputs.chunks_exact_mut(len);
-            if let [Some(a), Some(b), Some(c), Some(d)] = std::array::from_fn(|_| four.next()) {
-                transform::<T, F, POINTS, TILE>(sums, [a, b, c, d]);
-            }
-            for (row, output) in (first..rows.n.min(first + TILE)).zip(outputs.chunks_exact(len)) {
-                let row = b * rows.n_to + rows.to_first + row * rows.to_step;
-                // Adjacent columns are copied together.
-                let width = if columns.to_step == 1 { len } else { self.pass.n_to };
-                for (column, output) in output.chunks_exact(width).enumerate() {
-                    let column = row * columns.n_to + columns.to_first + column * columns.to_step;
+            transform(sums, std::array::from_fn(|_| four.next().unwrap_or_default()), F::outputs);
+            for (row, output) in outputs.chunks_exact(len).enumerate().take(rows.n - first) {
+                for (column, output) in output.chunks_exact(n_to).enumerate() {
                     // SAFETY: guaranteed by the caller.
-                    unsafe { to.at(column * self.pass.n_to).copy_from_nonoverlapping(output.as_ptr(), width) };
+                    unsafe { at(row, column).copy_from_nonoverlapping(output.as_ptr(), n_to) };
                 }
             }
         });
@@ -254,7 +259,7 @@ impl<T: Scalar> WinogradPass<'_, T> {
 }
 
 /// Transforms packed weights, whose steps are `TAPS` times `phases` rows: those of a point have one row per phase.
-fn transform_weights<T: Scalar, F: LinearMap<TAPS, POINTS>, const TAPS: usize, const POINTS: usize>(
+fn transform_weights<T: Scalar, F: Filter<TAPS, POINTS>, const TAPS: usize, const POINTS: usize>(
     weights: &PackedWeights<T>,
     phases: usize,
 ) -> [PackedWeights<T>; POINTS] {
@@ -272,7 +277,7 @@ fn transform_weights<T: Scalar, F: LinearMap<TAPS, POINTS>, const TAPS: usize, c
             // SAFETY: the tasks write disjoint parts of the data of each point.
             unsafe { std::slice::from_raw_parts_mut(data.at(starts[panel] + phase * n), n) }
         });
-        transform::<T, F, TAPS, POINTS>(taps, to);
+        transform(taps, to, F::taps);
     });
     points
 }
@@ -294,18 +299,16 @@ pub(super) fn gradient_tiles<T: Scalar>(
     add: impl FnMut(GradientTiles<T>),
 ) {
     match taps {
-        FilterTaps::Two => gradient_tiles_of::<T, TwoTaps, 5>(s, operands, add),
-        FilterTaps::Three => gradient_tiles_of::<T, ThreeTaps, 6>(s, operands, add),
+        FilterTaps::Two => gradient_tiles_of::<T, TwoTaps, 2, 5>(s, operands, add),
+        FilterTaps::Three => gradient_tiles_of::<T, ThreeTaps, 3, 6>(s, operands, add),
     }
 }
 
-fn gradient_tiles_of<T: Scalar, F, const POINTS: usize>(
+fn gradient_tiles_of<T: Scalar, F: Filter<TAPS, POINTS>, const TAPS: usize, const POINTS: usize>(
     s: &ConvSizes,
     [x, grad]: [&[T]; 2],
     mut add: impl FnMut(GradientTiles<T>),
-) where
-    F: LinearMap<POINTS, POINTS> + LinearMap<POINTS, TILE>,
-{
+) {
     let [rows, columns] = s.axes;
     let phases = rows.stride;
     let (x_len, grad_len) = (columns.n_in * s.n_in, columns.n_out * s.n_out);
@@ -322,8 +325,8 @@ fn gradient_tiles_of<T: Scalar, F, const POINTS: usize>(
             for tiles in (0..all_tiles.n_parts).map(|part| all_tiles.part(part)) {
                 let n = tiles.len();
                 let (x, grad) = (&mut x[..POINTS * phases * n * x_len], &mut grad[..POINTS * n * grad_len]);
-                inputs.transform::<F, POINTS, POINTS>(tiles.clone(), x);
-                gradients.transform::<Transposed<F>, TILE, POINTS>(tiles, grad);
+                inputs.transform(tiles.clone(), x, F::inputs);
+                gradients.transform(tiles, grad, F::gradients_of_outputs);
                 let axes = [ConvAxis::valid(n * phases, phases, phases), columns];
                 add(GradientTiles { sizes: ConvSizes { batch: 1, axes, ..*s }, n_points: POINTS, x, grad });
             }
@@ -333,7 +336,7 @@ fn gradient_tiles_of<T: Scalar, F, const POINTS: usize>(
 
 /// Gradients of the rows of taps, [offsets of rows, ...], from those of the points, each [phases, ...].
 pub(super) fn gradients_of_taps<T: Scalar>(taps: FilterTaps, points: &[Vec<T>], phases: usize) -> Vec<T> {
-    fn of<T: Scalar, F: LinearMap<TAPS, POINTS>, const TAPS: usize, const POINTS: usize>(
+    fn of<T: Scalar, F: Filter<TAPS, POINTS>, const TAPS: usize, const POINTS: usize>(
         points: &[Vec<T>],
         phases: usize,
     ) -> Vec<T> {
@@ -343,7 +346,7 @@ pub(super) fn gradients_of_taps<T: Scalar>(taps: FilterTaps, points: &[Vec<T>], 
             let points = std::array::from_fn(|point| &points[point][phase * n..][..n]);
             let mut rows = gradients.chunks_exact_mut(n).skip(phase).step_by(phases);
             let rows = std::array::from_fn(|_| rows.next().unwrap_or_default());
-            transform::<T, Transposed<F>, POINTS, TAPS>(points, rows);
+            transform(points, rows, F::gradients_of_taps);
         }
         gradients
     }
