@@ -11,3 +11,4 @@ mod score_maps;
 mod spin_pool;
 mod transformer;
 mod weights;
+mod winograd;
