@@ -11,6 +11,7 @@ use orator_base::stage::workdir;
 use orator_dataset::config::{Config, Settings};
 use orator_formats::word_vectors::WordVectors;
 use orator_media::aligner::Aligner;
+use orator_nn::device;
 use orator_onnx::{ModelStore, Runtime};
 use orator_pipeline::pose2d::models;
 use orator_pipeline::process::probe;
@@ -53,6 +54,7 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
             checks.extend(word_checks(&config.settings.models.dir));
             checks.extend(recogniser(&config.settings));
             checks.push(work(&config.settings.work.dir));
+            checks.push(training_device(&config.settings));
             checks.push(sandbox(config.settings.work.sandbox));
             checks.push(aligner());
         }
@@ -100,6 +102,15 @@ fn sandbox(is_enabled: bool) -> Check {
         Err(error) => (false, format!("not active: {error:#}")),
     };
     Check { is_full: is_active, ..ok("sandbox", found) }
+}
+
+/// The device of trainings.
+fn training_device(settings: &Settings) -> Check {
+    let choice = settings.work.device;
+    match device::open(choice, || None) {
+        Ok((_, chosen)) => ok("device of trainings", chosen.unwrap_or_else(|| choice.to_string())),
+        Err(error) => missing("device of trainings", error.to_string(), "set work.device = \"auto\""),
+    }
 }
 
 /// The word aligner. Only `orator align` needs it, so nothing counts as missing without it.
