@@ -140,7 +140,8 @@ mod tests {
         let late = GanSettings { decay_share: 0.25, ..decaying };
         assert_eq!([9, 87, 500].map(|step| late.rate(step, None)), [1.0, 1.0, 0.1]);
         assert!((late.rate(98, None) - 0.55).abs() < 1e-12);
-        let (start, middle, end) = (late.rate(40, Some(&(40..60))), late.rate(50, Some(&(40..60))), late.rate(60, Some(&(40..60))));
+        let (start, middle, end) =
+            (late.rate(40, Some(&(40..60))), late.rate(50, Some(&(40..60))), late.rate(60, Some(&(40..60))));
         assert!((start, end) == (1.0, 0.1) && (middle - 0.55).abs() < 1e-12);
     }
 

@@ -35,10 +35,12 @@ impl EpochSchedule {
     }
 
     /// Decay of the learning rate if it begins after the validation of step `done`, which depends only on the scores so
-    /// far. It ends with a validation.
+    /// far. It ends with a validation. The decay that ends with `steps` is not replaced once it has begun.
     pub fn decay(&self, done: usize, best: Option<(usize, f32)>) -> Option<Range<usize>> {
-        let n_epochs = (done as f64 * self.decay_share / self.epoch_steps as f64).ceil() as usize;
-        (n_epochs > 0 && self.is_plateau(done, best)).then(|| done..(done + n_epochs * self.epoch_steps).min(self.steps))
+        let n_steps = done as f64 * self.decay_share;
+        let n_epochs = (n_steps / self.epoch_steps as f64).ceil() as usize;
+        let is_next = n_steps > 0.0 && done as f64 + n_steps < self.steps as f64 && self.is_plateau(done, best);
+        is_next.then(|| done..(done + n_epochs * self.epoch_steps).min(self.steps))
     }
 
     /// Last step of the training as known after `done` steps.
@@ -270,7 +272,7 @@ mod tests {
     fn schedule(schedule: EpochSchedule, scores: &[f32]) -> (Option<Range<usize>>, usize) {
         let (mut best, mut decay, mut done) = (None::<(usize, f32)>, None, 0);
         for score in scores {
-            if done == schedule.end(done, best, decay.as_ref()) {
+            if done >= schedule.end(done, best, decay.as_ref()) {
                 break;
             }
             done += 10;
@@ -289,7 +291,8 @@ mod tests {
         let rising = [3.0, 2.0, 1.0, 1.5, 1.2, 0.9, 0.8, 0.7, 0.6, 0.5, 0.4, 0.3, 0.2];
         // The fifth score is the second without an improvement: a quarter of 50 steps, in epochs, follows.
         assert_eq!(schedule(base, &rising), (Some(50..70), 70));
-        assert_eq!(schedule(EpochSchedule { steps: 60, ..base }, &rising), (Some(50..60), 60));
+        assert_eq!(schedule(EpochSchedule { steps: 65, ..base }, &rising), (Some(50..65), 70));
+        assert_eq!(schedule(EpochSchedule { steps: 60, ..base }, &rising), (None, 60));
         assert_eq!(schedule(EpochSchedule { patience: 3, ..base }, &rising), (None, 120));
         assert_eq!(schedule(base, &falling), (None, 120));
         assert_eq!(schedule(EpochSchedule { decay_share: 0.0, ..base }, &rising), (None, 50));

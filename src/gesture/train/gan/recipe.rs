@@ -228,9 +228,10 @@ pub fn lines(of: &GanSettings, material: &TrainingMaterial, secs_a_step: Option<
     let (train, held_out) = (length(material.train_secs), length(material.validation_secs));
     let whose = if material.n_speakers > 1 { format!(" of {} speakers", material.n_speakers) } else { String::new() };
     let time = secs_a_step.map(|secs| format!(", about {}", length(secs * of.steps as f64))).unwrap_or_default();
+    let decay = if of.decay_share > 0.0 { ", with a decay of the learning rate," } else { "" };
     let end = match of.patience {
         0 => String::new(),
-        epochs => format!("; stops early after {} without a better score", counted(epochs, "validation")),
+        epochs => format!("; stops early{decay} after {} without a better score", counted(epochs, "validation")),
     };
     let numbers = RECIPES[4..].iter().filter_map(|row| Some((row.key, values[row.key].as_f64()?)));
     let numbers = numbers.map(|(key, value)| {
@@ -287,7 +288,7 @@ pub(super) mod tests {
                     let settings = settings(&GanConfig::default(), &material, initial).unwrap();
                     let mut settings = orator_dataset::config::to_stored("gan", &settings).unwrap();
                     let keys = settings.as_object_mut().unwrap();
-                    ["channels", "bone_loss", "words", "decay_share"].into_iter().for_each(|key| drop(keys.shift_remove(key)));
+                    ["channels", "bone_loss", "words"].into_iter().for_each(|key| drop(keys.shift_remove(key)));
                     hasher.update(settings.to_string().as_bytes());
                 }
             }
