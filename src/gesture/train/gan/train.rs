@@ -30,6 +30,7 @@ use orator_nn::cpu::spin_pool::with_spinning_workers;
 use orator_nn::gan::generator::FRAMES_MULTIPLE;
 use orator_nn::weights::Contents;
 use rayon::ThreadPoolBuilder;
+use std::ops::Range;
 use std::path::Path;
 use std::sync::mpsc::{self, Receiver, Sender};
 use std::time::{Duration, Instant};
@@ -226,8 +227,8 @@ impl ValidatedTraining for GanTraining<'_, '_> {
     }
 
     fn schedule(&self) -> EpochSchedule {
-        let GanSettings { steps, epoch_steps, checkpoint_every, patience, .. } = self.trainer.settings;
-        EpochSchedule { steps, epoch_steps, checkpoint_every, patience }
+        let GanSettings { steps, epoch_steps, checkpoint_every, patience, decay_share, .. } = self.trainer.settings;
+        EpochSchedule { steps, epoch_steps, checkpoint_every, patience, decay_share }
     }
 
     fn is_pretrained(&self) -> bool {
@@ -240,6 +241,14 @@ impl ValidatedTraining for GanTraining<'_, '_> {
 
     fn best(&mut self) -> &mut Option<(usize, f32)> {
         &mut self.trainer.best
+    }
+
+    fn decay(&self) -> Option<&Range<usize>> {
+        self.trainer.decay.as_ref()
+    }
+
+    fn set_decay(&mut self, decay: Range<usize>) {
+        self.trainer.decay = Some(decay);
     }
 
     fn step(&mut self) -> Result<StepReport> {
