@@ -17,7 +17,11 @@ pub fn open_device(on_card: bool) -> anyhow::Result<Device> {
     if !on_card {
         return Ok(Device::Cpu);
     }
-    Device::new_cuda(0).context(
+    #[cfg(feature = "cuda")]
+    let opened = crate::cuda::gpu::open(0);
+    #[cfg(not(feature = "cuda"))]
+    let opened = Device::new_cuda(0);
+    opened.context(
         "no usable NVIDIA GPU: gan.device = \"cuda\" needs a GPU and a program built with `cargo build --release \
          --features cuda`; set gan.device = \"cpu\" to train without",
     )
