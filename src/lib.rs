@@ -74,6 +74,7 @@ pub use orator_gesture::batch::{BatchReport, SpeechBatch};
 pub use orator_gesture::generate::GestureGenerator;
 pub use orator_gesture::generate::seq2seq::SequenceGenerator;
 pub use orator_media::ffmpeg::audio::read_sound;
+pub use orator_nn::device::Device;
 pub use orator_nn::seq2seq::predict::StateAtSeams;
 
 // Motion to files for animation programs.

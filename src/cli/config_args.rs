@@ -1,6 +1,10 @@
 //! Arguments shared by several verbs.
 
+use super::ui::Ui;
 use crate::Split;
+use orator_base::stage::progress::Progress as _;
+use orator_base::types::device::DeviceChoice;
+use orator_nn::device::{self, Device};
 use std::path::PathBuf;
 
 /// Configuration file and overrides of its keys.
@@ -38,6 +42,34 @@ impl ConfigArgs {
         let config = orator_dataset::config::load(&self.config, &self.set)?;
         config.notes.iter().for_each(|note| crate::cli::ui::note(&format!("note: {note}")));
         Ok(config)
+    }
+}
+
+/// Device of the networks.
+#[derive(clap::Args, Clone, Copy, Debug, Default)]
+pub struct DeviceArgs {
+    /// Device of the networks: `cpu`, `cuda` (the first NVIDIA GPU), `cuda:N` (GPU N, counted from 0), or `auto` (the
+    /// first GPU if it can be used, otherwise the CPU); defaults to `cpu`, in `train` to `work.device`.
+    #[arg(long, value_name = "DEVICE")]
+    device: Option<DeviceChoice>,
+}
+
+impl DeviceArgs {
+    /// Opens the device; `cpu_only` returns why the networks run on the CPU only, if they do.
+    ///
+    /// # Errors
+    /// A GPU that cannot be used.
+    pub fn open<'a>(
+        self,
+        default: DeviceChoice,
+        cpu_only: impl FnOnce() -> Option<&'a str>,
+        ui: &Ui,
+    ) -> anyhow::Result<Device> {
+        let (device, chosen) = device::open(self.device.unwrap_or(default), cpu_only)?;
+        // Without CUDA, the default leaves no choice to report.
+        let chosen = chosen.filter(|_| self.device.is_some() || device::has_cuda());
+        chosen.iter().for_each(|chosen| ui.say(&format!("device: {chosen}")));
+        Ok(device)
     }
 }
 

@@ -7,6 +7,7 @@ use anyhow::{Context, Result, bail, ensure};
 use orator_base::stage::fingerprint::{HashCache, hash_file};
 use orator_base::stage::progress::Progress;
 use orator_base::stage::{Unit, workdir};
+use orator_base::types::device::DeviceChoice;
 use orator_dataset::config::videos::Videos;
 use orator_dataset::config::{Config, GanConfig, Seq2seqConfig};
 use orator_pipeline::Pipeline;
@@ -316,7 +317,7 @@ fn has(videos: &Videos, unit: &PlannedUnit) -> bool {
 /// jobs does not change results.
 pub fn settings_hash(config: &Config) -> Result<String> {
     let mut settings = config.settings.clone();
-    settings.work.jobs = 0;
+    (settings.work.jobs, settings.work.device) = (0, DeviceChoice::default());
     settings.gan = GanConfig::default();
     settings.seq2seq = Seq2seqConfig::default();
     Ok(blake3::hash(&serde_json::to_vec(&settings)?).to_hex().to_string())

@@ -9,24 +9,6 @@ use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::collections::BTreeMap;
 
-/// Opens the CPU or the first NVIDIA GPU.
-///
-/// # Errors
-/// The program was built without CUDA, or there is no GPU.
-pub fn open_device(on_card: bool) -> anyhow::Result<Device> {
-    if !on_card {
-        return Ok(Device::Cpu);
-    }
-    #[cfg(feature = "cuda")]
-    let opened = crate::cuda::gpu::open(0);
-    #[cfg(not(feature = "cuda"))]
-    let opened = Device::new_cuda(0);
-    opened.context(
-        "no usable NVIDIA GPU: gan.device = \"cuda\" needs a GPU and a program built with `cargo build --release \
-         --features cuda`; set gan.device = \"cpu\" to train without",
-    )
-}
-
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Init {
     Constant(f64),

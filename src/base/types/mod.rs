@@ -1,6 +1,7 @@
 //! Plain values used by all modules: time, pictures, poses, sound, intervals. No file access, no mathematics beyond
 //! their own invariants; this module imports no other module of the project.
 
+pub mod device;
 pub mod file_name;
 pub mod image;
 pub mod interval;

@@ -18,6 +18,7 @@ use orator_gesture::evaluate::table::table::Table;
 use orator_gesture::generate::model::model_lock;
 use orator_gesture::metrics::definition::Definition;
 use orator_gesture::metrics::settings::MetricSettings;
+use orator_nn::device::Device;
 use serde_json::{Value, json};
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -58,10 +59,16 @@ pub(super) fn folders(config: &ConfigArgs, which: &str) -> Result<Vec<SpeakerFol
 }
 
 /// Measures all `speakers` on `split`; a speaker that cannot be measured does not stop the others.
-pub(super) fn run(speakers: &[SpeakerFolders], split: Split, settings: &MetricSettings, ui: &Ui) -> Result<Outcome> {
+pub(super) fn run(
+    speakers: &[SpeakerFolders],
+    split: Split,
+    settings: &MetricSettings,
+    device: &Device,
+    ui: &Ui,
+) -> Result<Outcome> {
     let (mut text, mut rows, mut n_failed) = (heading(split, settings), Vec::new(), 0);
     for speaker in speakers {
-        match measure(speaker, split, settings, ui) {
+        match measure(speaker, split, settings, device, ui) {
             Ok((_, table)) => {
                 let _ = writeln!(text, "{:<16} {}", speaker.name, line(&table));
                 rows.push(row(&speaker.name, &table));
@@ -95,12 +102,14 @@ pub fn measure(
     speaker: &SpeakerFolders,
     split: Split,
     settings: &MetricSettings,
+    device: &Device,
     ui: &Ui,
 ) -> Result<(Evaluation, Table)> {
     let _dataset = FolderLock::shared(&speaker.dataset)?;
     let _model = model_lock(&speaker.model)?;
     let dataset = Dataset::open(&speaker.dataset)?;
-    let checkpoints = EvaluatedCheckpoint::open_all(std::slice::from_ref(&speaker.model), &dataset.info().speaker)?;
+    let (model, name) = (std::slice::from_ref(&speaker.model), &dataset.info().speaker);
+    let checkpoints = EvaluatedCheckpoint::open_all_on(model, name, device)?;
     let store = MotionStore::in_folder(&speaker.dataset, MEMORY_BYTES);
     let evaluation = Evaluation::of_generators(&dataset, &checkpoints, split, &store, ui)?;
     let table = evaluation.measure(settings, ui);

@@ -2,13 +2,14 @@
 
 use super::speakers;
 use crate::cli::Outcome;
-use crate::cli::config_args::{ConfigArgs, split};
+use crate::cli::config_args::{ConfigArgs, DeviceArgs, split};
 use crate::cli::moved::MovedVerb;
 use crate::cli::sandbox::enter_sandbox;
 use crate::cli::train::stopped::same_command;
 use crate::cli::ui::Ui;
 use anyhow::{Result, bail, ensure};
 use orator_base::stage::workdir::{self, FolderLock};
+use orator_base::types::device::DeviceChoice;
 use orator_base::types::time::FrameRate;
 use orator_dataset::{Dataset, Split};
 use orator_formats::word_vectors::WordVectors;
@@ -19,8 +20,10 @@ use orator_gesture::evaluate::conclusion::text;
 use orator_gesture::evaluate::table::result::StoredResult;
 use orator_gesture::evaluate::table::{compare, result};
 use orator_gesture::generate::model::model_lock;
+use orator_gesture::generate::seq2seq::metadata::cpu_only;
 use orator_gesture::metrics::settings::Convention;
 use orator_gesture::metrics::settings::MetricSettings;
+use orator_nn::device::Device;
 use orator_report::evaluation::page;
 use serde::Deserialize as _;
 use serde::de::IntoDeserializer as _;
@@ -106,21 +109,29 @@ struct MotionArgs {
     /// Also write an HTML page with the table, plots, and truth and prediction played side by side with the audio.
     #[arg(long, value_name = "PAGE.html")]
     report: Option<PathBuf>,
+    #[command(flatten)]
+    device: DeviceArgs,
 }
 
 pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
-    let MotionArgs { report, dataset, checkpoint, speaker, config, split, .. } = &args.motion;
+    let MotionArgs { report, dataset, checkpoint, speaker, config, split, device, .. } = &args.motion;
     if let Some(which) = speaker {
         let folders = speakers::folders(&ConfigArgs { config: config.clone(), set: Vec::new() }, which)?;
-        enter_sandbox(None, speakers::locked(&folders));
-        return speakers::run(&folders, *split, &settings(&args.motion), ui);
+        let device = device.open(DeviceChoice::Cpu, || None, ui)?;
+        if device.is_cpu() {
+            enter_sandbox(None, speakers::locked(&folders));
+        }
+        return speakers::run(&folders, *split, &settings(&args.motion), &device, ui);
     }
-    enter_sandbox(report.as_deref(), dataset.iter().chain(checkpoint).map(PathBuf::as_path));
+    let device = device.open(DeviceChoice::Cpu, || cpu_only(checkpoint.iter().map(PathBuf::as_path)), ui)?;
+    if device.is_cpu() {
+        enter_sandbox(report.as_deref(), dataset.iter().chain(checkpoint).map(PathBuf::as_path));
+    }
     match args.mode {
         Some(EvaluateMode::Lifter(args)) => args.fail("evaluate lifter"),
         Some(EvaluateMode::Compare(args)) => compare_results(&args, ui),
         Some(EvaluateMode::People(args)) => args.fail("evaluate people"),
-        None => motion(&args.motion, ui),
+        None => motion(&args.motion, &device, ui),
     }
 }
 
@@ -138,7 +149,7 @@ fn check_report(args: &MotionArgs) -> Result<()> {
     Ok(())
 }
 
-fn motion(args: &MotionArgs, ui: &Ui) -> Result<Outcome> {
+fn motion(args: &MotionArgs, device: &Device, ui: &Ui) -> Result<Outcome> {
     check_report(args)?;
     // The folder of a dataset is writable in the sandbox because it contains the dataset's lock.
     let in_dataset = |folder: &PathBuf| MotionStore::in_folder(folder, MEMORY_BYTES);
@@ -146,7 +157,7 @@ fn motion(args: &MotionArgs, ui: &Ui) -> Result<Outcome> {
     // The page lists its inputs, so the locks prevent `orator forget` from removing them before the page is written.
     let _dataset = args.dataset.as_deref().map(FolderLock::shared).transpose()?;
     let _models: Vec<FolderLock> = args.checkpoint.iter().map(|path| model_lock(path)).collect::<Result<_>>()?;
-    let evaluation = evaluation(args, &store, ui)?;
+    let evaluation = evaluation(args, device, &store, ui)?;
     let table = evaluation.measure(&settings(args), ui)?;
     let mut facts: Value = result::json(&table);
     if let Some(words) = &args.words {
@@ -193,10 +204,10 @@ fn title(args: &MotionArgs) -> String {
 }
 
 /// The evaluation of files or of a dataset.
-fn evaluation(args: &MotionArgs, store: &MotionStore, ui: &Ui) -> Result<Evaluation> {
+fn evaluation(args: &MotionArgs, device: &Device, store: &MotionStore, ui: &Ui) -> Result<Evaluation> {
     if let Some(dataset) = &args.dataset {
         let dataset = Dataset::open(dataset)?;
-        let mut checkpoints = EvaluatedCheckpoint::open_all(&args.checkpoint, &dataset.info().speaker)?;
+        let mut checkpoints = EvaluatedCheckpoint::open_all_on(&args.checkpoint, &dataset.info().speaker, device)?;
         let words = args.words.as_deref().map(WordVectors::open).transpose()?.map(Arc::new);
         EvaluatedCheckpoint::set_options(&mut checkpoints, words.as_ref(), args.carry_state)?;
         return Evaluation::of_generators(&dataset, &checkpoints, args.split, store, ui);

@@ -1,22 +1,29 @@
 //! Motion for many audio files in one call.
 
 use crate::cli::Outcome;
+use crate::cli::config_args::DeviceArgs;
 use crate::cli::sandbox::enter_sandbox;
 use crate::cli::signals;
 use crate::cli::ui::Ui;
 use anyhow::Result;
 use orator_base::text::{counted, first_three};
+use orator_base::types::device::DeviceChoice;
 use orator_gesture::batch::{BatchReport, BatchState, SpeechBatch};
+use orator_gesture::generate::seq2seq::metadata::cpu_only;
 use serde_json::json;
 
 /// Maximum number of files in the final table, not counting failures.
 const MAX_LISTED: usize = 30;
 
-pub fn run(batch: &SpeechBatch, ui: &Ui) -> Result<Outcome> {
+pub fn run(batch: &SpeechBatch, device: DeviceArgs, ui: &Ui) -> Result<Outcome> {
     let checkpoints = batch.sounds.iter().filter_map(|sound| sound.checkpoint.as_deref());
-    enter_sandbox([batch.folder.as_path()], checkpoints.chain(batch.checkpoint.as_deref()));
+    let checkpoints = checkpoints.chain(batch.checkpoint.as_deref());
+    let device = device.open(DeviceChoice::Cpu, || cpu_only(checkpoints.clone()), ui)?;
+    if device.is_cpu() {
+        enter_sandbox([batch.folder.as_path()], checkpoints);
+    }
     signals::exit_on_signal("completed audio files are saved; run the same command again to continue");
-    let report = batch.run(ui)?;
+    let report = batch.run(&device, ui)?;
     ui.summary(&text(&report), None, json!(report));
     Ok(if report.failed > 0 { Outcome::SomeFailed } else { Outcome::Done })
 }

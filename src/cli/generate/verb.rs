@@ -2,6 +2,7 @@
 
 use super::batch;
 use crate::cli::Outcome;
+use crate::cli::config_args::DeviceArgs;
 use crate::cli::figure_args::FigureArgs;
 use crate::cli::outputs::{OutputFiles, is_same_file, names, next_output, outputs, variant_path};
 use crate::cli::sandbox::enter_sandbox;
@@ -9,12 +10,13 @@ use crate::cli::ui::Ui;
 use anyhow::{Context as _, Result, bail, ensure};
 use orator_base::stage::progress::Progress as _;
 use orator_base::text::{counted, length};
+use orator_base::types::device::DeviceChoice;
 use orator_formats::word_vectors::WordVectors;
 use orator_gesture::batch::speech::{SegmentFacts, SpeechSource};
 use orator_gesture::batch::{SpeechBatch, motion_files, sounds, transcripts};
 use orator_gesture::generate::model::GenerationChoice;
 use orator_gesture::generate::model::{checkpoint_file, model_lock};
-use orator_gesture::generate::seq2seq::metadata::reads_transcript;
+use orator_gesture::generate::seq2seq::metadata::{cpu_only, reads_transcript};
 use orator_gesture::generate::trained::TrainedSpeaker;
 use orator_nn::seq2seq::predict::StateAtSeams;
 use serde_json::json;
@@ -82,13 +84,19 @@ pub struct Args {
     /// Regenerate outputs of --audio-folder and --batch that are up to date.
     #[arg(long, alias = "again", conflicts_with = "audio")]
     force: bool,
+    #[command(flatten)]
+    device: DeviceArgs,
 }
 
 pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
-    let Some(audio) = &args.audio else { return batch::run(&batch(args)?, ui) };
+    let device = args.device;
+    let Some(audio) = &args.audio else { return batch::run(&batch(args)?, device, ui) };
     let variants = variants(&args);
     let files: Vec<Vec<PathBuf>> = variants.iter().map(|variant| variant.files(&args.out)).collect();
-    enter_sandbox(files.iter().flatten().map(PathBuf::as_path), args.checkpoint.as_deref());
+    let device = device.open(DeviceChoice::Cpu, || cpu_only(args.checkpoint.as_deref()), ui)?;
+    if device.is_cpu() {
+        enter_sandbox(files.iter().flatten().map(PathBuf::as_path), args.checkpoint.as_deref());
+    }
     let Some(given) = &args.checkpoint else { bail!("give --checkpoint") };
     let outputs: Vec<OutputFiles> = files
         .iter()
@@ -106,7 +114,7 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     let mut results = Vec::new();
     for (variant, outputs) in variants.iter().zip(&outputs) {
         let choice = GenerationChoice { speaker: args.speaker.clone(), seed: variant.seed };
-        let mut trained = TrainedSpeaker::open_as(&checkpoint, &choice)?;
+        let mut trained = TrainedSpeaker::open_as(&checkpoint, &choice, &device)?;
         if let Some(vectors) = &vectors {
             trained.set_word_vectors(vectors.clone())?;
         }

@@ -2,7 +2,7 @@
 
 use super::train::train_speakers;
 use crate::cli::Outcome;
-use crate::cli::config_args::ConfigArgs;
+use crate::cli::config_args::{ConfigArgs, DeviceArgs};
 use crate::cli::sandbox::this_program;
 use crate::cli::setup::models::with_models;
 use crate::cli::signals;
@@ -69,6 +69,8 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     let (from, to) = (args.from.unwrap_or(default.from), args.to.unwrap_or(default.to));
     let selection = Selection { from, to, speakers: args.speaker, jobs: args.jobs, force: args.force };
     let pipeline = Pipeline::open(args.config.load()?)?.with_processes(this_program());
+    let device = pipeline.config().settings.work.device;
+    let device = args.train.then(|| DeviceArgs::default().open(device, || None, ui)).transpose()?;
     signals::exit_on_signal("completed stages are saved; run the same command again to continue");
     let mut report = with_models(&pipeline.config().settings, ui, || pipeline.run(&selection, ui))?;
 
@@ -115,9 +117,9 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     };
     let mut facts = json!(report);
     let mut outcome = if n_failed == 0 { Outcome::Done } else { Outcome::SomeFailed };
-    if args.train {
+    if let Some(device) = &device {
         stop_on_signal(ui);
-        let trained = match train_speakers(&pipeline, &report.datasets, ui) {
+        let trained = match train_speakers(&pipeline, &report.datasets, device, ui) {
             Ok(trained) => trained,
             Err(error) => return report_stopped(error, ui),
         };

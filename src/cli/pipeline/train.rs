@@ -20,6 +20,7 @@ use orator_gesture::evaluate::clips::motion_store::StoredMotion;
 use orator_gesture::evaluate::conclusion::conclusion::{better_than_constant_pose, depends_on_audio};
 use orator_gesture::generate::model::model_lock;
 use orator_gesture::metrics::settings::MetricSettings;
+use orator_nn::device::Device;
 use orator_pipeline::stale_results::OLD_MODEL;
 use orator_pipeline::{Pipeline, UnitState};
 use orator_report::evaluation::page;
@@ -33,7 +34,12 @@ const MAX_FILM_SECS: f64 = 20.0;
 ///
 /// # Errors
 /// A training that was stopped on request; failures of a speaker are part of the results.
-pub(super) fn train_speakers(pipeline: &Pipeline, datasets: &[PathBuf], ui: &Ui) -> Result<TrainedModels> {
+pub(super) fn train_speakers(
+    pipeline: &Pipeline,
+    datasets: &[PathBuf],
+    device: &Device,
+    ui: &Ui,
+) -> Result<TrainedModels> {
     let mut config = pipeline.config().clone();
     let has_dataset = |name: &str| datasets.iter().any(|dir| dir.file_name().is_some_and(|of| of == name));
     config.settings.speaker.retain(|speaker| has_dataset(&speaker.name));
@@ -44,7 +50,7 @@ pub(super) fn train_speakers(pipeline: &Pipeline, datasets: &[PathBuf], ui: &Ui)
         if models.iter().any(|model| model.name == format!("gan/{speaker}") && model.state == UnitState::Stale) {
             move_aside(&folders.model)?;
         }
-        with_results(train_speaker(&config, speaker, ui)?, &folders, ui)
+        with_results(train_speaker(&config, speaker, device, ui)?, &folders, device, ui)
     })
 }
 
@@ -64,9 +70,9 @@ fn move_aside(model: &Path) -> Result<()> {
 
 /// Adds the evaluation to the result of a training. If the model cannot be evaluated, it remains and the reason is
 /// reported.
-fn with_results(model: TrainedModel, folders: &SpeakerFolders, ui: &Ui) -> Result<TrainedModel> {
+fn with_results(model: TrainedModel, folders: &SpeakerFolders, device: &Device, ui: &Ui) -> Result<TrainedModel> {
     let TrainedModel { mut text, mut next, mut facts, has_page } = model;
-    let evaluated = evaluate(folders, ui);
+    let evaluated = evaluate(folders, device, ui);
     match &evaluated {
         Ok(results) => {
             text += &format!("\n{}\n{}\npage  {}", results.verdicts[0], results.verdicts[1], results.page.display());
@@ -96,13 +102,13 @@ struct ModelResults {
 
 /// Evaluates a model on the test split, else on the validation split, else on the training split, which the page
 /// states; writes `film.mp4` and `result.html` into the folder of the model.
-fn evaluate(folders: &SpeakerFolders, ui: &Ui) -> Result<ModelResults> {
+fn evaluate(folders: &SpeakerFolders, device: &Device, ui: &Ui) -> Result<ModelResults> {
     let _dataset = FolderLock::shared(&folders.dataset)?;
     let _model = model_lock(&folders.model)?;
     let dataset = Dataset::open(&folders.dataset)?;
     let has_samples = |split: &Split| !dataset.samples(*split).is_empty();
     let split = [Split::Test, Split::Validation].into_iter().find(has_samples).unwrap_or(Split::Train);
-    let (evaluation, table) = measure(folders, split, &MetricSettings::default(), ui)?;
+    let (evaluation, table) = measure(folders, split, &MetricSettings::default(), device, ui)?;
     let own = table.predictions().next().context("the evaluation has no prediction")?;
     let verdicts = [better_than_constant_pose(&table, own).sentence, depends_on_audio(&table, own).sentence];
     let film = folders.model.join("film.mp4");

@@ -11,6 +11,7 @@ use orator_base::stage::workdir;
 use orator_dataset::config::{Config, Settings};
 use orator_formats::word_vectors::WordVectors;
 use orator_media::aligner::Aligner;
+use orator_nn::device;
 use orator_onnx::{ModelStore, Runtime};
 use orator_pipeline::pose2d::models;
 use orator_pipeline::process::probe;
@@ -46,6 +47,7 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
         ok("OpenCV", orator_media::opencv::version()),
         ok("processor cores", std::thread::available_parallelism().map_or(1, |n| n.get()).to_string()),
     ];
+    #[cfg(feature = "cuda")]
     checks.extend(gpus());
     match config {
         Ok(config) => {
@@ -54,6 +56,7 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
             checks.extend(word_checks(&config.settings.models.dir));
             checks.extend(recogniser(&config.settings));
             checks.push(work(&config.settings.work.dir));
+            checks.push(training_device(&config.settings));
             checks.push(sandbox(config.settings.work.sandbox));
             checks.push(aligner());
         }
@@ -93,22 +96,18 @@ fn missing(name: &str, problem: String, fix: &str) -> Check {
 }
 
 /// NVIDIA GPUs, and the libraries of CUDA. They are optional, so nothing counts as missing without them.
+#[cfg(feature = "cuda")]
 fn gpus() -> Vec<Check> {
     let note = |name: &str, problem: String| Check { is_full: false, ..ok(name, problem) };
-    #[cfg(not(feature = "cuda"))]
-    return vec![note("GPU", "not used: this program was built without CUDA (`orator guide gpu`)".to_owned())];
-    #[cfg(feature = "cuda")]
-    {
-        let libraries = orator_nn::cuda::libraries::status().iter().map(|(name, found)| match found {
-            Ok(path) => ok(name, path.display().to_string()),
-            Err(problem) => note(name, problem.clone()),
-        });
-        let gpus = match orator_nn::cuda::gpu::list() {
-            Ok(gpus) => gpus.into_iter().enumerate().map(|(number, gpu)| ok(&format!("GPU {number}"), gpu)).collect(),
-            Err(error) => vec![note("GPU", format!("none, the CPU is used: {error:#}"))],
-        };
-        gpus.into_iter().chain(libraries).collect()
-    }
+    let gpus = match orator_nn::cuda::gpu::list() {
+        Ok(gpus) => gpus.into_iter().enumerate().map(|(number, gpu)| ok(&format!("GPU {number}"), gpu)).collect(),
+        Err(error) => vec![note("GPU", format!("none: {error:#}"))],
+    };
+    let libraries = orator_nn::cuda::libraries::status().iter().map(|(name, found)| match found {
+        Ok(path) => ok(name, path.display().to_string()),
+        Err(problem) => note(name, problem.clone()),
+    });
+    gpus.into_iter().chain(libraries).collect()
 }
 
 /// Restrictions of processes that read videos on this machine. They are optional, so nothing counts as missing without
@@ -120,6 +119,15 @@ fn sandbox(is_enabled: bool) -> Check {
         Err(error) => (false, format!("not active: {error:#}")),
     };
     Check { is_full: is_active, ..ok("sandbox", found) }
+}
+
+/// The device of trainings.
+fn training_device(settings: &Settings) -> Check {
+    let choice = settings.work.device;
+    match device::open(choice, || None) {
+        Ok((_, chosen)) => ok("device of trainings", chosen.unwrap_or_else(|| choice.to_string())),
+        Err(error) => missing("device of trainings", error.to_string(), "set work.device = \"auto\""),
+    }
 }
 
 /// The word aligner. Only `orator align` needs it, so nothing counts as missing without it.

@@ -2,7 +2,7 @@
 
 use super::training::{ALL, TrainedModel, TrainingFolders, TrainingPage, middle, page_samples, speed, train_all};
 use crate::cli::Outcome;
-use crate::cli::config_args::ConfigArgs;
+use crate::cli::config_args::{ConfigArgs, DeviceArgs};
 use crate::cli::ui::Ui;
 use anyhow::Result;
 use orator_base::text::counted;
@@ -16,7 +16,8 @@ use orator_gesture::generate::GestureGenerator;
 use orator_gesture::generate::model::GenerationChoice;
 use orator_gesture::train::epochs::ValidatedStep;
 use orator_gesture::train::gan::score::{Validation, ValidationMetrics, below_mean_pose};
-use orator_gesture::train::gan::train;
+use orator_gesture::train::gan::train::{self, TrainingStart};
+use orator_nn::device::Device;
 use orator_report::training::strip::HeldOutPair;
 use serde_json::json;
 use std::path::PathBuf;
@@ -59,26 +60,29 @@ pub struct Args {
     /// Dataset folder, or those of several speakers; defaults to dataset/SPEAKER in the work folder.
     #[arg(long, value_name = "DIR", num_args = 1..)]
     dataset: Vec<PathBuf>,
+    #[command(flatten)]
+    device: DeviceArgs,
 }
 
 pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     let config = if args.dataset.is_empty() { args.config.load()? } else { args.config.load_or_default()? };
+    let device = args.device.open(config.settings.work.device, || None, ui)?;
     if args.all {
-        let trained = train_all(&config, ui, |speaker| train_one(&args, Some(speaker), &config, ui))?;
+        let trained = train_all(&config, ui, |speaker| train_one(&args, Some(speaker), &config, &device, ui))?;
         return Ok(trained.report(ui));
     }
-    Ok(train_one(&args, args.speaker.as_ref(), &config, ui)?.report(ui))
+    Ok(train_one(&args, args.speaker.as_ref(), &config, &device, ui)?.report(ui))
 }
 
 /// Trains the model of a configured speaker on its dataset, in `gan/SPEAKER` of the work folder.
-pub fn train_speaker(config: &Config, speaker: &str, ui: &Ui) -> Result<TrainedModel> {
+pub fn train_speaker(config: &Config, speaker: &str, device: &Device, ui: &Ui) -> Result<TrainedModel> {
     let none = ConfigArgs { config: config.file.clone(), set: Vec::new() };
-    let (from, words, out, dataset) = (None, None, None, Vec::new());
-    let args = Args { config: none, speaker: None, all: true, steps: None, from, words, out, dataset };
-    train_one(&args, Some(&speaker.to_owned()), config, ui)
+    let (from, words, out, dataset, unused) = (None, None, None, Vec::new(), DeviceArgs::default());
+    let args = Args { config: none, speaker: None, all: true, steps: None, from, words, out, dataset, device: unused };
+    train_one(&args, Some(&speaker.to_owned()), config, device, ui)
 }
 
-fn train_one(args: &Args, speaker: Option<&String>, config: &Config, ui: &Ui) -> Result<TrainedModel> {
+fn train_one(args: &Args, speaker: Option<&String>, config: &Config, device: &Device, ui: &Ui) -> Result<TrainedModel> {
     let out = &args.out;
     let folders = TrainingFolders { config, speaker, dataset: args.dataset.first(), out: out.as_ref() };
     let is_named = |name: &String| config.settings.speaker.iter().any(|of| of.name == *name);
@@ -103,14 +107,16 @@ fn train_one(args: &Args, speaker: Option<&String>, config: &Config, ui: &Ui) ->
         for dataset in &datasets {
             let speaker = (datasets.len() > 1).then(|| dataset.info().speaker.clone());
             let choice = GenerationChoice { speaker, seed: None };
-            all.extend(pairs(dataset, &GestureGenerator::open_as(&out.join(train::BEST), &choice)?, datasets.len())?);
+            let generator = GestureGenerator::open_as(&out.join(train::BEST), &choice, device)?;
+            all.extend(pairs(dataset, &generator, datasets.len())?);
         }
         Ok(all)
     };
     let mut page = TrainingPage::new(&out, names.clone(), Box::new(poses), ui);
     let validated = &mut |at| page.update(at);
     let (from, vectors) = (args.from.as_deref(), args.words.as_deref().map(WordVectors::open).transpose()?);
-    let outcome = train::train_with_callback(&datasets, &settings, from, vectors.as_ref(), &out, ui, validated)?;
+    let training = TrainingStart { device, from, vectors: vectors.as_ref() };
+    let outcome = train::train_with_callback(&datasets, &settings, &training, &out, ui, validated)?;
     let (speed, steps_per_sec) = speed(outcome.began_at, outcome.steps, start.elapsed().as_secs_f64());
     let page = page.finish(ValidatedStep { step: outcome.steps, best_step: outcome.best_step });
     let text = format!(

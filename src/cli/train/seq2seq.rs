@@ -2,7 +2,7 @@
 
 use super::training::{TrainedModel, TrainingFolders, TrainingPage, middle, page_samples, speed, train_all};
 use crate::cli::Outcome;
-use crate::cli::config_args::ConfigArgs;
+use crate::cli::config_args::{ConfigArgs, DeviceArgs};
 use crate::cli::setup::words;
 use crate::cli::ui::Ui;
 use anyhow::Result;
@@ -24,6 +24,8 @@ use orator_gesture::train::gan::score::below_mean_pose;
 use orator_gesture::train::seq2seq::captures::CaptureFolder;
 use orator_gesture::train::seq2seq::source::TrainingSource;
 use orator_gesture::train::seq2seq::train;
+use orator_nn::device::Device;
+use orator_nn::seq2seq::config::CPU_ONLY;
 use orator_report::training::strip::HeldOutPair;
 use serde_json::json;
 use std::path::{Path, PathBuf};
@@ -69,17 +71,20 @@ pub struct Args {
     /// Folder of the checkpoints; defaults to seq2seq/SPEAKER in the work folder.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
+    #[command(flatten)]
+    device: DeviceArgs,
 }
 
 pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     let is_named = args.dataset.is_some() || args.captures.is_some();
     let config = if is_named { args.config.load_or_default()? } else { args.config.load()? };
+    let device = args.device.open(config.settings.work.device, || CPU_ONLY, ui)?;
     let vectors = args.words.as_deref().map(WordVectors::open).transpose()?;
+    let train = |speaker: Option<&String>| train_one(&args, speaker, &config, vectors.as_ref(), &device, ui);
     if args.all {
-        let trained = train_all(&config, ui, |speaker| train_one(&args, Some(speaker), &config, vectors.as_ref(), ui))?;
-        return Ok(trained.report(ui));
+        return Ok(train_all(&config, ui, |speaker| train(Some(speaker)))?.report(ui));
     }
-    Ok(train_one(&args, args.speaker.as_ref(), &config, vectors.as_ref(), ui)?.report(ui))
+    Ok(train(args.speaker.as_ref())?.report(ui))
 }
 
 fn train_one(
@@ -87,6 +92,7 @@ fn train_one(
     speaker: Option<&String>,
     config: &Config,
     vectors: Option<&WordVectors>,
+    device: &Device,
     ui: &Ui,
 ) -> Result<TrainedModel> {
     let mut settings = config.settings.seq2seq.clone();
@@ -100,7 +106,7 @@ fn train_one(
         }
         let mut page = TrainingPage::new(out, source.name(), poses, ui);
         let validated = &mut |at| page.update(at);
-        let outcome = train::train_with_callback(source, vectors, &settings, out, ui, validated)?;
+        let outcome = train::train_with_callback(source, vectors, &settings, device, out, ui, validated)?;
         let page = page.finish(ValidatedStep { step: outcome.steps, best_step: outcome.best_step });
         anyhow::Ok((outcome, page))
     };
@@ -112,7 +118,7 @@ fn train_one(
         _ => {
             let (dataset, out) = (args.dataset.as_ref(), args.out.as_ref());
             let (dataset, out) = TrainingFolders { config, speaker, dataset, out }.open("seq2seq")?;
-            let poses = || pairs(&dataset, &SequenceGenerator::open(&out.join(train::BEST))?);
+            let poses = || pairs(&dataset, &SequenceGenerator::open_on(&out.join(train::BEST), device)?);
             train(TrainingSource::Dataset(&dataset), &out, Box::new(poses))?
         }
     };

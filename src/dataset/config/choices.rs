@@ -157,13 +157,6 @@ choices! {
         Time,
     }
 
-    /// Device on which training runs.
-    pub enum ComputeDevice {
-        Cpu,
-        /// First NVIDIA GPU; needs a build with the feature `cuda`.
-        Cuda,
-    }
-
     /// Recipe that chooses the training settings that are `"auto"`.
     pub enum GanRecipe {
         /// Chosen by the minutes of speech in the dataset.

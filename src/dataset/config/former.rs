@@ -9,13 +9,14 @@ use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
 /// Former names of keys and sections, with their current names.
-pub(super) const RENAMED: [(&str, &str); 11] = [
+pub(super) const RENAMED: [(&str, &str); 12] = [
     ("shard", "dataset"),
     ("segment.max_bone_change", "lift.max_bone_change"),
     ("segment.max_people", "segment.max_persons"),
     ("segment.max_still_secs", "segment.max_static_secs"),
     ("pose2d.person_follow", "pose2d.box_smoothing"),
     ("gan.fade_to", "gan.final_lr_ratio"),
+    ("gan.device", "work.device"),
     ("seq2seq.fade_from", "seq2seq.decay_start"),
     ("seq2seq.reach", "seq2seq.variance_loss"),
     ("seq2seq.lambda_reach", "seq2seq.lambda_variance"),
@@ -39,7 +40,11 @@ pub fn to_stored(section: &str, settings: &impl Serialize) -> serde_json::Result
         former.filter(|(of, _)| *of == section).map_or(key, |(_, name)| name.to_owned())
     };
     Ok(match serde_json::to_value(settings)? {
-        Value::Object(keys) => keys.into_iter().map(|(key, value)| (stored_name(key), value)).collect(),
+        Value::Object(keys) => {
+            // The device was a setting of the training; results of all devices are stored as those of the CPU.
+            let device = (section == "gan").then(|| ("device".to_owned(), "cpu".into()));
+            keys.into_iter().map(|(key, value)| (stored_name(key), value)).chain(device).collect()
+        }
         value => value,
     })
 }

@@ -3,7 +3,7 @@
 //! and the guide (`configuration`) document the keys.
 
 use super::auto::{Auto, filled};
-use super::choices::{AdversarialLoss, BoneLoss, ComputeDevice, GanRecipe, MotionRepresentation, NetworkPreset};
+use super::choices::{AdversarialLoss, BoneLoss, GanRecipe, MotionRepresentation, NetworkPreset};
 use super::sections::auto_section;
 use orator_base::types::posture::PostureChannel;
 use serde::{Deserialize, Serialize};
@@ -52,7 +52,6 @@ auto_section! {
         patience: C = count => (0.0, 1e9, "epochs"),
         checkpoint_every: usize = 100 => (1.0, 1e9, "steps"),
         keep_checkpoints: usize = 3 => (1.0, 1e6, "checkpoints"),
-        device: ComputeDevice = ComputeDevice::Cpu,
     }
 }
 

@@ -255,7 +255,8 @@ mod tests {
                 "gan.preset=ligth",
                 "unknown value \"ligth\": expected one of \"auto\", \"small\", \"light\", \"paper\" (did you mean light?)",
             ),
-            ("gan.device=`gpu`", "unknown value \"`gpu`\": expected \"cpu\" or \"cuda\""),
+            ("pose2d.follow=`gpu`", "unknown value \"`gpu`\": expected \"largest\" or \"speaking\""),
+            ("work.device=gpu", "invalid value \"gpu\": expected \"auto\", \"cpu\", \"cuda\" or \"cuda:N\""),
         ] {
             let (key, _) = set.split_once('=').unwrap();
             assert_eq!(problems("", &[set]), [format!("--set: {key}: {expected}")]);

@@ -18,7 +18,7 @@ pub mod videos;
 
 pub use auto::{Auto, number};
 pub use choices::{
-    AdversarialLoss, BoneLoss, ComputeDevice, ContinuityLoss, DistanceLoss, FineMotionReading, FollowRule, GanRecipe,
+    AdversarialLoss, BoneLoss, ContinuityLoss, DistanceLoss, FineMotionReading, FollowRule, GanRecipe,
     MotionRepresentation, NetworkPreset, SeamState, SequenceNetwork, SpeechRule, SplitUnit, VarianceLoss,
 };
 pub use file::{Problem, SourceLocation};

@@ -6,6 +6,7 @@ use super::choices::{FollowRule, SpeechRule, SplitUnit};
 use super::gan::GanConfig;
 use super::seq2seq::Seq2seqConfig;
 use orator_base::stage::artifacts::StageName;
+use orator_base::types::device::DeviceChoice;
 use orator_base::types::time::FrameRate;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
@@ -149,11 +150,12 @@ pub fn image_size(text: &str) -> Option<[u32; 2]> {
 }
 
 section! {
-    /// `[work]`: where the stages write.
+    /// `[work]`: where the stages write, and how this machine works.
     WorkConfig {
         dir: PathBuf = "work".into(),
         jobs: usize = 0,
         sandbox: bool = true,
+        device: DeviceChoice = DeviceChoice::Auto,
     }
 }
 

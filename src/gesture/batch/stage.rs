@@ -4,10 +4,11 @@
 use super::motion_files;
 use super::sounds::BatchSound;
 use super::speech::SpeechSource;
-use crate::generate::model::{checkpoint_file, model_lock};
+use crate::generate::model::{GenerationChoice, checkpoint_file, model_lock};
 use crate::generate::seq2seq::metadata::reads_transcript;
 use crate::generate::trained::TrainedSpeaker;
 use anyhow::{Context, Result, bail, ensure};
+use candle_core::Device;
 use orator_avatar::animate::AnimationOptions;
 use orator_avatar::animate::export::file::{ExportFormat, FigureOptions};
 use orator_base::stage::fingerprint::HashCache;
@@ -26,6 +27,7 @@ use std::sync::{Arc, Mutex};
 /// Stage that generates motion files for sounds.
 pub struct BatchStage<'a> {
     batch: &'a SpeechBatch,
+    device: &'a Device,
     sounds: BTreeMap<&'a str, &'a BatchSound>,
     formats: Vec<(String, ExportFormat)>,
     /// Checkpoint file for sounds without their own.
@@ -36,12 +38,12 @@ pub struct BatchStage<'a> {
 }
 
 impl<'a> BatchStage<'a> {
-    /// Stage of a batch.
+    /// Stage of a batch, with its networks on `device`.
     ///
     /// # Errors
     /// A format that is unknown or given twice, a sound without a checkpoint, a common checkpoint or a table of word
     /// vectors that cannot be read, a table that the common checkpoint does not read.
-    pub fn new(batch: &'a SpeechBatch) -> Result<Self> {
+    pub fn new(batch: &'a SpeechBatch, device: &'a Device) -> Result<Self> {
         let checkpoint = batch.checkpoint.as_deref().map(checkpoint_file).transpose()?;
         if checkpoint.is_none()
             && let Some(sound) = batch.sounds.iter().find(|sound| sound.checkpoint.is_none())
@@ -51,7 +53,7 @@ impl<'a> BatchStage<'a> {
         let sounds = batch.sounds.iter().map(|sound| (sound.name.as_str(), sound)).collect();
         let formats = formats(&batch.formats)?;
         let vectors = batch.words.as_deref().map(WordVectors::open).transpose()?.map(Arc::new);
-        let stage = Self { batch, sounds, formats, checkpoint, vectors, speakers: Mutex::default() };
+        let stage = Self { batch, device, sounds, formats, checkpoint, vectors, speakers: Mutex::default() };
         // Loaded immediately, because a broken common checkpoint would fail all sounds.
         stage.checkpoint.as_deref().map(|path| stage.speaker(path)).transpose()?;
         Ok(stage)
@@ -86,7 +88,7 @@ impl<'a> BatchStage<'a> {
             return Ok(speaker.clone());
         }
         let lock = model_lock(checkpoint)?;
-        let mut speaker = TrainedSpeaker::open(checkpoint)?;
+        let mut speaker = TrainedSpeaker::open_as(checkpoint, &GenerationChoice::default(), self.device)?;
         if let Some(vectors) = &self.vectors {
             speaker.set_word_vectors(vectors.clone())?;
         }
@@ -231,12 +233,12 @@ pub enum BatchState {
 }
 
 impl SpeechBatch {
-    /// Generates motions that are missing or out of date.
+    /// Generates motions that are missing or out of date, on `device`.
     ///
     /// # Errors
     /// Errors that affect all sounds: an unknown format, an unreadable common checkpoint, another batch in the folder.
-    pub fn run(&self, progress: &dyn Progress) -> Result<BatchReport> {
-        let stage = BatchStage::new(self)?;
+    pub fn run(&self, device: &Device, progress: &dyn Progress) -> Result<BatchReport> {
+        let stage = BatchStage::new(self, device)?;
         let records = self.folder.join(RECORDS);
         let _lock = workdir::lock(&records)?;
         let hashes = HashCache::open(&artifacts::hashes(&records));

@@ -35,13 +35,13 @@ pub struct GestureGenerator {
 impl GestureGenerator {
     /// Opens a checkpoint of `orator train gan`: a file, or the best checkpoint in the folder of a training.
     pub fn open(path: &Path) -> Result<Self> {
-        Self::open_as(path, &GenerationChoice::default())
+        Self::open_as(path, &GenerationChoice::default(), &Device::Cpu)
     }
 
-    /// Like `open`, for the chosen speaker and variant. Also fails for a speaker that the network does not have, and
-    /// for variants of a network that was trained without dropout.
-    pub fn open_as(path: &Path, choice: &GenerationChoice) -> Result<Self> {
-        let (metadata, generator) = model::load(&checkpoint_file(path)?, choice)?;
+    /// Like `open`, for the chosen speaker and variant, on `device`. Also fails for a speaker that the network does not
+    /// have, and for variants of a network that was trained without dropout.
+    pub fn open_as(path: &Path, choice: &GenerationChoice, device: &Device) -> Result<Self> {
+        let (metadata, generator) = model::load(&checkpoint_file(path)?, choice, device)?;
         Ok(Self::new(metadata, generator))
     }
 

@@ -6,6 +6,7 @@ use super::seq2seq::metadata::is_sequence_kind;
 use super::trained;
 use super::word_input::TrainedWords;
 use anyhow::{Context, Result, bail, ensure};
+use candle_core::Device;
 use ndarray::ArrayView2;
 use orator_base::audio::mel;
 use orator_base::motion::bones;
@@ -141,8 +142,8 @@ pub struct GenerationChoice {
     pub seed: Option<u64>,
 }
 
-/// Loads a checkpoint of `orator train gan` as a network of one speaker. Errors name the file and the cause.
-pub fn load(path: &Path, choice: &GenerationChoice) -> Result<(SpeakerMetadata, Generator)> {
+/// Loads a checkpoint of `orator train gan` as a network of one speaker on `device`. Errors name the file and the cause.
+pub fn load(path: &Path, choice: &GenerationChoice, device: &Device) -> Result<(SpeakerMetadata, Generator)> {
     let mut contents = Contents::read(path)?;
     let context = || format!("{} is not a checkpoint of `orator train gan`", path.display());
     check(&contents.facts["speaker"]).with_context(context)?;
@@ -150,7 +151,7 @@ pub fn load(path: &Path, choice: &GenerationChoice) -> Result<(SpeakerMetadata, 
     if let Some(seed) = choice.seed {
         trained::vary(&mut contents, GENERATOR, seed).with_context(|| format!("{} has no variants", path.display()))?;
     }
-    build(&contents).with_context(context)
+    build(&contents, device).with_context(context)
 }
 
 /// Speakers of a checkpoint of `orator train gan` in the order of their indices, from its metadata `facts`.
@@ -195,7 +196,7 @@ fn check(facts: &serde_json::Value) -> Result<()> {
     Ok(())
 }
 
-fn build(contents: &Contents) -> Result<(SpeakerMetadata, Generator)> {
+fn build(contents: &Contents, device: &Device) -> Result<(SpeakerMetadata, Generator)> {
     check(&contents.facts["speaker"])?;
     let metadata: SpeakerMetadata =
         serde_json::from_value(contents.facts["speaker"].clone()).context("incomplete metadata")?;
@@ -224,7 +225,7 @@ fn build(contents: &Contents) -> Result<(SpeakerMetadata, Generator)> {
     ensure!(fps.is_plausible(), "the frame rate is {fps}, expected 1 to 1000 fps");
     metadata.normalisation.check()?;
     metadata.representation.check()?;
-    let mut params = Params::frozen();
+    let mut params = Params::frozen().on(device);
     let generator = Generator::new(&mut params, &metadata.network)?;
     params.load(&contents.part(GENERATOR))?;
     Ok((metadata, generator))
@@ -278,7 +279,7 @@ mod tests {
         Generator::new(&mut params, &network).unwrap();
         let mut contents = Contents { facts: serde_json::json!({ "speaker": facts }), tensors: BTreeMap::new() };
         contents.add(GENERATOR, params.tensors().unwrap());
-        build(&contents).unwrap();
+        build(&contents, &Device::Cpu).unwrap();
         for (pointer, value) in [
             ("/speaker/network/width", 1_000_000),
             ("/speaker/network/width", 0),
@@ -293,13 +294,13 @@ mod tests {
             facts["speaker"]["network"]["vocabulary"] = 0.into();
             *facts.pointer_mut(pointer).unwrap() = value.into();
             let wrong = Contents { facts, tensors: contents.tensors.clone() };
-            assert!(build(&wrong).is_err(), "{pointer} {value}");
+            assert!(build(&wrong, &Device::Cpu).is_err(), "{pointer} {value}");
         }
         for (field, value) in [("bone_lengths", -0.1), ("std", -1.0), ("mean", 1e300)] {
             let mut facts = contents.facts.clone();
             facts["speaker"]["normalisation"][field][5] = value.into();
             let wrong = Contents { facts, tensors: contents.tensors.clone() };
-            let text = format!("{:#}", build(&wrong).err().unwrap());
+            let text = format!("{:#}", build(&wrong, &Device::Cpu).err().unwrap());
             assert!(text.contains("normalisation"), "{field}: {text}");
         }
     }

@@ -11,7 +11,7 @@ use super::seq2seq::architecture::Architecture;
 use super::seq2seq::metadata::is_sequence_kind;
 use super::word_input::KnownWords;
 use anyhow::{Result, bail, ensure};
-use candle_core::{DType, Tensor};
+use candle_core::{DType, Device, Tensor};
 use orator_base::types::pose3d::Motion;
 use orator_base::types::sound::{SAMPLE_RATE, Sound};
 use orator_base::types::time::FrameRate;
@@ -33,11 +33,12 @@ pub enum TrainedSpeaker {
 impl TrainedSpeaker {
     /// Opens a checkpoint of one speaker: a file, or the best, else the newest one of a folder. Errors name the file.
     pub fn open(path: &Path) -> Result<Self> {
-        Self::open_as(path, &GenerationChoice::default())
+        Self::open_as(path, &GenerationChoice::default(), &Device::Cpu)
     }
 
-    /// Like `open`, for the chosen speaker and variant. Also fails if the network lacks the speaker or has no variants.
-    pub fn open_as(path: &Path, choice: &GenerationChoice) -> Result<Self> {
+    /// Like `open`, for the chosen speaker and variant, on `device`. Also fails if the network lacks the speaker or has
+    /// no variants.
+    pub fn open_as(path: &Path, choice: &GenerationChoice, device: &Device) -> Result<Self> {
         let file = checkpoint_file(path)?;
         let kind = &checkpoint::facts(&file)?["speaker"]["kind"];
         ensure!(
@@ -46,9 +47,9 @@ impl TrainedSpeaker {
             file.display()
         );
         if !is_sequence_kind(kind) {
-            return Ok(Self::Gan(Box::new(GestureGenerator::open_as(&file, choice)?)));
+            return Ok(Self::Gan(Box::new(GestureGenerator::open_as(&file, choice, device)?)));
         }
-        let speaker = SequenceGenerator::open(&file)?;
+        let speaker = SequenceGenerator::open_on(&file, device)?;
         ensure!(
             choice.seed.is_none(),
             "{} is a checkpoint of `orator train seq2seq`, which has no variants: omit --seed and --variants",
@@ -60,12 +61,12 @@ impl TrainedSpeaker {
         Ok(Self::Sequence(Box::new(speaker)))
     }
 
-    /// Like `open`; selects the speaker of this name if the network has several.
-    pub fn open_for(path: &Path, speaker: &str) -> Result<Self> {
+    /// Like `open`, on `device`; selects the speaker of this name if the network has several.
+    pub fn open_for(path: &Path, speaker: &str, device: &Device) -> Result<Self> {
         let file = checkpoint_file(path)?;
         let is_of_several = checkpoint::facts(&file)?["other_speakers"].is_array();
         let speaker = is_of_several.then(|| speaker.to_owned());
-        Self::open_as(&file, &GenerationChoice { speaker, seed: None })
+        Self::open_as(&file, &GenerationChoice { speaker, seed: None }, device)
     }
 
     pub fn name(&self) -> &str {
@@ -193,7 +194,6 @@ pub fn vary(contents: &mut Contents, prefix: &str, seed: u64) -> Result<()> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use candle_core::Device;
     use std::collections::BTreeMap;
 
     fn contents(dropout: f64) -> Contents {

@@ -2,7 +2,7 @@
 //! network and its samples; this module has the schedule, the optimiser and resuming.
 
 use anyhow::{Context, Result, ensure};
-use candle_core::{DType, Device, Tensor};
+use candle_core::{DType, Tensor};
 use orator_base::stage::progress::Progress;
 use orator_base::stage::workdir::FolderLock;
 use orator_gesture::train::epochs::StoppedTraining;
@@ -177,7 +177,7 @@ fn train_until(
     let n_points = weights.len();
     let mean_weight = weights.iter().sum::<f32>() / n_points as f32;
     let weights: Vec<f32> = weights.iter().map(|w| w / mean_weight).collect();
-    let weights = Tensor::from_vec(weights, (1, n_points), &Device::Cpu)?;
+    let weights = Tensor::from_vec(weights, (1, n_points), training_task.params().device())?;
     let task = progress.begin("training", (schedule.steps - start.min(schedule.steps)) as u64);
     let evaluate_every = schedule.steps.div_ceil(N_EVALUATIONS);
     let (mut sum, mut n_summed) = (0.0, 0);
@@ -273,8 +273,9 @@ fn batch(
     x.par_chunks_mut(group * n_in).zip(y.par_chunks_mut(group * n_out)).enumerate().for_each(|(i, (x, y))| {
         training_task.sample(&mut stream(schedule.seed, step, n, i), x, y);
     });
-    let x = Tensor::from_vec(x, [vec![n], shape].concat(), &Device::Cpu)?;
-    Ok((x, Tensor::from_vec(y, (n, n_points, 3), &Device::Cpu)?))
+    let device = training_task.params().device();
+    let x = Tensor::from_vec(x, [vec![n], shape].concat(), device)?;
+    Ok((x, Tensor::from_vec(y, (n, n_points, 3), device)?))
 }
 
 /// Random stream of group `i` of a step of `batch` samples (`i == batch`: of the step itself).
@@ -295,6 +296,7 @@ mod tests {
     use super::*;
     use crate::train::lifter::body::BodyLifterTask;
     use crate::train::lifter::hands::HandLifterTask;
+    use candle_core::Device;
     use orator_base::stage::progress::Silent;
     use orator_nn::lifter::body::BodyLifter;
 
@@ -323,13 +325,16 @@ mod tests {
     #[test]
     fn an_interrupted_body_training_ends_in_the_same_bytes() {
         resumed_equals_straight(|| {
-            Box::new(BodyLifterTask::new(Vec::new(), Vec::new(), &BodyLifter::config(8, &[3, 3, 3]), 3).unwrap())
+            Box::new(
+                BodyLifterTask::new(Vec::new(), Vec::new(), &BodyLifter::config(8, &[3, 3, 3]), 3, &Device::Cpu)
+                    .unwrap(),
+            )
         });
     }
 
     #[test]
     fn an_interrupted_hand_training_ends_in_the_same_bytes() {
-        resumed_equals_straight(|| Box::new(HandLifterTask::new(16, 3).unwrap()));
+        resumed_equals_straight(|| Box::new(HandLifterTask::new(16, 3, &Device::Cpu).unwrap()));
     }
 
     #[test]

@@ -10,7 +10,7 @@ use crate::ops::conv_norm::conv_norm;
 use crate::ops::conv2d::{self, Conv};
 use crate::ops::resize;
 use crate::params::{Init, Params};
-use candle_core::{Result, Tensor};
+use candle_core::{Device, Result, Tensor};
 use serde::{Deserialize, Serialize};
 
 /// Divisor of the number of frames inside the UNet, which halves the frame rate five times.
@@ -130,6 +130,10 @@ impl Generator {
             decoder: row("decoder", N_DECODER, PLAIN)?,
             last: Conv::new(params, "last", &[config.n_out, n, 1], 1)?,
         })
+    }
+
+    pub fn device(&self) -> &Device {
+        self.enter.first().map_or(&Device::Cpu, |block| block.weight.device())
     }
 
     /// Maps `mels` [B, n_mels, T_mel] to poses [B, n_out, n_frames]; `n_frames` is at least 1 and covers the same time as

@@ -95,7 +95,7 @@ impl<'a, M: FnMut(Range<usize>) -> Result<Tensor>> StreamingGenerator<'a, M> {
         self.encode_until(needed.clone(), n_encoded)?;
         let Some(encoded) = &self.encoded else { candle_core::bail!("no encoded audio frames are buffered") };
         let encoded = encoded.narrow(1, needed.start - self.first_encoded, needed.len())?;
-        let words = self.words.as_ref().map(|words| words.part(first..end)).transpose()?;
+        let words = self.words.as_ref().map(|words| words.part(first..end)?.on(encoded.device())).transpose()?;
         let encoded = self.generator.with_words(resize::linear_part(&encoded, &part)?, words.as_ref())?;
         let poses = self.generator.decode(&encoded, false)?;
         poses.narrow(2, frames.start - first, frames.len())
@@ -127,7 +127,8 @@ impl<'a, M: FnMut(Range<usize>) -> Result<Tensor>> StreamingGenerator<'a, M> {
             end if end == n_encoded => self.n_mel_frames,
             end => ((end - 1) * HOPS + audio_after(self.preset) + 1).min(self.n_mel_frames),
         };
-        let encoded = self.generator.encode(&(self.mels)(first * HOPS..end)?, &[], false)?;
+        let mels = (self.mels)(first * HOPS..end)?.to_device(self.generator.device())?;
+        let encoded = self.generator.encode(&mels, &[], false)?;
         encoded.narrow(1, piece.start - first, piece.len())
     }
 }

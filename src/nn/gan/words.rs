@@ -6,7 +6,7 @@
 use crate::ops::conv2d::Conv;
 use crate::params::{Init, Params};
 use crate::seq2seq::encoders::table_name;
-use candle_core::{DType, Result, Tensor};
+use candle_core::{DType, Device, Result, Tensor};
 use std::ops::Range;
 
 /// Name of the layer, whose tensors are `words.embedding.weight` and `words.output`.
@@ -30,6 +30,12 @@ pub struct WordFrames {
 }
 
 impl WordFrames {
+    /// The same words on another device.
+    pub fn on(&self, device: &Device) -> Result<Self> {
+        let added = self.added.as_ref().map(|added| added.to_device(device)).transpose()?;
+        Ok(Self { numbers: self.numbers.to_device(device)?, times: self.times.to_device(device)?, added })
+    }
+
     /// Returns a range of frames.
     pub fn part(&self, frames: Range<usize>) -> Result<Self> {
         let part = |tensor: &Tensor| tensor.narrow(1, frames.start, frames.len());

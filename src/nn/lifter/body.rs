@@ -3,7 +3,7 @@
 use super::temporal::{Config, TemporalLifter};
 use crate::Mode;
 use crate::params::Params;
-use candle_core::{Device, Result, Tensor};
+use candle_core::{Result, Tensor};
 use orator_base::motion::upper_body::{BodyPoints, HandDirections, Pose};
 use orator_base::motion::view::body::{BodyView, N_IN, N_OUT, mirror_mean};
 
@@ -56,7 +56,7 @@ impl BodyLifter {
         if n_views == 0 {
             return Ok(Vec::new());
         }
-        let x = Tensor::from_vec(numbers, (n_views, n_in, window), &Device::Cpu)?;
+        let x = Tensor::from_vec(numbers, (n_views, n_in, window), self.net.device())?;
         self.net.forward(&x, &mut Mode::Eval)?.flatten_all()?.to_vec1::<f32>()
     }
 }

@@ -4,7 +4,7 @@
 use crate::Mode;
 use crate::ops::dropout::dropout;
 use crate::params::{Init, Params};
-use candle_core::{Device, Module, Result, Tensor};
+use candle_core::{Module, Result, Tensor};
 use candle_nn::Linear;
 use orator_base::motion::view::hand::{HandJoints, HandPoints, HandView};
 use orator_base::types::skeleton::Side;
@@ -65,7 +65,8 @@ impl HandLifter {
         if x.is_empty() {
             return Ok(vec![None; seen.len()]);
         }
-        let x = Tensor::from_vec(x, (views.iter().flatten().count(), self.config.n_in), &Device::Cpu)?;
+        let n_views = views.iter().flatten().count();
+        let x = Tensor::from_vec(x, (n_views, self.config.n_in), self.layers[0].weight().device())?;
         let y = self.forward(&x, &mut Mode::Eval)?.flatten_all()?.to_vec1::<f32>()?;
         let mut outputs = y.chunks_exact(self.config.n_out);
         Ok(views.iter().map(|view| view.as_ref().and_then(|view| Some(view.hand(outputs.next()?)))).collect())

@@ -9,7 +9,7 @@ use crate::Mode;
 use crate::cpu::axis::ConvAxis;
 use crate::ops::dropout::dropout;
 use crate::params::{Init, Params};
-use candle_core::{D, Device, Module, Result, Tensor};
+use candle_core::{D, Module, Result, Tensor};
 use candle_nn::Linear;
 use orator_base::motion::view::hand::{HandJoints, HandPoints};
 use orator_base::types::skeleton::Side;
@@ -104,7 +104,8 @@ impl HeatmapLifter {
             for ((i, crop), maps) in batch.iter().zip(maps.chunks_exact_mut(N_MAPS)) {
                 score_maps(&mirrored[*i], Crop { side: CROP_SCALE * crop.side, ..*crop }, maps);
             }
-            let maps = Tensor::from_vec(maps, (batch.len(), MAP_SIZE, MAP_SIZE, MAPS), &Device::Cpu)?;
+            let shape = (batch.len(), MAP_SIZE, MAP_SIZE, MAPS);
+            let maps = Tensor::from_vec(maps, shape, self.pose_prior.layers[0].weight().device())?;
             let rows = self.forward(&maps, &right_sides(batch.len(), &maps)?, &mut Mode::Eval)?.to_vec2::<f32>()?;
             for ((i, _), row) in batch.iter().zip(rows) {
                 let at = |j: usize| std::array::from_fn(|k| f64::from(row[3 * j + k]));
@@ -117,9 +118,9 @@ impl HeatmapLifter {
     }
 }
 
-/// Side input of `n` right hands, of the dtype of `like`.
+/// Side input of `n` right hands, of the dtype and on the device of `like`.
 pub fn right_sides(n: usize, like: &Tensor) -> Result<Tensor> {
-    Tensor::new(&[[0f32, 1.0]], &Device::Cpu)?.to_dtype(like.dtype())?.repeat((n, 1))
+    Tensor::new(&[[0f32, 1.0]], like.device())?.to_dtype(like.dtype())?.repeat((n, 1))
 }
 
 /// Axis-angle vectors [B, 3] to rotation matrices [B, 9], by row: Rodrigues' formula with the angle sqrt(|v|^2 + 1e-8).

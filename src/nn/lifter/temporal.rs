@@ -6,9 +6,12 @@ use crate::ops::batch_norm::BatchNorm;
 use crate::ops::conv1d::Conv1d;
 use crate::ops::dropout::dropout;
 use crate::params::Params;
-use candle_core::{Module, Result, Tensor};
+use candle_core::{Device, Module, Result, Tensor};
 use serde::{Deserialize, Serialize};
 
+/// Why the network runs on the CPU only; `None` once all of its operators have a formulation for other devices.
+pub const CPU_ONLY: Option<&str> =
+    Some("the body lifter runs on the CPU only, since conv1d and batch norm have no implementation for CUDA");
 /// Initial weight of a new batch in the running statistics; training lowers it with `set_momentum`.
 const MOMENTUM: f64 = 0.1;
 
@@ -91,6 +94,10 @@ impl TemporalLifter {
 
     pub fn config(&self) -> &Config {
         &self.config
+    }
+
+    pub fn device(&self) -> &Device {
+        self.expand.norm.weight.device()
     }
 
     /// Maps windows of one receptive field [B, n_in, RF] to their middle frames [B, n_out]. The windows are

@@ -1,9 +1,14 @@
 //! Configuration of the networks, with the defaults of the authors' code, and their common input batch.
 
-use candle_core::{Result, Tensor};
+use candle_core::{Device, Result, Tensor};
 use serde::{Deserialize, Serialize};
 use std::ops::RangeInclusive;
 
+/// Why the networks run on the CPU only; `None` once all of their operators have a formulation for other devices.
+pub const CPU_ONLY: Option<&str> = Some(
+    "sequence-to-sequence networks run on the CPU only, since GRU, decoder, linear layers, batch norm and conv1d have \
+     no implementation for CUDA",
+);
 /// Possible numbers of blocks of the discriminator.
 pub const SCORE_BLOCKS: RangeInclusive<usize> = 2..=6;
 
@@ -115,6 +120,14 @@ pub struct Segment {
     /// Word indices in the vocabulary (u32), padded to a common length of at least 1: those of the segment [B, W] for
     /// `words`, those around each predicted pose [B, predicted, W] for `contextual`; `None` for networks without words.
     pub words: Option<Tensor>,
+}
+
+impl Segment {
+    /// The same segments on another device.
+    pub fn on(&self, device: &Device) -> Result<Self> {
+        let words = self.words.as_ref().map(|words| words.to_device(device)).transpose()?;
+        Ok(Self { audio: self.audio.to_device(device)?, previous: self.previous.to_device(device)?, words })
+    }
 }
 
 /// Windows of `width` frames around each frame with complete context: [B, T + width - 1, C] to [B, T, width, C].

@@ -106,7 +106,7 @@ impl FixedBatch {
             words: None,
         };
         let facts = SpeakerMetadata::new("benchmark", FPS, "", network, normalisation, representation);
-        Ok(Self { trainer: GanTrainer::new(vec![facts], settings)?, batch })
+        Ok(Self { trainer: GanTrainer::new(vec![facts], settings, &Device::Cpu)?, batch })
     }
 
     /// Weights, batch and settings as input of the reference.

@@ -1,6 +1,7 @@
 //! Readers of weights: speaker checkpoints, lifters, motion embeddings.
 
 use crate::fixtures::fuzzing::harness::{corpus, fuzz_bytes, fuzz_file};
+use candle_core::Device;
 use orator_gesture::generate::model::{self, GenerationChoice};
 use orator_gesture::metrics::space::{basis::Basis, embedding};
 use orator_nn::weights::Contents;
@@ -14,7 +15,7 @@ fn checkpoint() {
 #[test]
 fn speaker() {
     fuzz_file("speaker", &corpus("weights", "speaker"), "best.safetensors", |path| {
-        drop(model::load(path, &GenerationChoice::default()));
+        drop(model::load(path, &GenerationChoice::default(), &Device::Cpu));
     });
 }
 

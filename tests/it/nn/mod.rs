@@ -4,6 +4,7 @@ mod adversarial;
 mod conv2d;
 mod conv_norm;
 mod decoder;
+mod device;
 mod networks;
 mod params;
 mod predict;

@@ -1,14 +1,7 @@
 //! Parameters of networks.
 
 use candle_core::Result;
-use orator_nn::params::{Init, Params, open_device};
-
-#[test]
-fn a_device_that_is_missing_is_reported() {
-    assert!(open_device(false).unwrap().is_cpu());
-    #[cfg(not(feature = "cuda"))]
-    assert!(open_device(true).unwrap_err().to_string().contains("--features cuda"));
-}
+use orator_nn::params::{Init, Params};
 
 #[test]
 fn the_first_values_depend_on_seed_and_name_only() -> anyhow::Result<()> {

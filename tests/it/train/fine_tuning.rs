@@ -11,7 +11,7 @@ use orator_formats::checkpoint;
 use orator_gesture::generate::GestureGenerator;
 use orator_gesture::generate::model::BEST;
 use orator_gesture::train::epochs::ValidatedStep;
-use orator_gesture::train::gan::train::{train, train_with_callback};
+use orator_gesture::train::gan::train::{TrainingStart, train, train_with_callback};
 use std::path::Path;
 
 fn speaker(folder: &Path, name: &str, phase: f64) -> Dataset {
@@ -39,7 +39,15 @@ fn weights_are_initialised_and_the_skeleton_is_its_own() {
     let stop = Stop::at(u64::MAX);
     let ignore = &mut |_: ValidatedStep| ();
     let of_ben = dir.join("ben-gan");
-    train_with_callback(&[&ben], &settings(), Some(&of_anna), None, &of_ben, &Shared(stop.clone()), ignore).unwrap();
+    train_with_callback(
+        &[&ben],
+        &settings(),
+        &TrainingStart { from: Some(&of_anna), ..TrainingStart::default() },
+        &of_ben,
+        &Shared(stop.clone()),
+        ignore,
+    )
+    .unwrap();
     let log = stop.said.lock().unwrap().join("\n");
     assert!(log.contains("initialising from ") && log.contains("(trained on anna)"), "{log}");
 
@@ -59,18 +67,25 @@ fn weights_are_initialised_and_the_skeleton_is_its_own() {
     let parts = dir.join("ben-parts");
     let half = GanConfig { warmup_steps: 0.into(), final_lr_ratio: 1.0.into(), ..settings() };
     let uninterrupted = dir.join("ben-whole");
-    train_with_callback(&[&ben], &half, Some(&of_anna), None, &uninterrupted, &Silent, ignore).unwrap();
+    train_with_callback(
+        &[&ben],
+        &half,
+        &TrainingStart { from: Some(&of_anna), ..TrainingStart::default() },
+        &uninterrupted,
+        &Silent,
+        ignore,
+    )
+    .unwrap();
     train_with_callback(
         &[&ben],
         &GanConfig { steps: 3.into(), ..half.clone() },
-        Some(&of_anna),
-        None,
+        &TrainingStart { from: Some(&of_anna), ..TrainingStart::default() },
         &parts,
         &Silent,
         ignore,
     )
     .unwrap();
-    train_with_callback(&[&ben], &half, None, None, &parts, &Silent, ignore).unwrap();
+    train_with_callback(&[&ben], &half, &TrainingStart::default(), &parts, &Silent, ignore).unwrap();
     let last = |out: &Path| std::fs::read(checkpoint::path(out, 6)).unwrap();
     assert!(last(&uninterrupted) == last(&parts));
     assert!(bytes(&uninterrupted).iter().any(|(name, _)| name == BEST));
@@ -82,7 +97,14 @@ fn unsuitable_initial_models_are_named() {
     let dir = folder.path();
     let (anna, ben) = (speaker(dir, "anna", 0.0), speaker(dir, "ben", 1.5));
     let fails = |from: &Path, settings: &GanConfig| {
-        let result = train_with_callback(&[&ben], settings, Some(from), None, &dir.join("out"), &Silent, &mut |_| ());
+        let result = train_with_callback(
+            &[&ben],
+            settings,
+            &TrainingStart { from: Some(from), ..TrainingStart::default() },
+            &dir.join("out"),
+            &Silent,
+            &mut |_| (),
+        );
         format!("{:#}", result.unwrap_err())
     };
     assert!(fails(&dir.join("nowhere"), &settings()).contains("nowhere"));

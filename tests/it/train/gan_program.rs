@@ -114,6 +114,48 @@ fn each_speaker_gets_a_model_whose_file_is_enough_to_generate() {
 }
 
 #[test]
+fn a_training_continues_with_another_choice_of_device() {
+    let folder = tempfile::tempdir().unwrap();
+    let dir = folder.path();
+    project(dir);
+    let run = |args: &str| {
+        let output = orator(dir, args).stderr(Stdio::piped()).output().unwrap();
+        (output.status.code(), String::from_utf8_lossy(&output.stderr).into_owned())
+    };
+    let train = |out: &str, steps: usize, device: &str| {
+        let constant_rate = "--set gan.epoch_steps=3 --set gan.warmup_steps=0 --set gan.final_lr_ratio=1";
+        run(&format!("train gan --speaker anna --out {out} --steps {steps} {constant_rate} {device}"))
+    };
+    let last = |out: &str| std::fs::read(orator_formats::checkpoint::path(&dir.join(out), 6)).unwrap();
+    assert_eq!(train("calm", 6, "").0, Some(0));
+    let (code, said) = train("parts", 3, "--set gan.device=cpu");
+    assert!(code == Some(0) && said.contains("gan.device was renamed: write work.device"), "{said}");
+    assert_eq!(train("parts", 6, "--device cpu --set work.device=cuda:7").0, Some(0));
+    assert!(last("calm") == last("parts"));
+    // Without a GPU, `auto` is the CPU and prints why.
+    #[cfg(not(feature = "cuda"))]
+    {
+        assert_eq!(train("auto", 3, "--device cpu").0, Some(0));
+        let (code, said) = train("auto", 6, "--device auto");
+        assert!(code == Some(0) && said.contains("device: CPU (this program has no CUDA"), "{said}");
+        assert!(last("calm") == last("auto"));
+        let generate = "generate --checkpoint calm --audio speech.wav --out motion.bvh";
+        let failing = [
+            "train gan --speaker anna --device cuda",
+            "run --train --set work.device=cuda",
+            &format!("{generate} --device cuda"),
+            "evaluate --dataset work/dataset/anna --checkpoint calm --device cuda",
+        ];
+        for args in failing {
+            let (code, said) = run(args);
+            assert!(code == Some(1) && said.contains("cannot use the device cuda: this program has no CUDA"), "{said}");
+        }
+        let (_, said) = run(&format!("{generate} --device cuda:x"));
+        assert!(said.contains("expected \"auto\", \"cpu\", \"cuda\" or \"cuda:N\""), "{said}");
+    }
+}
+
+#[test]
 fn an_unwritable_training_page_sets_the_exit_code() {
     let folder = tempfile::tempdir().unwrap();
     let dir = folder.path();

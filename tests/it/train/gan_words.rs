@@ -17,7 +17,7 @@ use orator_formats::{checkpoint, wav};
 use orator_gesture::evaluate::clips::checkpoint::EvaluatedCheckpoint;
 use orator_gesture::generate::GestureGenerator;
 use orator_gesture::generate::model::{BEST, GENERATOR};
-use orator_gesture::train::gan::train::{train, train_with_callback};
+use orator_gesture::train::gan::train::{TrainingStart, train, train_with_callback};
 use orator_nn::weights::Contents;
 use std::panic::AssertUnwindSafe;
 use std::path::Path;
@@ -157,7 +157,15 @@ fn common_words_keep_their_vectors_in_another_training() {
     let table = WordVectors::open(&dir.join("table.safetensors")).unwrap();
     let start = |from: Option<&Path>, vectors: Option<&WordVectors>, out: &str| {
         let settings = GanConfig { learning_rate: 1e-9.into(), ..settings(2) };
-        train_with_callback(&[&ben], &settings, from, vectors, &dir.join(out), &Silent, &mut |_| ()).unwrap();
+        train_with_callback(
+            &[&ben],
+            &settings,
+            &TrainingStart { from, vectors, ..TrainingStart::default() },
+            &dir.join(out),
+            &Silent,
+            &mut |_| (),
+        )
+        .unwrap();
     };
     let rows = |out: &str| {
         let contents = Contents::read(&dir.join(out).join(BEST)).unwrap();
@@ -198,7 +206,15 @@ fn settings_and_data_that_do_not_fit_are_errors() {
     let table = folder.path().join("table.safetensors");
     glove::convert(&b"up 1 2\n"[..], &table).unwrap();
     let (table, audio) = (WordVectors::open(&table).unwrap(), GanConfig { words: false, ..settings(2) });
-    let error = train_with_callback(&[&dataset], &audio, None, Some(&table), &out, &Silent, &mut |_| ()).unwrap_err();
+    let error = train_with_callback(
+        &[&dataset],
+        &audio,
+        &TrainingStart { vectors: Some(&table), ..TrainingStart::default() },
+        &out,
+        &Silent,
+        &mut |_| (),
+    )
+    .unwrap_err();
     assert!(error.to_string().contains("set gan.words = true"), "{error}");
 }
 

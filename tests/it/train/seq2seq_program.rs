@@ -91,6 +91,9 @@ fn all_speakers_are_trained_by_the_papers_reading() {
     assert!(said.contains("warning: 6.0 s of motion to train on: expect a result close to the mean pose"), "{said}");
     assert!(resumed.status.success() && said.contains("seq2seq.reading is \"code\", but \"paper\""), "{said}");
     assert!(String::from_utf8_lossy(&resumed.stdout).contains("6 steps"), "{resumed:?}");
+    let rejected = orator(dir, "train seq2seq --speaker ben --device cuda");
+    let said = String::from_utf8_lossy(&rejected.stderr).into_owned();
+    assert!(said.contains("device cuda: sequence-to-sequence networks run on the CPU only"), "{said}");
     let rejected = orator(dir, "train seq2seq --speaker ben --set seq2seq.lambda_adversarial=0.5");
     let said = String::from_utf8_lossy(&rejected.stderr).into_owned();
     assert!(said.contains("seq2seq.lambda_adversarial has no effect on the network \"contextual\""), "{said}");
@@ -114,6 +117,10 @@ fn captures_need_an_output_folder_and_have_a_page_without_poses() {
     assert!(trained.status.success() && has_hint, "{said}");
     let page = std::fs::read_to_string(dir.join("model/training.html")).unwrap();
     assert!(page.contains("Training of takes") && page.contains("No interval with the 49 joints to show"));
-    let output = orator(dir, "generate --checkpoint model --audio takes/a.wav --transcript takes/a.tsv --out a.bvh");
+    let generate = "generate --checkpoint model --audio takes/a.wav --transcript takes/a.tsv --out a.bvh";
+    let rejected = orator(dir, &format!("{generate} --device cuda"));
+    assert!(String::from_utf8_lossy(&rejected.stderr).contains("networks run on the CPU only"), "{rejected:?}");
+    let output = orator(dir, &format!("{generate} --device auto"));
+    assert!(String::from_utf8_lossy(&output.stderr).contains("device: CPU (sequence-to-sequence"), "{output:?}");
     assert!(output.status.success() && dir.join("a.bvh").is_file());
 }

@@ -4,7 +4,7 @@
 use crate::fixtures::faults::stop::bytes;
 use crate::fixtures::gesture_dataset::{FPS, sample};
 use crate::fixtures::write_dataset::write_dataset;
-use candle_core::Tensor;
+use candle_core::{Device, Tensor};
 use ndarray::Array3;
 use orator_base::stage::progress::Silent;
 use orator_base::types::skeleton::{L_WRIST, parent};
@@ -18,7 +18,7 @@ use orator_gesture::train::epochs::ValidatedStep;
 use orator_gesture::train::gan::pretrained::PretrainedModel;
 use orator_gesture::train::gan::recipe::{self, InitialWeights, TrainingMaterial};
 use orator_gesture::train::gan::speakers;
-use orator_gesture::train::gan::train::{train, train_with_callback};
+use orator_gesture::train::gan::train::{TrainingStart, train, train_with_callback};
 use orator_gesture::train::gan::windows::JoinedWindows;
 use orator_gesture::train::gan::windows::WindowLoader;
 use orator_nn::gan::speaker_layer::{SPEAKER, SPEAKER_EMBEDDING, SPEAKER_WEIGHT};
@@ -67,7 +67,7 @@ fn orator(dir: &Path, args: &str) -> ProgramAnswer {
 }
 
 fn as_speaker(folder: &Path, name: &str) -> anyhow::Result<GestureGenerator> {
-    GestureGenerator::open_as(folder, &GenerationChoice { speaker: Some(name.to_owned()), seed: None })
+    GestureGenerator::open_as(folder, &GenerationChoice { speaker: Some(name.to_owned()), seed: None }, &Device::Cpu)
 }
 
 #[test]
@@ -77,7 +77,7 @@ fn each_speaker_is_generated_with_its_own_skeleton() {
     let (anna, ben) = (speaker(dir, "anna", 0.0, 1.0), speaker(dir, "ben", 1.5, 1.2));
     let ignore = &mut |_: ValidatedStep| ();
     let both = dir.join("both");
-    train_with_callback(&[&anna, &ben], &settings(), None, None, &both, &Silent, ignore).unwrap();
+    train_with_callback(&[&anna, &ben], &settings(), &TrainingStart::default(), &both, &Silent, ignore).unwrap();
 
     let audio = Sound { rate: 16_000, samples: (0..48_000).map(|n| (n as f32 * 0.05).sin() * 0.3).collect() };
     let motion = |name: &str| -> Array3<f32> {
@@ -99,10 +99,10 @@ fn each_speaker_is_generated_with_its_own_skeleton() {
     // Stopped and resumed, it ends with identical bytes.
     let parts = dir.join("parts");
     let half = GanConfig { steps: 3.into(), ..settings() };
-    train_with_callback(&[&anna, &ben], &half, None, None, &parts, &Silent, ignore).unwrap();
+    train_with_callback(&[&anna, &ben], &half, &TrainingStart::default(), &parts, &Silent, ignore).unwrap();
     let error = train(&anna, &settings(), &parts, &Silent).unwrap_err();
     assert!(format!("{error:#}").contains("2 speakers"), "{error:#}");
-    train_with_callback(&[&anna, &ben], &settings(), None, None, &parts, &Silent, ignore).unwrap();
+    train_with_callback(&[&anna, &ben], &settings(), &TrainingStart::default(), &parts, &Silent, ignore).unwrap();
     let last = |out: &Path| std::fs::read(checkpoint::path(out, 6)).unwrap();
     assert!(last(&both) == last(&parts));
     let names = |out: &Path| bytes(out).into_iter().map(|(name, _)| name).collect::<Vec<_>>();
@@ -112,25 +112,56 @@ fn each_speaker_is_generated_with_its_own_skeleton() {
     let carl = speaker(dir, "carl", 0.7, 0.9);
     assert_starts_from_nearest_speaker(&both, &carl);
     let of_carl = dir.join("carl-gan");
-    train_with_callback(&[&carl], &settings(), Some(&both), None, &of_carl, &Silent, ignore).unwrap();
+    train_with_callback(
+        &[&carl],
+        &settings(),
+        &TrainingStart { from: Some(&both), ..TrainingStart::default() },
+        &of_carl,
+        &Silent,
+        ignore,
+    )
+    .unwrap();
     let model = GestureGenerator::open(&of_carl).unwrap().metadata;
     assert_eq!((model.name.as_str(), model.network.n_speakers), ("carl", 1));
     let trained_on: Vec<&str> = model.videos.iter().map(|video| video.speaker.as_str()).collect();
     assert!(["anna", "ben", "carl"].iter().all(|name| trained_on.contains(name)), "{trained_on:?}");
     assert_trains_only_speaker_layer(&both, &carl, &dir.join("layer"));
     // Two speakers can also be initialised from a single one.
-    train_with_callback(&[&anna, &ben], &settings(), Some(&of_carl), None, &dir.join("all"), &Silent, ignore).unwrap();
+    train_with_callback(
+        &[&anna, &ben],
+        &settings(),
+        &TrainingStart { from: Some(&of_carl), ..TrainingStart::default() },
+        &dir.join("all"),
+        &Silent,
+        ignore,
+    )
+    .unwrap();
     assert_eq!(as_speaker(&dir.join("all"), "ben").unwrap().metadata.network.n_speakers, 1);
 
-    let error =
-        train_with_callback(&[&anna, &anna], &settings(), None, None, &dir.join("twice"), &Silent, ignore).unwrap_err();
+    let error = train_with_callback(
+        &[&anna, &anna],
+        &settings(),
+        &TrainingStart::default(),
+        &dir.join("twice"),
+        &Silent,
+        ignore,
+    )
+    .unwrap_err();
     assert!(format!("{error:#}").contains("both of speaker anna"), "{error:#}");
 }
 
 /// The weights shared by all speakers do not change at a learning rate of 0.
 fn assert_trains_only_speaker_layer(both: &Path, new: &Dataset, out: &Path) {
     let settings = GanConfig { shared_rate: 0.0.into(), ..settings() };
-    train_with_callback(&[new], &settings, Some(both), None, out, &Silent, &mut |_| ()).unwrap();
+    train_with_callback(
+        &[new],
+        &settings,
+        &TrainingStart { from: Some(both), ..TrainingStart::default() },
+        out,
+        &Silent,
+        &mut |_| (),
+    )
+    .unwrap();
     let initial = Contents::read(&both.join(BEST)).unwrap().part(GENERATOR);
     let trained = Contents::read(&checkpoint::path(out, 6)).unwrap().part("training.generator.");
     let values = |tensor: &Tensor| tensor.flatten_all().unwrap().to_vec1::<f32>().unwrap();

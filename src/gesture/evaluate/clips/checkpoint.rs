@@ -9,6 +9,7 @@ use crate::generate::model::checkpoint_file;
 use crate::generate::seq2seq::SequenceGenerator;
 use crate::generate::trained::TrainedSpeaker;
 use anyhow::{Context, Result, ensure};
+use candle_core::Device;
 use ndarray::s;
 use orator_base::motion::resample;
 use orator_base::text::counted;
@@ -45,6 +46,11 @@ impl EvaluatedCheckpoint {
     /// # Errors
     /// A path that does not exist; a checkpoint of another kind; a checkpoint that is given twice.
     pub fn open_all(paths: &[PathBuf], speaker: &str) -> Result<Vec<Self>> {
+        Self::open_all_on(paths, speaker, &Device::Cpu)
+    }
+
+    /// Like `open_all`, on `device`.
+    pub fn open_all_on(paths: &[PathBuf], speaker: &str, device: &Device) -> Result<Vec<Self>> {
         let files: Vec<PathBuf> = paths.iter().map(|path| checkpoint_file(path)).collect::<Result<_>>()?;
         let paths_on_disk: Vec<PathBuf> = files.iter().map(std::fs::canonicalize).collect::<std::io::Result<_>>()?;
         for (at, path_on_disk) in paths_on_disk.iter().enumerate() {
@@ -52,7 +58,7 @@ impl EvaluatedCheckpoint {
             ensure!(earlier.is_none(), "{} is given twice: give each checkpoint once", paths[at].display());
         }
         let speakers: Vec<TrainedSpeaker> =
-            files.iter().map(|file| TrainedSpeaker::open_for(file, speaker)).collect::<Result<_>>()?;
+            files.iter().map(|file| TrainedSpeaker::open_for(file, speaker, device)).collect::<Result<_>>()?;
         let names = speakers
             .iter()
             .zip(&paths_on_disk)

@@ -48,7 +48,12 @@ pub struct GeneratedPoses {
 impl SequenceGenerator {
     /// Opens a checkpoint of `orator train seq2seq`: a file, or the best checkpoint in the folder of a training.
     pub fn open(path: &Path) -> Result<Self> {
-        let (metadata, params, network) = metadata::load(&checkpoint_file(path)?)?;
+        Self::open_on(path, &Device::Cpu)
+    }
+
+    /// Like `open`, on `device`.
+    pub fn open_on(path: &Path, device: &Device) -> Result<Self> {
+        let (metadata, params, network) = metadata::load(&checkpoint_file(path)?, device)?;
         Ok(Self { metadata, network, params, vectors: None })
     }
 
@@ -119,7 +124,7 @@ impl SequenceGenerator {
         let cepstra =
             architecture::audio_features(sound, self.fps(), n_frames, n_frames.next_multiple_of(predicted), context);
         let shape = (1, cepstra.nrows(), cepstra.ncols());
-        let audio = Tensor::from_iter(cepstra.iter().copied(), &Device::Cpu)?.reshape(shape)?;
+        let audio = Tensor::from_iter(cepstra.iter().copied(), self.params.device())?.reshape(shape)?;
         let (words, added) = self.known_words().numbered(words)?;
         let network = added.map(|added| self.metadata.with_word_vectors(&self.params, &added)).transpose()?;
         Ok(SpeechInput { n_frames, audio, words, network })
@@ -132,9 +137,12 @@ impl SequenceGenerator {
     pub fn generate(&self, speech: &SpeechInput, seams: StateAtSeams) -> Result<GeneratedPoses> {
         let SpeechInput { n_frames, audio, words, network } = speech;
         let Config { pose, previous, predicted, .. } = *self.network.config();
-        let start = Tensor::zeros((1, previous, pose), DType::F32, &Device::Cpu)?;
+        let start = Tensor::zeros((1, previous, pose), DType::F32, audio.device())?;
         let of = &self.metadata;
-        let words = |i| architecture::words_tensor(of.architecture, &[of.words_of_segment(words, i * predicted)]);
+        let words = |i| {
+            let words = architecture::words_tensor(of.architecture, &[of.words_of_segment(words, i * predicted)])?;
+            words.map(|words| words.to_device(audio.device())).transpose()
+        };
         let network = network.as_ref().unwrap_or(&self.network);
         let generated = generate(&**network, audio, &start, seams, words)?.flatten_all()?.to_vec1::<f32>()?;
         ensure!(

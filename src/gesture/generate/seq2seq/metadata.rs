@@ -2,11 +2,12 @@
 
 use super::architecture::{self, AROUND_SEGMENT_SECS, Architecture, NumberedWord, RATES, Vocabulary, network_config};
 use super::poses::PoseFormat;
+use crate::generate::model::checkpoint_file;
 use anyhow::{Context, Result, ensure};
-use candle_core::Tensor;
+use candle_core::{Device, Tensor};
 use orator_base::types::time::FrameRate;
 use orator_nn::params::Params;
-use orator_nn::seq2seq::config::{Config, SCORE_BLOCKS};
+use orator_nn::seq2seq::config::{CPU_ONLY, Config, SCORE_BLOCKS};
 use orator_nn::seq2seq::encoders::table_name;
 use orator_nn::seq2seq::predict::GesturePredictor;
 use orator_nn::weights::Contents;
@@ -71,9 +72,9 @@ impl SequenceMetadata {
         let mut tensors: BTreeMap<String, Tensor> =
             params.all().map(|(name, var)| (name.to_owned(), var.as_detached_tensor())).collect();
         let table = tensors.get_mut(&table_name(encoder)).context("the network has no word embedding")?;
-        *table = Tensor::cat(&[&*table, added], 0)?;
+        *table = Tensor::cat(&[&*table, &added.to_device(params.device())?], 0)?;
         let config = Config { vocabulary: table.dim(0)?, ..self.network.clone() };
-        let mut extended = Params::frozen();
+        let mut extended = Params::frozen().on(params.device());
         let network = architecture::network(self.architecture, &mut extended, &config)?;
         extended.load(&tensors)?;
         Ok(network)
@@ -120,20 +121,29 @@ pub fn is_sequence_kind(kind: &serde_json::Value) -> bool {
     kind.as_str().is_some_and(|kind| kind.starts_with("orator sequence"))
 }
 
-/// Loads a checkpoint of `orator train seq2seq`: the network, and its tensors. Errors name the file and the cause.
-pub fn load(path: &Path) -> Result<(SequenceMetadata, Params, Box<dyn GesturePredictor>)> {
-    let contents = Contents::read(path)?;
-    build(&contents).with_context(|| format!("{} is not a checkpoint of `orator train seq2seq`", path.display()))
+/// Why the networks of checkpoints, or of folders of trainings, run on the CPU only; `None` if no network does.
+pub fn cpu_only<'p>(paths: impl IntoIterator<Item = &'p Path>) -> Option<&'static str> {
+    let facts = |path| checkpoint_file(path).and_then(|file| orator_formats::checkpoint::facts(&file));
+    let is_sequence = |path| facts(path).is_ok_and(|facts| is_sequence_kind(&facts["speaker"]["kind"]));
+    CPU_ONLY.filter(|_| paths.into_iter().any(is_sequence))
 }
 
-fn build(contents: &Contents) -> Result<(SequenceMetadata, Params, Box<dyn GesturePredictor>)> {
+/// Loads a checkpoint of `orator train seq2seq` on `device`: the network, and its tensors. Errors name the file and the
+/// cause.
+pub fn load(path: &Path, device: &Device) -> Result<(SequenceMetadata, Params, Box<dyn GesturePredictor>)> {
+    let contents = Contents::read(path)?;
+    build(&contents, device)
+        .with_context(|| format!("{} is not a checkpoint of `orator train seq2seq`", path.display()))
+}
+
+fn build(contents: &Contents, device: &Device) -> Result<(SequenceMetadata, Params, Box<dyn GesturePredictor>)> {
     let kind = &contents.facts["speaker"]["kind"];
     ensure!(kind == KIND, "unsupported kind {kind}: expected {KIND:?}");
     let metadata: SequenceMetadata =
         serde_json::from_value(contents.facts["speaker"].clone()).context("incomplete metadata")?;
     metadata.check()?;
     contents.expect_numbers(metadata.network.hidden * metadata.network.hidden)?;
-    let mut params = Params::frozen();
+    let mut params = Params::frozen().on(device);
     let network = architecture::network(metadata.architecture, &mut params, &metadata.network)?;
     params.load(&contents.part(NETWORK))?;
     Ok((metadata, params, network))

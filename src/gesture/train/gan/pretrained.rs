@@ -55,10 +55,10 @@ impl PretrainedModel {
         }
     }
 
-    /// Trainer of these speakers, initialised with the weights of this model, whose videos are added to the speakers'
-    /// lists. A single speaker initialised from a model of several gets the speaker layer with the smallest initial
-    /// error on `windows`, among those of all speakers and their mean. Words that the model does not have get their
-    /// vectors from `vectors`, or random ones.
+    /// Trainer of these speakers on `device`, initialised with the weights of this model, whose videos are added to the
+    /// speakers' lists. A single speaker initialised from a model of several gets the speaker layer with the smallest
+    /// initial error on `windows`, among those of all speakers and their mean. Words that the model does not have get
+    /// their vectors from `vectors`, or random ones.
     ///
     /// # Errors
     /// A network of another shape, or with word input if the training has none.
@@ -68,6 +68,7 @@ impl PretrainedModel {
         settings: GanSettings,
         vectors: Option<&WordVectors>,
         windows: &JoinedWindows,
+        device: &Device,
     ) -> Result<GanTrainer> {
         let (Some(own), Some(other)) = (speakers.first(), self.speakers.first()) else { bail!("no speaker to train") };
         let (own, other) = (&own.network, &other.network);
@@ -98,7 +99,7 @@ impl PretrainedModel {
             let speaker_weights = self.speakers[0].network.speaker_weights;
             speakers[0].network = Config { n_speakers: 1, speaker_weights, ..speakers[0].network.clone() };
         }
-        let trainer = GanTrainer::new(speakers, settings)?;
+        let trainer = GanTrainer::new(speakers, settings, device)?;
         trainer.initialise_words(vectors)?;
         trainer.set_tensors(self.words(&trainer)?)?;
         let initialise = || {

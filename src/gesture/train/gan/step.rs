@@ -10,13 +10,13 @@ use crate::train::optim::adam::{self, Adam};
 use crate::train::{resume, word_vectors};
 use anyhow::{Context, Result, ensure};
 use candle_core::{Device, Tensor};
-use orator_dataset::config::{ComputeDevice, GanConfig, GanSettings, to_stored};
+use orator_dataset::config::{GanConfig, GanSettings, to_stored};
 use orator_formats::checkpoint;
 use orator_formats::word_vectors::WordVectors;
 use orator_nn::gan::discriminator::{Discriminator, motion};
 use orator_nn::gan::generator::Generator;
 use orator_nn::gan::words::WORDS;
-use orator_nn::params::{Params, open_device};
+use orator_nn::params::Params;
 use orator_nn::weights::Contents;
 use rand::Rng;
 use serde_json::Value;
@@ -35,7 +35,7 @@ const WORD_DROPOUT: u64 = 0x776f_7264;
 pub const MAX_NORM: f64 = 10.0;
 
 /// Settings that a resumed training takes from the configuration; all others come from the checkpoint.
-const OVERRIDABLE_ON_RESUME: [&str; 5] = ["steps", "patience", "checkpoint_every", "keep_checkpoints", "device"];
+const OVERRIDABLE_ON_RESUME: [&str; 4] = ["steps", "patience", "checkpoint_every", "keep_checkpoints"];
 
 /// Unweighted losses of one step, and the gradient norm of the generator.
 #[derive(Clone, Copy, Debug, serde::Serialize)]
@@ -83,14 +83,13 @@ pub struct GanTrainer {
 }
 
 impl GanTrainer {
-    /// Networks for one speaker or several, with random initial weights determined by the seed.
-    pub fn new(speakers: Vec<SpeakerMetadata>, settings: GanSettings) -> Result<Self> {
-        let device = open_device(settings.device == ComputeDevice::Cuda)?;
-        let mut generator_params = Params::new(settings.seed).on(&device);
-        let speakers = SpeakerSet::new(speakers, settings.bone_loss, &device)?;
+    /// Networks on `device` for one speaker or several, with random initial weights determined by the seed.
+    pub fn new(speakers: Vec<SpeakerMetadata>, settings: GanSettings, device: &Device) -> Result<Self> {
+        let mut generator_params = Params::new(settings.seed).on(device);
+        let speakers = SpeakerSet::new(speakers, settings.bone_loss, device)?;
         let generator = Generator::new(&mut generator_params, speakers.network())?;
         let ema = if settings.ema_decay > 0.0 {
-            let mut params = Params::frozen().on(&device);
+            let mut params = Params::frozen().on(device);
             let ema = Generator::new(&mut params, speakers.network())?;
             params.load(&generator_params.tensors()?)?;
             Some((ema, params))
@@ -98,7 +97,7 @@ impl GanTrainer {
             None
         };
         // Inverted seed, so that equally named tensors of the two networks are initialised differently.
-        let mut discriminator_params = Params::new(!settings.seed).on(&device);
+        let mut discriminator_params = Params::new(!settings.seed).on(device);
         let discriminator = Discriminator::new(&mut discriminator_params, speakers.n_features())?;
         let adam = adam::Config { max_norm: Some(MAX_NORM), ..adam::Config::default() };
         let decaying = adam::Config { weight_decay: settings.weight_decay, ..adam };

@@ -18,21 +18,36 @@ use crate::train::resume::{self, sample_windows};
 use crate::train::word_vectors::WORD_DIM;
 use crate::train::{log, no_window};
 use anyhow::{Context, Result, ensure};
+use candle_core::Device;
 use orator_base::stage::progress::Progress;
 use orator_base::stage::workdir::{self, FolderLock};
 use orator_base::text::counted;
-use orator_dataset::config::{ComputeDevice, GanConfig, GanSettings};
+use orator_dataset::config::{GanConfig, GanSettings};
 use orator_dataset::{Dataset, Split};
 use orator_formats::checkpoint;
 use orator_formats::word_vectors::WordVectors;
 use orator_nn::cpu::spin_pool::with_spinning_workers;
 use orator_nn::gan::generator::FRAMES_MULTIPLE;
-use orator_nn::params::open_device;
 use orator_nn::weights::Contents;
 use rayon::ThreadPoolBuilder;
 use std::path::Path;
 use std::sync::mpsc::{self, Receiver, Sender};
 use std::time::{Duration, Instant};
+
+/// Device of a training, and what a new training is initialised from.
+pub struct TrainingStart<'a> {
+    pub device: &'a Device,
+    /// Checkpoint of another model, or folder of checkpoints; a resumed training ignores it.
+    pub from: Option<&'a Path>,
+    /// Vectors for the word embeddings; without them they are random.
+    pub vectors: Option<&'a WordVectors>,
+}
+
+impl Default for TrainingStart<'_> {
+    fn default() -> Self {
+        Self { device: &Device::Cpu, from: None, vectors: None }
+    }
+}
 
 /// Trains on `dataset` until `requested.steps`, resuming from the newest checkpoint in `folder` if there is one; then
 /// the settings of that checkpoint apply, and differences are reported.
@@ -46,22 +61,20 @@ pub fn train(
     folder: &Path,
     progress: &dyn Progress,
 ) -> Result<TrainingOutcome<Validation>> {
-    train_with_callback(&[dataset], requested, None, None, folder, progress, &mut |_| ())
+    train_with_callback(&[dataset], requested, &TrainingStart::default(), folder, progress, &mut |_| ())
 }
 
 /// Like [`train`], for one speaker or several, a dataset each; calls `validated` after each validation, when its log
-/// line and checkpoint have been written. `from`: checkpoint, or folder of checkpoints, that a new training is
-/// initialised from; a resumed training ignores it. `vectors` initialise the word embeddings; without them they are
-/// random.
+/// line and checkpoint have been written.
 pub fn train_with_callback(
     datasets: &[&Dataset],
     requested: &GanConfig,
-    from: Option<&Path>,
-    vectors: Option<&WordVectors>,
+    start: &TrainingStart,
     folder: &Path,
     progress: &dyn Progress,
     validated: &mut dyn FnMut(ValidatedStep),
 ) -> Result<TrainingOutcome<Validation>> {
+    let TrainingStart { device, from, vectors } = *start;
     check(requested)?;
     ensure!(
         vectors.is_none() || requested.words,
@@ -121,8 +134,8 @@ pub fn train_with_callback(
     };
     let loader = JoinedWindows::new(loaders);
     let mut trainer = match &pretrained_model {
-        None => GanTrainer::new(speakers, settings)?,
-        Some(pretrained_model) => pretrained_model.trainer(speakers, settings, vectors, &loader)?,
+        None => GanTrainer::new(speakers, settings, device)?,
+        Some(pretrained_model) => pretrained_model.trainer(speakers, settings, vectors, &loader, device)?,
     };
     if resumed.is_none() && pretrained_model.is_none() {
         trainer.initialise_words(vectors)?;
@@ -181,7 +194,7 @@ fn secs_a_step(trainer: &GanTrainer, loader: &JoinedWindows) -> Result<Option<f6
     if trainer.settings.steps < MIN_STEPS {
         return Ok(None);
     }
-    let mut trial = GanTrainer::new(trainer.speakers.all().to_vec(), trainer.settings.clone())?;
+    let mut trial = GanTrainer::new(trainer.speakers.all().to_vec(), trainer.settings.clone(), trainer.device())?;
     let which = sample_windows(trial.settings.seed, 0, trial.settings.batch, loader.len());
     let batch = loader.batch_changed(&which, &[])?;
     with_spinning_workers(|| {
@@ -301,7 +314,6 @@ fn check(settings: &GanConfig) -> Result<()> {
         settings.checkpoint_every > 0 && settings.epoch_steps.given() != Some(0) && settings.stride_frames > 0,
         "gan.checkpoint_every, gan.epoch_steps and gan.stride_frames must be at least 1"
     );
-    open_device(settings.device == ComputeDevice::Cuda)?;
     Ok(())
 }
 
@@ -360,7 +372,7 @@ pub fn prefetch<R>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use candle_core::{Device, Tensor};
+    use candle_core::Tensor;
     use std::sync::atomic::{AtomicUsize, Ordering};
 
     #[test]

@@ -59,10 +59,8 @@ impl WindowBatch {
     pub fn on(&self, device: &Device) -> Result<Self> {
         let on = |tensor: &Tensor| tensor.to_device(device);
         let (mels, poses, mask) = (on(&self.mels)?, on(&self.poses)?, on(&self.mask)?);
-        let words = self.words.as_ref().map(|words| {
-            Ok::<_, anyhow::Error>(WordFrames { numbers: on(&words.numbers)?, times: on(&words.times)?, added: None })
-        });
-        Ok(Self { mels, poses, mask, speakers: self.speakers.clone(), words: words.transpose()? })
+        let words = self.words.as_ref().map(|words| words.on(device)).transpose()?;
+        Ok(Self { mels, poses, mask, speakers: self.speakers.clone(), words })
     }
 }
 

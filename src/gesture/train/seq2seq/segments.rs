@@ -40,6 +40,13 @@ impl SegmentBatch {
     pub fn completed(&self, predicted: &Tensor) -> candle_core::Result<Tensor> {
         (predicted * &self.known)? + &self.filled
     }
+
+    /// The same segments on another device.
+    pub fn on(&self, device: &Device) -> candle_core::Result<Self> {
+        let on = |tensor: &Tensor| tensor.to_device(device);
+        let segment = self.segment.on(device)?;
+        Ok(Self { segment, real: on(&self.real)?, known: on(&self.known)?, filled: on(&self.filled)? })
+    }
 }
 
 impl SegmentLoader {
@@ -192,7 +199,8 @@ pub fn roll_out_previous(
         return Ok(());
     }
     let preceding = loader.batch_before(&chosen.iter().map(|row| which[*row]).collect::<Vec<_>>())?;
-    let predicted_poses = network.forward(&preceding.segment, &mut Mode::Eval)?.detach();
+    let preceding = preceding.segment.on(batch.real.device())?;
+    let predicted_poses = network.forward(&preceding, &mut Mode::Eval)?.detach();
     let predicted_poses = predicted_poses.narrow(1, predicted - previous, previous)?;
     let mut rows =
         (0..which.len()).map(|row| batch.segment.previous.get(row)).collect::<candle_core::Result<Vec<_>>>()?;

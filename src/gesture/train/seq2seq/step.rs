@@ -10,7 +10,7 @@ use crate::train::gan::losses::number;
 use crate::train::optim::adam::{self, Adam};
 use crate::train::resume;
 use anyhow::{Context, Result, ensure};
-use candle_core::Tensor;
+use candle_core::{Device, Tensor};
 use orator_dataset::config::{Seq2seqConfig, Seq2seqSettings, to_stored};
 use orator_formats::checkpoint;
 use orator_nn::Mode;
@@ -75,16 +75,16 @@ pub struct SequenceTrainer {
 }
 
 impl SequenceTrainer {
-    /// Networks with random initial weights, determined by the seed.
-    pub fn new(metadata: SequenceMetadata, settings: Seq2seqSettings) -> Result<Self> {
-        let mut params = Params::new(settings.seed);
+    /// Networks on `device` with random initial weights, determined by the seed.
+    pub fn new(metadata: SequenceMetadata, settings: Seq2seqSettings, device: &Device) -> Result<Self> {
+        let mut params = Params::new(settings.seed).on(device);
         let network = architecture::network(metadata.architecture, &mut params, &metadata.network)?;
         let is_adversarial = metadata.architecture == Architecture::Adversarial;
         let beta1 = if is_adversarial { 0.5 } else { 0.9 };
         let adam_config =
             adam::Config { beta1, beta2: if is_adversarial { 0.9 } else { 0.999 }, ..adam::Config::default() };
         let adversary = |seed: u64| -> Result<Adversary> {
-            let mut params = Params::new(seed);
+            let mut params = Params::new(seed).on(device);
             let network = SegmentDiscriminator::new(&mut params, &metadata.network)?;
             Ok(Adversary { network, adam: Adam::new(&params, adam_config)?, params })
         };
@@ -250,7 +250,6 @@ fn normal_like(tensor: &Tensor, rng: &mut ChaCha8Rng) -> Result<Tensor> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use candle_core::Device;
     use rand::SeedableRng;
 
     #[test]

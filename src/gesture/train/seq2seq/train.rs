@@ -43,14 +43,16 @@ pub fn train(
     folder: &Path,
     progress: &dyn Progress,
 ) -> Result<TrainingOutcome<SequenceValidation>> {
-    train_with_callback(source, vectors, requested, folder, progress, &mut |_| ())
+    train_with_callback(source, vectors, requested, &Device::Cpu, folder, progress, &mut |_| ())
 }
 
-/// Like [`train`]; calls `validated` after each validation, when its log line and checkpoint have been written.
+/// Like [`train`], on `device`; calls `validated` after each validation, when its log line and checkpoint have been
+/// written.
 pub fn train_with_callback(
     source: TrainingSource,
     vectors: Option<&WordVectors>,
     requested: &Seq2seqConfig,
+    device: &Device,
     folder: &Path,
     progress: &dyn Progress,
     validated: &mut dyn FnMut(ValidatedStep),
@@ -85,14 +87,14 @@ pub fn train_with_callback(
                 network.word
             );
             let splits = source.sequences(poses, network.context)?;
-            let mut trainer = SequenceTrainer::new(stored.speaker.clone(), stored.settings.clone())?;
+            let mut trainer = SequenceTrainer::new(stored.speaker.clone(), stored.settings.clone(), device)?;
             trainer.load(stored, contents)?;
             // A process killed before removing the oldest checkpoint leaves one too many.
             checkpoint::prune(folder, trainer.settings.keep_checkpoints)?;
             (trainer, splits)
         }
         None => {
-            let initial = initialise(source, vectors, requested)?;
+            let initial = initialise(source, vectors, requested, device)?;
             let reads_words = architecture::word_encoder(requested.network).is_some();
             if reads_words && vectors.is_none() && requested.reading == FineMotionReading::Paper {
                 progress.say("the word vectors are random: the paper's are GloVe's (`--words FILE`)");
@@ -144,7 +146,7 @@ pub fn train_with_callback(
         };
         progress.say(&format!("no validation segments, so the metrics are those of training segments: {cause}"));
     }
-    let held_out = ValidationSegments::new(&held_out, &train, trainer.settings.batch)?;
+    let held_out = ValidationSegments::new(&held_out, &train, trainer.settings.batch, device)?;
     let mut training = SequenceTraining { trainer: &mut trainer, loader: &train, held_out: &held_out };
     let outcome = with_spinning_workers(|| epochs::run(&mut training, folder, progress, validated))?;
     let (n_parameters, n_words) = (trainer.params().n_parameters(), trainer.metadata.vocabulary.words().len());
@@ -156,6 +158,7 @@ fn initialise(
     source: TrainingSource,
     vectors: Option<&WordVectors>,
     requested: &Seq2seqConfig,
+    device: &Device,
 ) -> Result<(SequenceTrainer, SequenceSplits)> {
     let settings = reading::settings(requested)?;
     let (fps, poses) = (source.fps(), source.pose_format()?);
@@ -184,7 +187,7 @@ fn initialise(
         has_word_vectors: vectors.is_some(),
         dataset: source.hash()?,
     };
-    let trainer = SequenceTrainer::new(metadata, settings)?;
+    let trainer = SequenceTrainer::new(metadata, settings, device)?;
     if let Some(encoder) = architecture::word_encoder(trainer.metadata.architecture) {
         word_vectors::initialise(trainer.params(), encoder, &trainer.metadata.vocabulary, vectors)?;
     }
@@ -211,7 +214,7 @@ fn initialise_scales(trainer: &SequenceTrainer, train: &[PoseSequence]) -> Resul
     let n = trainer.metadata.network.pose;
     let scales: Vec<f32> = (0..n).map(scale).collect();
     let noise: Vec<f32> = (0..n).map(|c| NOISE * deviation(c) / scales[c]).collect();
-    let tensor = |values: Vec<f32>| Tensor::from_vec(values, n, &Device::Cpu);
+    let tensor = |values: Vec<f32>| Tensor::from_vec(values, n, trainer.params().device());
     Ok(baseline.set_scale(&tensor(scales)?, &tensor(noise)?)?)
 }
 
@@ -244,7 +247,7 @@ impl ValidatedTraining for SequenceTraining<'_> {
     fn step(&mut self) -> Result<StepReport> {
         let Seq2seqSettings { seed, batch, rollout_previous, .. } = self.trainer.settings;
         let which = sample_windows(seed, self.trainer.step, batch, self.loader.len());
-        let mut batch = self.loader.batch(&which)?;
+        let mut batch = self.loader.batch(&which)?.on(self.trainer.params().device())?;
         if rollout_previous > 0.0 {
             // The segments and the dropout use other derived seeds.
             let rng = &mut step_rng(seed.rotate_left(32), self.trainer.step);

@@ -4,7 +4,7 @@ use super::segments::{SegmentBatch, SegmentLoader};
 use crate::train::gan::losses::number;
 use crate::train::gan::score;
 use anyhow::Result;
-use candle_core::Tensor;
+use candle_core::{Device, Tensor};
 use orator_nn::Mode;
 use orator_nn::seq2seq::predict::GesturePredictor;
 use serde::{Deserialize, Serialize};
@@ -45,12 +45,12 @@ struct Sums {
 }
 
 impl ValidationSegments {
-    /// At most `MAX_SEGMENTS` evenly spaced held-out segments, or training segments if none is held out.
-    pub fn new(held_out: &SegmentLoader, train: &SegmentLoader, batch: usize) -> Result<Self> {
+    /// At most `MAX_SEGMENTS` evenly spaced held-out segments, or training segments if none is held out, on `device`.
+    pub fn new(held_out: &SegmentLoader, train: &SegmentLoader, batch: usize, device: &Device) -> Result<Self> {
         let (split, loader) = if held_out.is_empty() { ("train", train) } else { ("validation", held_out) };
         let n = loader.len().min(MAX_SEGMENTS);
         let chosen: Vec<usize> = (0..n).map(|i| i * loader.len() / n).collect();
-        let batches = chosen.chunks(batch).map(|which| loader.batch(which)).collect::<Result<_>>()?;
+        let batches = chosen.chunks(batch).map(|which| Ok(loader.batch(which)?.on(device)?)).collect::<Result<_>>()?;
         Ok(Self { split, batches })
     }
 

@@ -7,8 +7,11 @@ use crate::train::lifter::heatmaps::HeatmapLifterTask;
 use crate::train::supervised::{Schedule, TrainingTask, start_from, train};
 use anyhow::{Context, ensure};
 use orator::cli::Outcome;
+use orator::cli::config_args::DeviceArgs;
 use orator::cli::ui::Ui;
+use orator_base::types::device::DeviceChoice;
 use orator_nn::lifter::body::BodyLifter;
+use orator_nn::lifter::temporal::CPU_ONLY;
 use std::path::PathBuf;
 
 /// Train the networks that lift 2D keypoints to 3D joints.
@@ -59,6 +62,8 @@ pub struct Args {
     /// Number of steps between checkpoints.
     #[arg(long, default_value_t = 250)]
     checkpoint_every: usize,
+    #[command(flatten)]
+    device: DeviceArgs,
 }
 
 /// Lifter whose networks are trained.
@@ -83,6 +88,8 @@ pub fn run(args: Args, ui: &Ui) -> anyhow::Result<Outcome> {
         args.learning_rate
     );
     ensure!((1..=4096).contains(&args.width.unwrap_or(256)), "invalid --width: expected 1 to 4096");
+    let cpu_only = || CPU_ONLY.filter(|_| args.part == LifterPart::Body);
+    let device = args.device.open(DeviceChoice::Cpu, cpu_only, ui)?;
     let mut training_task: Box<dyn TrainingTask> = match args.part {
         LifterPart::Body => {
             ensure!(!args.mocap.is_empty(), "no training motion for the body lifter; give --mocap PATH");
@@ -95,7 +102,7 @@ pub fn run(args: Args, ui: &Ui) -> anyhow::Result<Outcome> {
             let (held_out, takes) = upper_body::divide(takes, &args.hold_out)?;
             ensure!(!takes.is_empty(), "--hold-out selects every take: expected at least one take for training");
             let config = BodyLifter::config(args.width.unwrap_or(256), &args.widths);
-            Box::new(BodyLifterTask::new(takes, held_out, &config, args.seed)?)
+            Box::new(BodyLifterTask::new(takes, held_out, &config, args.seed, &device)?)
         }
         LifterPart::Hands => {
             ensure!(
@@ -103,8 +110,10 @@ pub fn run(args: Args, ui: &Ui) -> anyhow::Result<Outcome> {
                 "--mocap and --hold-out apply to `--part body` only; the hand lifter is trained on procedural hands"
             );
             match args.network {
-                HandNetwork::Coordinates => Box::new(HandLifterTask::new(args.width.unwrap_or(896), args.seed)?),
-                HandNetwork::Heatmap => Box::new(HeatmapLifterTask::new(args.seed)?),
+                HandNetwork::Coordinates => {
+                    Box::new(HandLifterTask::new(args.width.unwrap_or(896), args.seed, &device)?)
+                }
+                HandNetwork::Heatmap => Box::new(HeatmapLifterTask::new(args.seed, &device)?),
             }
         }
     };

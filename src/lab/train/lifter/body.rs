@@ -5,7 +5,7 @@ use crate::mocap::upper_body::{BodyTake, Set};
 use crate::train::scene::body::{FilmedScene, Filming, scenes};
 use crate::train::supervised::TrainingTask;
 use anyhow::Result;
-use candle_core::Tensor;
+use candle_core::{Device, Tensor};
 use orator_base::motion::upper_body::N_POINTS;
 use orator_base::motion::view::body::{BodyView, N_BODY_IN, N_IN, N_OUT};
 use orator_nn::Mode;
@@ -46,14 +46,20 @@ pub struct BodyLifterTask {
 }
 
 impl BodyLifterTask {
-    /// Creates a network initialised from `seed`, to be trained on `takes`; `held_out` takes are used for evaluation
-    /// only.
+    /// Creates a network on `device`, initialised from `seed`, to be trained on `takes`; `held_out` takes are used for
+    /// evaluation only.
     ///
     /// # Errors
     /// A configuration from which no network can be created.
-    pub fn new(mut takes: Vec<BodyTake>, held_out: Vec<Set>, config: &Config, seed: u64) -> Result<Self> {
+    pub fn new(
+        mut takes: Vec<BodyTake>,
+        held_out: Vec<Set>,
+        config: &Config,
+        seed: u64,
+        device: &Device,
+    ) -> Result<Self> {
         takes.sort_by(|a, b| a.name.cmp(&b.name));
-        let mut params = Params::new(seed);
+        let mut params = Params::new(seed).on(device);
         let lifter = BodyLifter::new(&mut params, config)?;
         let (rendered, captured) = takes.into_iter().partition(|take| take.rendered);
         Ok(Self { params, lifter, captured: TakePool::new(captured), rendered: TakePool::new(rendered), held_out })

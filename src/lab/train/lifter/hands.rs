@@ -3,7 +3,7 @@
 use crate::train::scene::hand::{errors, sample_hand};
 use crate::train::supervised::TrainingTask;
 use anyhow::Result;
-use candle_core::Tensor;
+use candle_core::{Device, Tensor};
 use orator_base::motion::view::hand::{HandView, N_IN, N_OUT};
 use orator_base::types::pose2d::N_HAND;
 use orator_base::types::skeleton::Side;
@@ -23,12 +23,12 @@ pub struct HandLifterTask {
 }
 
 impl HandLifterTask {
-    /// Creates a network with layers of `hidden` units, initialised from `seed`.
+    /// Creates a network with layers of `hidden` units, on `device`, initialised from `seed`.
     ///
     /// # Errors
     /// A network that cannot be created.
-    pub fn new(hidden: usize, seed: u64) -> Result<Self> {
-        let mut params = Params::new(seed);
+    pub fn new(hidden: usize, seed: u64, device: &Device) -> Result<Self> {
+        let mut params = Params::new(seed).on(device);
         let config = Config { n_in: N_IN, n_out: N_OUT, hidden, dropout: 0.0 };
         let lifter = HandLifter::new(&mut params, NAME, &config)?;
         Ok(Self { params, lifter })

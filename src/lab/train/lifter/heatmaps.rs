@@ -6,7 +6,7 @@ use crate::train::scene::hand::{errors, sample_hand};
 use crate::train::scene::hand_shape::normal;
 use crate::train::supervised::TrainingTask;
 use anyhow::Result;
-use candle_core::Tensor;
+use candle_core::{Device, Tensor};
 use orator_base::types::pose2d::N_HAND;
 use orator_base::types::skeleton::Side;
 use orator_nn::Mode;
@@ -30,12 +30,12 @@ pub struct HeatmapLifterTask {
 }
 
 impl HeatmapLifterTask {
-    /// Creates the networks, initialised from `seed`.
+    /// Creates the networks on `device`, initialised from `seed`.
     ///
     /// # Errors
     /// A network that cannot be created.
-    pub fn new(seed: u64) -> Result<Self> {
-        let mut params = Params::new(seed);
+    pub fn new(seed: u64, device: &Device) -> Result<Self> {
+        let mut params = Params::new(seed).on(device);
         let lifter = HeatmapLifter::new(&mut params, NAME)?;
         Ok(Self { params, lifter })
     }
@@ -96,13 +96,12 @@ impl TrainingTask for HeatmapLifterTask {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use candle_core::Device;
     use orator_nn::lifter::score_maps::N_MAPS;
     use rand::SeedableRng;
 
     #[test]
     fn targets_are_hands_in_their_own_frame_and_a_right_answer_costs_nothing() -> Result<()> {
-        let training_task = HeatmapLifterTask::new(1)?;
+        let training_task = HeatmapLifterTask::new(1, &Device::Cpu)?;
         let mut rng = ChaCha8Rng::seed_from_u64(5);
         let (mut x, mut y) = (vec![0.0; N_MAPS], vec![0.0; 3 * N_ROWS]);
         training_task.sample(&mut rng, &mut x, &mut y);
