@@ -6,6 +6,7 @@
 # make test    everything CI runs
 # make test-data   the tests that the last `make test` skipped, with the real data and models in ORATOR_DATA
 # make prove   the long-running tests and the benchmarks
+# make prove-cuda   the feature `cuda`, for NVIDIA GPUs, without a GPU: build, start, messages; packs what measures it
 # make build   target/release/orator and target/release/orator-lab
 # make dist    a Python wheel and relocatable archives in target/dist, with all libraries and licences
 # Requires Debian 12 (x86-64) and Rust. The scripts in .ci/setup install all other dependencies.
@@ -13,7 +14,7 @@
 SHELL := /bin/bash
 .SHELLFLAGS := -euo pipefail -c
 .DEFAULT_GOAL := build
-.PHONY: spelling test-data setup runtime models readers aligner browser blender validator vrm driver loader build dist check test prove prove-dist prove-rule prove-words prove-people prove-cluster prove-study demo demo-quick demo-study clean-demo docs
+.PHONY: cuda spelling test-data setup runtime models readers aligner browser blender validator vrm driver loader build dist check test prove prove-dist prove-rule prove-words prove-people prove-cluster prove-cuda prove-study demo demo-quick demo-study clean-demo docs
 
 TARGET := $(or $(CARGO_TARGET_DIR),target)
 ORATOR := $(TARGET)/release/orator
@@ -34,7 +35,7 @@ export ORATOR_DRIVER ?= $(abspath $(TARGET)/driver)
 setup: ; @.ci/setup/system.sh
 runtime: ; @.ci/setup/onnxruntime.sh
 readers spelling: ; @.ci/setup/python.sh $@
-aligner browser blender validator vrm driver loader: ; @.ci/setup/$@.sh
+aligner browser blender cuda validator vrm driver loader: ; @.ci/setup/$@.sh
 models: build ; @.ci/setup/models.sh
 
 build: setup runtime
@@ -73,6 +74,9 @@ test-data: build
 		else echo 'the last `make test` skipped no test'; fi
 
 prove prove-rule prove-words prove-people prove-cluster: build models aligner loader
+	.ci/$@
+
+prove-cuda: build
 	.ci/$@
 
 prove: prove-dist

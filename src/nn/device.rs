@@ -1,10 +1,11 @@
 //! The device that the networks of a command are computed on: opened once, and handed down as a [`Device`].
 
-use anyhow::{Result, anyhow, bail, ensure};
+#[cfg(feature = "cuda")]
+use crate::cuda::gpu::open as open_gpu;
+use anyhow::{Result, anyhow, bail};
 pub use candle_core::Device;
 use candle_core::utils::cuda_is_available;
 use orator_base::types::device::DeviceChoice;
-use std::panic;
 
 /// Opens the chosen device. `cpu_only` returns why the networks of the command run on the CPU only, if they do; it is not
 /// called for the CPU. For [`DeviceChoice::Auto`] also returns which device was chosen, and why if it is the CPU.
@@ -33,15 +34,7 @@ pub fn has_cuda() -> bool {
     cuda_is_available()
 }
 
-fn open_gpu(number: usize) -> Result<Device> {
-    ensure!(has_cuda(), "this program has no CUDA: build it with `cargo build --release --features cuda`");
-    // The bindings panic if a library of CUDA is missing. The message is part of the error instead of printed.
-    let hook = panic::take_hook();
-    panic::set_hook(Box::new(|_| ()));
-    let opened = panic::catch_unwind(|| Device::new_cuda(number));
-    panic::set_hook(hook);
-    match opened {
-        Ok(opened) => opened.map_err(|error| anyhow!("no usable NVIDIA GPU {number}: {error}")),
-        Err(message) => bail!("{}", message.downcast_ref::<String>().map_or("CUDA cannot be loaded", String::as_str)),
-    }
+#[cfg(not(feature = "cuda"))]
+fn open_gpu(_number: usize) -> Result<Device> {
+    bail!("this program has no CUDA: build it with `cargo build --release --features cuda` (`orator guide gpu`)")
 }

@@ -5,6 +5,8 @@
 //! of the lifters are channels first; those of the GAN (`gan::generator`) are channels last, which avoids unfolding.
 
 pub mod cpu;
+#[cfg(feature = "cuda")]
+pub mod cuda;
 pub mod device;
 pub mod gan;
 pub mod lifter;

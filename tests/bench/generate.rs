@@ -4,6 +4,7 @@ use super::child;
 use super::report::{Report, median};
 use anyhow::{Result, ensure};
 use orator_base::stage::progress::Progress;
+use orator_base::types::device::DeviceChoice;
 use orator_base::types::skeleton::{N_BONES, N_JOINTS};
 use orator_base::types::sound::Sound;
 use orator_base::types::time::FrameRate;
@@ -12,6 +13,7 @@ use orator_gesture::generate::generator::CHUNK;
 use orator_gesture::generate::model::SpeakerMetadata;
 use orator_gesture::generate::normalisation::{N_FEATURES, Normalisation};
 use orator_gesture::generate::representation::Representation;
+use orator_nn::device::{self, Device};
 use orator_nn::gan::generator::{Config, Generator, Preset};
 use orator_nn::params::Params;
 use orator_test_support::drawn::speech::Speech;
@@ -40,6 +42,9 @@ pub(crate) struct Args {
     /// Measure only this preset.
     #[arg(long, value_name = "light|paper")]
     preset: Option<Preset>,
+    /// Device of the network.
+    #[arg(long, default_value = "cpu", value_name = "cpu|cuda|cuda:N")]
+    device: DeviceChoice,
 }
 
 /// Frame rate of the generated motion.
@@ -48,6 +53,7 @@ const FPS: FrameRate = FrameRate::new(15, 1);
 pub(crate) fn run(args: &Args, progress: &dyn Progress) -> Result<Report> {
     ensure!(args.secs >= 1.0 && args.secs < 1e6, "--secs is {}, expected 1 to a million", args.secs);
     ensure!(args.rounds > 0 && args.threads > 0, "nothing to measure: there must be rounds and threads");
+    let (device, _) = device::open(args.device, || None)?;
     let pool = rayon::ThreadPoolBuilder::new().num_threads(args.threads).build()?;
     let presets = [("light", Preset::Light), ("paper", Preset::Paper)];
     let presets: Vec<_> = presets.into_iter().filter(|(_, p)| args.preset.is_none_or(|only| only == *p)).collect();
@@ -56,7 +62,7 @@ pub(crate) fn run(args: &Args, progress: &dyn Progress) -> Result<Report> {
     // The smaller preset first: the peak memory is that of the process so far.
     let measured = presets.iter().map(|(name, preset)| {
         task.detail(name);
-        let speaker = untrained(*preset)?;
+        let speaker = untrained(*preset, &device)?;
         let mut secs = Vec::new();
         for _ in 0..args.rounds {
             let start = Instant::now();
@@ -74,8 +80,9 @@ pub(crate) fn run(args: &Args, progress: &dyn Progress) -> Result<Report> {
     drop(task);
 
     let mut lines = vec![format!(
-        "{:.0} s of speech, {} thread(s), median of {} round(s); before it {:.0} MiB are the sound's",
+        "{:.0} s of speech, {}, {} thread(s), median of {} round(s); before it {:.0} MiB are the sound's",
         args.secs,
+        args.device,
         args.threads,
         args.rounds,
         sound.samples.len() as f64 * 4.0 / 1024.0 / 1024.0
@@ -95,11 +102,11 @@ fn speech(secs: f64) -> Sound {
 }
 
 /// A speaker with random weights.
-fn untrained(preset: Preset) -> Result<GestureGenerator> {
+fn untrained(preset: Preset, device: &Device) -> Result<GestureGenerator> {
     let network = Config::from_preset(preset, N_FEATURES);
     let mut random = Params::new(1337);
     Generator::new(&mut random, &network)?;
-    let mut params = Params::frozen();
+    let mut params = Params::frozen().on(device);
     let generator = Generator::new(&mut params, &network)?;
     params.load(&random.tensors()?)?;
     let table = ndarray::Array2::from_elem((N_JOINTS, 3), 0.1);

@@ -47,6 +47,8 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
         ok("OpenCV", orator_media::opencv::version()),
         ok("processor cores", std::thread::available_parallelism().map_or(1, |n| n.get()).to_string()),
     ];
+    #[cfg(feature = "cuda")]
+    checks.extend(gpus());
     match config {
         Ok(config) => {
             checks.push(ok("configuration", config.file.display().to_string()));
@@ -91,6 +93,21 @@ fn ok(name: &str, found: String) -> Check {
 
 fn missing(name: &str, problem: String, fix: &str) -> Check {
     Check { name: name.to_owned(), found: Err((problem, fix.to_owned())), is_full: false }
+}
+
+/// NVIDIA GPUs, and the libraries of CUDA. They are optional, so nothing counts as missing without them.
+#[cfg(feature = "cuda")]
+fn gpus() -> Vec<Check> {
+    let note = |name: &str, problem: String| Check { is_full: false, ..ok(name, problem) };
+    let gpus = match orator_nn::cuda::gpu::list() {
+        Ok(gpus) => gpus.into_iter().enumerate().map(|(number, gpu)| ok(&format!("GPU {number}"), gpu)).collect(),
+        Err(error) => vec![note("GPU", format!("none: {error:#}"))],
+    };
+    let libraries = orator_nn::cuda::libraries::status().iter().map(|(name, found)| match found {
+        Ok(path) => ok(name, path.display().to_string()),
+        Err(problem) => note(name, problem.clone()),
+    });
+    gpus.into_iter().chain(libraries).collect()
 }
 
 /// Restrictions of processes that read videos on this machine. They are optional, so nothing counts as missing without

@@ -8,6 +8,7 @@ use anyhow::{Context, Result, ensure};
 use candle_core::{Device, Tensor};
 use orator_base::audio::mel::N_MELS;
 use orator_base::stage::progress::Progress;
+use orator_base::types::device::DeviceChoice;
 use orator_base::types::skeleton::{N_BONES, N_JOINTS, NECK, is_duplicate, parent};
 use orator_base::types::time::FrameRate;
 use orator_dataset::config::{AdversarialLoss, GanConfig, GanRecipe, MotionRepresentation};
@@ -20,6 +21,7 @@ use orator_gesture::train::gan::recipe::{self, InitialWeights, TrainingMaterial}
 use orator_gesture::train::gan::step::{GanTrainer, Losses, MAX_NORM};
 use orator_gesture::train::gan::windows::WindowBatch;
 use orator_nn::cpu::spin_pool::with_spinning_workers;
+use orator_nn::device;
 use orator_nn::gan::generator::Config;
 use orator_nn::weights::Contents;
 use rand::{Rng, SeedableRng};
@@ -54,6 +56,12 @@ pub(crate) struct Args {
     /// PyTorch reference script, run as `REFERENCE.py serve FILE` with the Python in ORATOR_REFERENCE_PYTHON.
     #[arg(long, value_name = "FILE")]
     python: Option<PathBuf>,
+    /// Device of both.
+    #[arg(long, default_value = "cpu", value_name = "cpu|cuda|cuda:N")]
+    device: DeviceChoice,
+    /// Compares the losses of this many steps on the device and on the CPU instead of measuring.
+    #[arg(long, value_name = "N")]
+    beside_cpu: Option<usize>,
 }
 
 /// The trainer with a constant batch.
@@ -63,7 +71,7 @@ struct FixedBatch {
 }
 
 impl FixedBatch {
-    fn new(args: &Args) -> Result<Self> {
+    fn new(args: &Args, device: &Device) -> Result<Self> {
         let preset = serde_json::from_value(json!(args.preset))?;
         let config = GanConfig {
             recipe: GanRecipe::Rebol2021,
@@ -106,7 +114,7 @@ impl FixedBatch {
             words: None,
         };
         let facts = SpeakerMetadata::new("benchmark", FPS, "", network, normalisation, representation);
-        Ok(Self { trainer: GanTrainer::new(vec![facts], settings, &Device::Cpu)?, batch })
+        Ok(Self { trainer: GanTrainer::new(vec![facts], settings, device)?, batch })
     }
 
     /// Weights, batch and settings as input of the reference.
@@ -144,6 +152,7 @@ impl FixedBatch {
                 self.trainer.step(&self.batch)?;
             }
             let losses = self.trainer.step(&self.batch)?;
+            self.trainer.device().synchronize()?;
             Ok((start.elapsed().as_secs_f64(), losses))
         })
     }
@@ -151,7 +160,9 @@ impl FixedBatch {
     /// Time of each phase of a step, seconds.
     fn phases(&mut self) -> Result<Vec<(&'static str, f64)>> {
         let (mut phases, mut last) = (Vec::new(), Instant::now());
+        let device = self.trainer.device().clone();
         let mut phase = |name| {
+            let _ = device.synchronize();
             phases.push((name, last.elapsed().as_secs_f64()));
             last = Instant::now();
         };
@@ -163,7 +174,8 @@ impl FixedBatch {
     /// of the losses and the gradient norm of the first step.
     fn differences(&mut self, theirs: &mut Reference) -> Result<(f64, f64)> {
         let their: Vec<f64> = serde_json::from_value(theirs.ask("forward")?["poses"].clone())?;
-        let raw = self.trainer.generator.forward(&self.batch.mels, &[], self.trainer.settings.window_frames, true)?;
+        let mels = self.batch.mels.to_device(self.trainer.device())?;
+        let raw = self.trainer.generator.forward(&mels, &[], self.trainer.settings.window_frames, true)?;
         let own = self.trainer.speakers.poses(&raw, &self.batch.speakers)?.flatten_all()?.to_vec1::<f32>()?;
         let n = own.len().div_ceil(OUTPUT_STRIDE);
         ensure!(their.len() == n, "the reference returned {} outputs, expected {n}", their.len());
@@ -190,14 +202,54 @@ pub(crate) fn run(args: &Args, progress: &dyn Progress) -> Result<Report> {
     measured
 }
 
+/// Losses of each step on the device and on the CPU, from the same weights and batch.
+fn beside_cpu(args: &Args, device: &Device, n_steps: usize) -> Result<Report> {
+    let mut trainers = [FixedBatch::new(args, device)?, FixedBatch::new(args, &Device::Cpu)?];
+    let mut text = format!(
+        "{}: losses on {} and on the CPU, and their largest relative difference\n\
+         step         L1               adversarial      discriminator",
+        args.preset, args.device
+    );
+    let mut differences = Vec::new();
+    for step in 1..=n_steps {
+        let [own, cpu] = trainers.each_mut().map(|trainer| trainer.train(1));
+        let [own, cpu] = [own?.1, cpu?.1].map(|losses| [losses.l1, losses.adversarial, losses.discriminator]);
+        let difference = own.iter().zip(&cpu).map(|(own, cpu)| (own - cpu).abs() / cpu.abs()).fold(0.0, f64::max);
+        differences.push(difference);
+        if step == n_steps || [1, 2, 5, 10, 20, 50, 100].contains(&step) {
+            let pairs: Vec<String> = own.iter().zip(&cpu).map(|(own, cpu)| format!("{own:.5} {cpu:.5}")).collect();
+            text += &format!("\n{step:4}  {}  {difference:.1e}", pairs.join("  "));
+        }
+    }
+    Ok(Report { text, facts: json!({ "preset": args.preset, "differences": differences }) })
+}
+
+/// Peak memory of the tensors on the device, or of this process on the CPU, MiB.
+fn peak_mib(device: &Device) -> Result<f64> {
+    #[cfg(feature = "cuda")]
+    if let candle_core::DeviceLocation::Cuda { gpu_id } = device.location() {
+        return Ok(orator_nn::cuda::gpu::peak_memory(gpu_id)? as f64 / f64::from(1 << 20));
+    }
+    ensure!(device.is_cpu(), "the memory of this device is not measured");
+    Ok(own_peak_mib())
+}
+
 fn measure(args: &Args, folder: &Path, progress: &dyn Progress) -> Result<Report> {
+    let (device, _) = device::open(args.device, || None)?;
+    if let Some(n_steps) = args.beside_cpu {
+        return beside_cpu(args, &device, n_steps);
+    }
     let n_threads = rayon::current_num_threads();
     // Peak memory of training only, before the input of the reference is created.
-    FixedBatch::new(args)?.train(args.steps)?;
-    let peak = own_peak_mib();
-    let mut ours = FixedBatch::new(args)?;
-    let start =
-        |script| Reference::start(script, n_threads, &ours.contents(folder)?, &folder.join("given.safetensors"));
+    FixedBatch::new(args, &device)?.train(args.steps)?;
+    let peak = peak_mib(&device)?;
+    let mut ours = FixedBatch::new(args, &device)?;
+    let start = |script| {
+        let file = folder.join("given.safetensors");
+        let mut theirs = Reference::start(script, n_threads, &ours.contents(folder)?, &file)?;
+        theirs.ask(if device.is_cpu() { "device cpu" } else { "device cuda" })?;
+        anyhow::Ok(theirs)
+    };
     let mut theirs = args.python.as_deref().map(start).transpose()?;
     let differences = theirs.as_mut().map(|theirs| ours.differences(theirs)).transpose()?;
 
@@ -215,11 +267,12 @@ fn measure(args: &Args, folder: &Path, progress: &dyn Progress) -> Result<Report
 
     let secs = median(own.clone());
     let mut text = format!(
-        "{}: {} parameters, batch {}, {n_threads} threads, median of {} rounds of {} steps\n\
+        "{}: {} parameters, batch {}, {}, {n_threads} threads, median of {} rounds of {} steps\n\
          this program     {:9.1} ms a step, peak memory {peak:6.0} MiB",
         args.preset,
         ours.trainer.n_parameters(),
         args.batch,
+        args.device,
         args.rounds,
         args.steps,
         1e3 * secs
