@@ -3,7 +3,7 @@
 
 use super::cluster::{plan, submit, work};
 use super::dataset::{align, forget, import, transcribe, verify as dataset};
-use super::motion::{lift, sheet};
+use super::motion::lift;
 use super::moved::MovedVerb;
 use super::pipeline::{init, report, run, status};
 use super::setup::{completions, doctor, models, words};
@@ -54,7 +54,6 @@ pub(super) enum Verb {
     Words(words::Args),
     Doctor(doctor::Args),
     Lift(lift::Args),
-    Sheet(sheet::Args),
     Report(report::Args),
     Import(import::Args),
     Transcribe(transcribe::Args),
@@ -96,7 +95,6 @@ fn run(cli: Cli, ui: &Ui) -> Result<Outcome> {
         Verb::Words(args) => words::run(args, ui),
         Verb::Doctor(args) => doctor::run(args, ui),
         Verb::Lift(args) => lift::run(args, ui),
-        Verb::Sheet(args) => sheet::run(args, ui),
         Verb::Report(args) => report::run(args, ui),
         Verb::Dataset(args) => dataset::run(args, ui),
         Verb::Import(args) => import::run(args, ui),
