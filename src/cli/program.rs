@@ -4,7 +4,6 @@
 use super::cluster::{plan, submit, work};
 use super::dataset::{align, forget, import, transcribe, verify as dataset};
 use super::motion::lift;
-use super::moved::MovedVerb;
 use super::pipeline::{init, report, run, status};
 use super::setup::{completions, doctor, models, words};
 use super::signals;
@@ -68,8 +67,6 @@ pub(super) enum Verb {
     Guide(completions::GuideArgs),
     Completions(completions::Args),
     Man(completions::ManArgs),
-    #[command(hide = true)]
-    Demo(MovedVerb),
 }
 
 /// Parses the command line, runs the verb, reports an error, and returns the exit code.
@@ -109,7 +106,6 @@ fn run(cli: Cli, ui: &Ui) -> Result<Outcome> {
         Verb::Guide(args) => completions::run_guide(&args, ui),
         Verb::Completions(args) => completions::run(&args, Cli::command(), ui),
         Verb::Man(args) => completions::run_man(&args, Cli::command(), ui),
-        Verb::Demo(args) => args.fail("demo"),
     }
 }
 
@@ -123,19 +119,16 @@ pub fn run_program<C: CommandFactory + FromArgMatches>(
     let name = command.get_name().to_owned();
     let parsed = command.try_get_matches().and_then(|matches| {
         workdir::announce(verb_path(&name, &matches));
-        let verb = matches.subcommand_name().filter(|_| name == "orator").unwrap_or_default().to_owned();
-        Ok((C::from_arg_matches(&matches)?, verb))
+        C::from_arg_matches(&matches)
     });
-    let (cli, verb) = match parsed {
-        Ok(parsed) => parsed,
+    let cli = match parsed {
+        Ok(cli) => cli,
         Err(error) => {
             let _ = error.print();
             return if error.use_stderr() { ExitCode::from(1) } else { ExitCode::SUCCESS };
         }
     };
-    let arguments = std::env::args_os().skip(1).map(|argument| argument.to_string_lossy().into_owned());
-    renamed::flag_notes(&verb, arguments).iter().for_each(|note| ui::note(note));
-    let ui = Ui::new(json(&cli), verb);
+    let ui = Ui::new(json(&cli));
     match run(cli, &ui) {
         Ok(_) if ui.has_output_error() => ExitCode::from(1),
         Ok(Outcome::Done) => ExitCode::SUCCESS,
