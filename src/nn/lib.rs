@@ -5,6 +5,7 @@
 //! of the lifters are channels first; those of the GAN (`gan::generator`) are channels last, which avoids unfolding.
 
 pub mod cpu;
+pub mod device;
 pub mod gan;
 pub mod lifter;
 pub mod motion_encoder;
