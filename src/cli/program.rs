@@ -8,7 +8,7 @@ use super::pipeline::{init, report, run, status};
 use super::setup::{completions, doctor, models, words};
 use super::signals;
 use super::ui::Ui;
-use super::{animate, evaluate, generate, renamed, study, train, ui, verb_groups};
+use super::{animate, evaluate, generate, study, train, ui, verb_groups};
 use anyhow::Result;
 use clap::{ArgMatches, CommandFactory, FromArgMatches, Parser, Subcommand};
 use orator_base::stage::workdir;

@@ -123,9 +123,7 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
         enter_sandbox(report.as_deref(), dataset.iter().chain(checkpoint).map(PathBuf::as_path));
     }
     match args.mode {
-        Some(EvaluateMode::Lifter(args)) => args.fail("evaluate lifter"),
         Some(EvaluateMode::Compare(args)) => compare_results(&args, ui),
-        Some(EvaluateMode::People(args)) => args.fail("evaluate people"),
         None => motion(&args.motion, &device, ui),
     }
 }

@@ -13,7 +13,7 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 /// Steps between two lines of `metrics.jsonl`.
-const LOG_EVERY: usize = 10;
+pub const LOG_EVERY: usize = 10;
 
 /// Intervals of the loop, in steps unless stated otherwise.
 #[derive(Clone, Copy, Debug)]

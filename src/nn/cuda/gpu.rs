@@ -51,7 +51,8 @@ pub fn open(number: usize) -> Result<Device> {
 pub fn peak_memory(number: usize) -> Result<u64> {
     let (name, mut peak) = (sys::CUmemPool_attribute::CU_MEMPOOL_ATTR_USED_MEM_HIGH, 0u64);
     // SAFETY: the value of this attribute is a `u64`.
-    let read = pool(number).and_then(|pool| unsafe { result::mem_pool::get_attribute(pool, name, (&raw mut peak).cast()) });
+    let read =
+        pool(number).and_then(|pool| unsafe { result::mem_pool::get_attribute(pool, name, (&raw mut peak).cast()) });
     read.map_err(failed)?;
     Ok(peak)
 }

@@ -1,6 +1,8 @@
 //! Layers and networks against plain arithmetic and finite differences.
 
 mod adversarial;
+mod card;
+mod composed;
 mod conv2d;
 mod conv_norm;
 mod decoder;
