@@ -253,54 +253,6 @@ mod tests {
         segments
     }
 
-    fn read(format: TranscriptFormat, segments: &[SpokenSegment]) -> Vec<Word> {
-        let ending = format!("{format:?}").to_lowercase();
-        let text = format.write(segments, "en", 4000.0);
-        Transcript::parse(&text, &ending, ("a", "")).unwrap_or_else(|error| panic!("{error:#}\n{text}")).words
-    }
-
-    #[test]
-    fn words_and_times_are_read_back() {
-        let segments = spoken();
-        let words: Vec<Word> = segments.iter().flat_map(|segment| segment.words.clone()).collect();
-        assert_eq!(read(TranscriptFormat::Json, &segments), words);
-        for format in [TranscriptFormat::Vtt, TranscriptFormat::TextGrid] {
-            let found = read(format, &segments);
-            assert_eq!(found.len(), words.len(), "{format:?}");
-            for (found, expected) in found.iter().zip(&words) {
-                let is_near = |a: f64, b: f64| (a - b).abs() < 1e-9;
-                let is_same_time =
-                    is_near(found.start_secs, expected.start_secs) && is_near(found.end_secs, expected.end_secs);
-                assert!(found.word == expected.word && is_same_time, "{format:?}: {found:?} {expected:?}");
-            }
-        }
-        // SubRip has no escapes.
-        let found: Vec<String> = read(TranscriptFormat::Srt, &segments).into_iter().map(|word| word.word).collect();
-        let texts: Vec<&str> = words.iter().map(|word| word.word.as_str()).filter(|text| *text != "<3").collect();
-        assert_eq!(found, texts);
-    }
-
-    #[test]
-    fn aligned_and_estimated_words_keep_their_source() {
-        let source = |source, confidence| Word { source, confidence: Some(confidence), ..word("so", 1.0, 1.5) };
-        let words = vec![source(WordSource::Aligned, 0.5), source(WordSource::Interpolated, 0.0)];
-        assert_eq!(read(TranscriptFormat::Json, &[segment(words.clone())]), words);
-    }
-
-    #[test]
-    fn no_speech_is_a_valid_transcript() {
-        for format in [TranscriptFormat::Json, TranscriptFormat::Srt, TranscriptFormat::Vtt, TranscriptFormat::TextGrid]
-        {
-            assert!(read(format, &[]).is_empty(), "{format:?}");
-        }
-        let path = |name: &str| TranscriptFormat::from_path(Path::new(name)).ok();
-        assert_eq!(
-            (path("a.TextGrid"), path("a.words.json")),
-            (Some(TranscriptFormat::TextGrid), Some(TranscriptFormat::Json))
-        );
-        assert_eq!((path("a.txt"), path("json")), (None, None));
-    }
-
     #[test]
     fn cues_are_short_and_end_at_pauses() {
         let segments = spoken();
@@ -314,15 +266,5 @@ mod tests {
         // Five repetitions four seconds apart; a short cue stays for a second.
         let repeated: Vec<&WordCue> = cues.iter().filter(|cue| cue.texts() == ["Yes."]).collect();
         assert!(repeated.len() == 5 && repeated.iter().all(|cue| cue.end - cue.start == 1000));
-    }
-
-    #[test]
-    fn overlapping_words_and_words_without_length_are_written() {
-        let words = vec![word("a", 1.0, 2.0), word("b", 1.5, 1.75), word("c", 2.5, 2.5)];
-        for format in [TranscriptFormat::Json, TranscriptFormat::Srt, TranscriptFormat::Vtt, TranscriptFormat::TextGrid]
-        {
-            let found = read(format, &[segment(words.clone())]);
-            assert_eq!(found.iter().map(|word| word.word.as_str()).collect::<String>(), "abc", "{format:?}");
-        }
     }
 }

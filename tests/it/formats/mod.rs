@@ -1,9 +1,15 @@
 //! Readers and writers of file formats.
 
 mod authors_txt;
+mod bvh_read;
 mod bvh_write;
+mod exponential_maps;
 mod frames;
+mod joint_names;
 mod joints_description;
 mod keypoints_npz;
 mod motion_file;
+mod subtitles;
+mod transcript;
+mod transcript_write;
 mod wav;
