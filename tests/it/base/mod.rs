@@ -1,5 +1,6 @@
 //! Numbers, rotations, motion, sound features and texts of the base crate.
 
+mod body_view;
 mod gaussian;
 mod hand;
 mod loudness;
