@@ -7,6 +7,7 @@ mod conv2d;
 mod conv_norm;
 mod decoder;
 mod device;
+mod gru;
 mod networks;
 mod params;
 mod predict;
