@@ -10,6 +10,7 @@ pub(crate) mod interrupted;
 pub(crate) mod losses;
 pub(crate) mod networks;
 pub(crate) mod operators;
+mod optim;
 pub(crate) mod reading;
 pub(crate) mod run_train;
 pub(crate) mod seq2seq;

@@ -1,0 +1,3 @@
+//! Optimisers.
+
+mod adam;
