@@ -10,6 +10,7 @@ pub(crate) mod posture;
 pub(crate) mod several_persons;
 pub(crate) mod shard;
 pub(crate) mod shared_audio;
+mod split;
 pub(crate) mod splits;
 pub(crate) mod splits_by_time;
 pub(crate) mod transcribe;

@@ -1,0 +1,3 @@
+//! How videos are divided among the splits.
+
+mod blocks;
