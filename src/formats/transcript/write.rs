@@ -227,7 +227,6 @@ fn text_grid(words: &[&Word], secs: f64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::transcript::Transcript;
 
     fn word(word: &str, start_secs: f64, end_secs: f64) -> Word {
         Word { word: word.to_owned(), start_secs, end_secs, source: WordSource::Given, confidence: Some(0.875) }

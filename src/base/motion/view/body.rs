@@ -199,7 +199,6 @@ fn large(lengths: impl Iterator<Item = f32>) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::motion::upper_body::{L_WRIST, R_WRIST};
 
     #[test]
     fn points_between_two_frames_are_interpolated() {
