@@ -1,6 +1,7 @@
 //! An opened model whose file was checked against the manifest (present, correct hash, names and shapes). It owns its
 //! input buffer and measures the time spent inside ONNX Runtime.
 
+use super::convert::BATCH;
 use super::{ModelEntry, ModelRole, Port, Runtime};
 use anyhow::{Context, Result, anyhow};
 use orator_base::input;
@@ -153,7 +154,7 @@ pub(super) fn open_session(runtime: &Runtime, entry: &ModelEntry, dir: &Path) ->
     Ok(session)
 }
 
-/// Creates a session with one thread, no spinning, full optimisation and deterministic results.
+/// Creates a session for one picture per run with one thread, no spinning, full optimisation and deterministic results.
 fn session(runtime: &Runtime, bytes: &[u8]) -> Result<Session> {
     fn to_anyhow<T>(error: ort::Error<T>) -> anyhow::Error {
         anyhow!("{error}")
@@ -170,6 +171,8 @@ fn session(runtime: &Runtime, bytes: &[u8]) -> Result<Session> {
         .with_deterministic_compute(true)
         .map_err(to_anyhow)?
         .with_log_level(ort::logging::LogLevel::Error)
+        .map_err(to_anyhow)?
+        .with_dimension_override(BATCH, 1)
         .map_err(to_anyhow)?
         .commit_from_memory(bytes)
         .map_err(to_anyhow)

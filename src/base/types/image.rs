@@ -20,11 +20,11 @@ impl Image {
     pub fn cropped(&self, area: PixelArea) -> Self {
         let [x, y] = [area.x.min(self.width), area.y.min(self.height)];
         let [width, height] = [area.width.min(self.width - x), area.height.min(self.height - y)];
-        let rows = (y..y + height).flat_map(|row| {
-            let start = 3 * (row * self.width + x);
-            &self.data[start..start + 3 * width]
-        });
-        Self { width, height, data: rows.copied().collect() }
+        let mut data = Vec::with_capacity(3 * width * height);
+        for start in (y..y + height).map(|row| 3 * (row * self.width + x)) {
+            data.extend_from_slice(&self.data[start..start + 3 * width]);
+        }
+        Self { width, height, data }
     }
 
     /// Pads the picture with black to `size` (width, height), which must not be smaller; the picture is centred.

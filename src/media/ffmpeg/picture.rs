@@ -98,8 +98,9 @@ impl Scaler {
         let tone_mapped = self.tone_mapper.as_mut().map(|tone_mapper| tone_mapper.map(&self.rgb)).transpose()?;
         let rgb = tone_mapped.as_ref().unwrap_or(&self.rgb);
         // Rows of the frame are padded to a multiple of 32 bytes.
-        let rows = rgb.data(0).chunks(rgb.stride(0)).take(height);
-        Ok(Image { width, height, data: rows.flat_map(|row| &row[..3 * width]).copied().collect() })
+        let mut data = Vec::with_capacity(3 * width * height);
+        rgb.data(0).chunks(rgb.stride(0)).take(height).for_each(|row| data.extend_from_slice(&row[..3 * width]));
+        Ok(Image { width, height, data })
     }
 }
 

@@ -32,6 +32,11 @@ pub enum AttributeValue<'a> {
     Ints(&'a [i64]),
 }
 
+/// First size of an input or output that has one entry per image of a batch of any size.
+pub(crate) const ANY_BATCH: usize = 0;
+/// Name of that size in the file.
+pub(crate) const BATCH: &str = "batch";
+
 /// Builder with the operators and weights added so far.
 pub struct OnnxGraph {
     nodes: Vec<u8>,
@@ -139,6 +144,19 @@ impl OnnxGraph {
         self.op("Concat", &as_strs(values), &[("axis", AttributeValue::Int(axis))])
     }
 
+    /// Reshapes each entry of a batch; a size of -1 is the rest.
+    pub(crate) fn reshaped(&mut self, value: &str, entry: &[i64]) -> Result<String> {
+        // A size of 0 is that of the input.
+        let sizes = self.ints(&[&[0], entry].concat())?;
+        Ok(self.op("Reshape", &[value, &sizes], &[]))
+    }
+
+    /// Resizes height and width by integer factors.
+    pub(crate) fn scaled(&mut self, value: &str, by: [usize; 2], mode: &[(&str, AttributeValue)]) -> Result<String> {
+        let scales = self.floats(&[4], &[1.0, 1.0, by[0] as f32, by[1] as f32])?;
+        Ok(self.op("Resize", &[value, "", &scales], mode))
+    }
+
     /// Clips values to 0..6.
     pub fn relu6(&mut self, value: &str) -> Result<String> {
         let (low, high) = (self.floats(&[], &[0.0])?, self.floats(&[], &[6.0])?);
@@ -226,7 +244,11 @@ fn port(name: &str, dims: &[usize]) -> Vec<u8> {
     let (mut shape, mut tensor, mut kind, mut port) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
     for dim in dims {
         let mut size = Vec::new();
-        number(&mut size, 1, *dim as i64);
+        if *dim == ANY_BATCH {
+            bytes(&mut size, 2, BATCH.as_bytes());
+        } else {
+            number(&mut size, 1, *dim as i64);
+        }
         bytes(&mut shape, 1, &size);
     }
     number(&mut tensor, 1, ElementType::F32 as i64);

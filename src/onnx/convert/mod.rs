@@ -15,5 +15,6 @@ mod tfjs;
 mod tfjs_file;
 mod tflite;
 
+pub(crate) use graph::BATCH;
 pub use graph::{AttributeValue, OnnxGraph};
 pub use source::{ConversionOptions, SourceFormat, convert};

@@ -63,7 +63,7 @@ impl Stage for Pose2dStage {
     }
 
     fn version(&self) -> u32 {
-        10
+        11
     }
 
     fn cost(&self) -> u32 {
