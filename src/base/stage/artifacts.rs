@@ -163,7 +163,7 @@ pub fn splits(work: &Path, speaker: &str) -> PathBuf {
     work.join("splits").join(format!("{speaker}.json"))
 }
 
-/// Contact sheet with one face per video, written when a speaker's videos seem to show several persons.
+/// Picture of the faces in a speaker's videos, which earlier versions of the program wrote.
 pub fn faces(work: &Path, speaker: &str) -> PathBuf {
     work.join("faces").join(format!("{speaker}.png"))
 }

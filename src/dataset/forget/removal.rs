@@ -112,7 +112,6 @@ impl Removal {
                 .extend([record::record_path(&dir), record::failure_path(&dir)].into_iter().filter(|p| p.exists()));
         }
         removal.paths.extend(left_over);
-        // One picture shows the faces of all videos; the dataset stage draws it again.
         removal.paths.extend(Some(artifacts::faces(work, speaker)).filter(|picture| picture.exists()));
         let splits = artifacts::splits(work, speaker);
         removal.paths.extend(workdir::left_over(&splits));

@@ -1,8 +1,7 @@
 //! Stage 6: the dataset of a speaker. `stage` -> `division` (assignment of videos or blocks to splits) -> `run` (writes
-//! the videos in turn, read by `video`) -> `outcome`. `persons` compares the persons in the videos, `faces` draws them.
+//! the videos in turn, read by `video`) -> `outcome`. `persons` compares the persons in the videos.
 
 pub mod division;
-pub mod faces;
 pub mod outcome;
 pub mod persons;
 pub mod run;

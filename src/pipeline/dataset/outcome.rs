@@ -14,7 +14,7 @@ use orator_dataset::{INFO, LEAKAGE};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// Largest number of videos whose notes on words are listed.
 const MAX_NOTED: usize = 5;
@@ -25,8 +25,6 @@ const MAX_FILES: usize = 3;
 /// Persons that the videos of one speaker appear to show.
 #[derive(Debug, Serialize)]
 pub struct SeveralPersons {
-    /// Overview picture with one face per video.
-    pub picture: PathBuf,
     /// File names of the videos of each person.
     pub videos: Vec<Vec<String>>,
 }
@@ -41,11 +39,10 @@ impl SeveralPersons {
         };
         let persons: Vec<String> = self.videos.iter().take(MAX_PERSONS).map(file_list).collect();
         format!(
-            "the videos appear to show {} ({}): see {}. Leave out videos of another person with `exclude`; if all \
-             show one person, set `same_person = true` under [[speaker]]",
+            "the videos appear to show {} ({}): `orator report` shows their faces. Leave out videos of another person \
+             with `exclude`; if all show one person, set `same_person = true` under [[speaker]]",
             counted(self.videos.len(), "person"),
-            persons.join(" | "),
-            self.picture.display()
+            persons.join(" | ")
         )
     }
 }

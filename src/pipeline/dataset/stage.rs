@@ -2,7 +2,6 @@
 //! videos of an existing dataset are reused, so that adding a video costs only that video.
 
 use super::division::{self, Division};
-use super::faces;
 use super::outcome::{DatasetOutcome, SeveralPersons};
 use super::persons::{self, VideoPerson};
 use super::run::DatasetRun;
@@ -12,7 +11,7 @@ use orator_base::stage::artifacts::{self, Artifact, StageName, dir, speaker_dir}
 use orator_base::stage::ledger::{Ledger, longest_first};
 use orator_base::stage::progress::Progress;
 use orator_base::stage::record::Failure;
-use orator_base::stage::{Input, Report, Stage, Unit, workdir};
+use orator_base::stage::{Input, Report, Stage, Unit};
 use orator_base::text::{counted, length};
 use orator_base::types::time::FrameRate;
 use orator_dataset::config::videos::Videos;
@@ -120,21 +119,15 @@ impl DatasetStage {
         failed.into_iter().map(|unit| failure(&self.work, unit)).collect()
     }
 
-    /// Persons in the speaker's videos, with an overview picture beside the stage folders; `None` if there is one.
-    fn several_persons(&self, speaker: &Unit) -> Result<Option<SeveralPersons>> {
+    /// Persons in the speaker's videos; `None` if there is one.
+    fn several_persons(&self, speaker: &Unit) -> Option<SeveralPersons> {
         let is_known =
             self.speakers.iter().any(|configured| configured.name == speaker.speaker && configured.same_person);
         let videos: Vec<&Unit> = if is_known { Vec::new() } else { self.ready(speaker) };
         let persons: Vec<VideoPerson> = videos.into_iter().map(|video| VideoPerson::read(&self.work, video)).collect();
         let groups = persons::groups(&persons);
-        let picture = artifacts::faces(&self.work, &speaker.speaker);
-        if groups.len() < 2 {
-            workdir::remove(&picture)?;
-            return Ok(None);
-        }
-        faces::write(&picture, &self.work, &groups)?;
         let files = |group: &Vec<&VideoPerson>| group.iter().map(|video| video.file.clone()).collect();
-        Ok(Some(SeveralPersons { picture, videos: groups.iter().map(files).collect() }))
+        (groups.len() > 1).then(|| SeveralPersons { videos: groups.iter().map(files).collect() })
     }
 
     /// Division of the speaker's videos: as recorded, else as configured.
@@ -331,7 +324,7 @@ impl Stage for DatasetStage {
         }
         let n_reused = run.n_reused;
         let (_, stats) = writer.finish()?;
-        let several_persons = self.several_persons(unit)?;
+        let several_persons = self.several_persons(unit);
         let outcome = DatasetOutcome {
             several_persons,
             settings: &self.settings,

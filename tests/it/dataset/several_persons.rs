@@ -1,4 +1,4 @@
-//! Several persons in the videos of one speaker give a warning with a picture, unless `same_person` is set.
+//! Several persons in the videos of one speaker give a warning, unless `same_person` is set.
 
 use crate::fixtures::media::lifted_videos::{settings, shard_as, video};
 use orator_base::stage::Unit;
@@ -28,11 +28,11 @@ fn a_second_person_gives_a_warning_unless_same_person_is_set() {
     let mut settings = settings(root);
     let work = settings.work.dir.clone();
     let splits = [(&units[0], Split::Train), (&units[1], Split::Validation), (&units[2], Split::Test)];
-    let picture = artifacts::faces(&work, &units[0].speaker);
     let facts = |settings: &orator_dataset::config::Settings, name: &str| {
         let report = shard_as(settings, &units, &splits, name).0.unwrap();
-        assert_eq!(report.line.contains("appear to show 2 persons"), picture.is_file(), "{}", report.line);
-        report.facts["several_persons"].clone()
+        let several = report.facts["several_persons"].clone();
+        assert_eq!(report.line.contains("appear to show 2 persons"), !several.is_null(), "{}", report.line);
+        several
     };
     std::fs::create_dir_all(artifacts::dir(&work, Artifact::Portrait.stage(), &units[0])).unwrap();
     assert!(facts(&settings, "nothing is known").is_null());
@@ -43,9 +43,6 @@ fn a_second_person_gives_a_warning_unless_same_person_is_set() {
     write_portrait(&work, &units[2], 2.0);
     let warning = facts(&settings, "two people");
     assert_eq!(warning["videos"][1], json!(["other.mp4"]), "{warning}");
-    let sheet = png::read(&picture).unwrap();
-    assert_eq!((sheet.width, sheet.height), (8 * 144, 2 * 186));
-    assert_eq!(sheet.pixel(8, 8), [200, 150, 120]);
     let speaker = SpeakerConfig { name: units[0].speaker.clone(), same_person: true, ..SpeakerConfig::default() };
     settings.speaker = vec![speaker];
     assert!(facts(&settings, "said to be one").is_null());
