@@ -194,7 +194,7 @@ fn input_indices(batch: usize, down: ConvAxis, across: ConvAxis) -> Vec<u32> {
 mod tests {
     use super::*;
     use crate::ops::gradcheck::{pattern, worst};
-    use candle_core::DType;
+    use candle_core::{DType, Device};
     use orator_base::math::rotation::Rotation;
     use orator_base::math::vec3;
 
