@@ -3,7 +3,6 @@
 mod authors_txt;
 mod bvh_read;
 mod bvh_write;
-mod exponential_maps;
 mod frames;
 mod joint_names;
 mod joints_description;
