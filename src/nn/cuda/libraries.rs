@@ -1,5 +1,5 @@
-//! The shared libraries of CUDA: found beside the program, in `ORATOR_CUDA`, in Python packages or by the system's search,
-//! and loaded once, before the first GPU is opened.
+//! The shared libraries of CUDA: found in `ORATOR_CUDA`, beside the program, in Python packages or by the system's
+//! search, and loaded once, before the first GPU is opened.
 
 use super::functions::{CudaLibrary, LIBRARIES};
 use anyhow::{Result, ensure};
@@ -30,9 +30,10 @@ pub fn status() -> &'static [LibraryStatus] {
 /// # Errors
 /// A library is missing or too old.
 pub fn load() -> Result<()> {
-    let problems: Vec<&str> = status().iter().filter_map(|(_, found)| found.as_ref().err()).map(String::as_str).collect();
-    // Without a driver the other libraries are of no use.
-    ensure!(problems.is_empty(), "{}", if status()[0].1.is_err() { problems[0].to_owned() } else { problems.join("; ") });
+    let problems = status().iter().filter_map(|(_, found)| found.as_ref().err());
+    // Without a driver, the first, the other libraries are of no use.
+    let problems: Vec<&str> = problems.map(String::as_str).take(if status()[0].1.is_err() { 1 } else { 9 }).collect();
+    ensure!(problems.is_empty(), "{}", problems.join("; "));
     Ok(())
 }
 
@@ -50,7 +51,7 @@ fn load_library(library: &CudaLibrary, folders: &[PathBuf]) -> Result<PathBuf, S
     let path = loaded_path(&named);
     for (name, address) in library.functions {
         // SAFETY: only the address is used.
-        let function = unsafe { loaded.get::<unsafe extern "C" fn()>(name) };
+        let function = unsafe { loaded.get::<unsafe extern "C" fn()>(*name) };
         let function = function.map_err(|_| {
             let needed = if is_driver { "the driver must be release 580 or newer" } else { "CUDA 13 is needed" };
             format!("{} has no function {name}: {needed}", path.display())
@@ -68,7 +69,8 @@ fn loaded_path(named: &Path) -> PathBuf {
     let stem = named.to_string_lossy().trim_end_matches(|c: char| c == '.' || c.is_ascii_digit()).to_owned();
     let mut paths = maps.lines().filter_map(|line| line.find('/').map(|start| Path::new(&line[start..])));
     let is_same = |path: &&Path| {
-        named.is_relative() && path.file_name().is_some_and(|name| name.to_string_lossy().starts_with(&format!("{stem}.")))
+        named.is_relative()
+            && path.file_name().is_some_and(|name| name.to_string_lossy().starts_with(&format!("{stem}.")))
     };
     paths.find(is_same).unwrap_or(named).to_owned()
 }
@@ -76,20 +78,22 @@ fn loaded_path(named: &Path) -> PathBuf {
 /// Folders in which libraries are searched for before the system's, in this order.
 fn folders() -> Vec<PathBuf> {
     let program = std::env::current_exe().and_then(std::fs::canonicalize).unwrap_or_default();
-    let chosen = std::env::var_os(VARIABLE).map(PathBuf::from).into_iter();
-    let chosen = chosen.flat_map(|folder| [vec![folder.join("lib"), folder.clone()], package_folders(&folder)].concat());
+    let chosen = std::env::var_os(VARIABLE).and_then(|folder| std::path::absolute(folder).ok()).into_iter();
+    let chosen =
+        chosen.flat_map(|folder| [vec![folder.join("lib"), folder.clone()], package_folders(&folder)].concat());
     let beside = program.ancestors().skip(1).flat_map(|folder| ["lib/orator", "lib"].map(|lib| folder.join(lib)));
     let prefixes = ["VIRTUAL_ENV", "CONDA_PREFIX"].into_iter().filter_map(std::env::var_os).map(PathBuf::from);
     let path = std::env::var_os("PATH").unwrap_or_default();
-    let pythons = std::env::split_paths(&path).filter(|folder| folder.is_absolute()).map(|folder| folder.join("python3"));
+    let pythons =
+        std::env::split_paths(&path).filter(|folder| folder.is_absolute()).map(|folder| folder.join("python3"));
     let pythons = pythons.filter_map(|python| Some([python.clone(), python.canonicalize().ok()?]));
     let pythons = pythons.flatten().filter_map(|python| Some(python.parent()?.parent()?.to_owned()));
     let of_program = program.ancestors().skip(1).map(Path::to_owned);
     let mut folders: Vec<PathBuf> = chosen.chain(beside).collect();
     for prefix in of_program.chain(prefixes).chain(pythons) {
-        let libs = entries(&prefix.join("lib")).into_iter().filter(|lib| {
-            lib.file_name().is_some_and(|name| name.to_string_lossy().starts_with("python3"))
-        });
+        let libs = entries(&prefix.join("lib"))
+            .into_iter()
+            .filter(|lib| lib.file_name().is_some_and(|name| name.to_string_lossy().starts_with("python3")));
         let packages = libs.flat_map(|lib| ["site-packages", "dist-packages"].map(|name| lib.join(name)));
         folders.extend(packages.flat_map(|packages| package_folders(&packages)));
     }
