@@ -21,7 +21,7 @@
 //! | `orator-dataset` | `pipeline.toml`, and the dataset on disk: write, read, verify, import, forget |
 //! | `orator-pipeline` | the six stages, their order, and their processes |
 //! | `orator-gesture` | training, generation, metrics, evaluation |
-//! | `orator-report` | HTML pages and contact sheets |
+//! | `orator-report` | HTML pages |
 //! | `orator-study` | user studies: films, server, statistics |
 //! | `orator-cluster` | several machines that share one work folder |
 //! | `orator` | this library and the program |

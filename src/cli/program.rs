@@ -3,13 +3,12 @@
 
 use super::cluster::{plan, submit, work};
 use super::dataset::{align, forget, import, transcribe, verify as dataset};
-use super::motion::{lift, sheet};
-use super::moved::MovedVerb;
+use super::motion::lift;
 use super::pipeline::{init, report, run, status};
 use super::setup::{completions, doctor, models, words};
 use super::signals;
 use super::ui::Ui;
-use super::{animate, evaluate, generate, renamed, study, train, ui, verb_groups};
+use super::{animate, evaluate, generate, study, train, ui, verb_groups};
 use anyhow::Result;
 use clap::{ArgMatches, CommandFactory, FromArgMatches, Parser, Subcommand};
 use orator_base::stage::workdir;
@@ -54,7 +53,6 @@ pub(super) enum Verb {
     Words(words::Args),
     Doctor(doctor::Args),
     Lift(lift::Args),
-    Sheet(sheet::Args),
     Report(report::Args),
     Import(import::Args),
     Transcribe(transcribe::Args),
@@ -69,8 +67,6 @@ pub(super) enum Verb {
     Guide(completions::GuideArgs),
     Completions(completions::Args),
     Man(completions::ManArgs),
-    #[command(hide = true)]
-    Demo(MovedVerb),
 }
 
 /// Parses the command line, runs the verb, reports an error, and returns the exit code.
@@ -96,7 +92,6 @@ fn run(cli: Cli, ui: &Ui) -> Result<Outcome> {
         Verb::Words(args) => words::run(args, ui),
         Verb::Doctor(args) => doctor::run(args, ui),
         Verb::Lift(args) => lift::run(args, ui),
-        Verb::Sheet(args) => sheet::run(args, ui),
         Verb::Report(args) => report::run(args, ui),
         Verb::Dataset(args) => dataset::run(args, ui),
         Verb::Import(args) => import::run(args, ui),
@@ -111,7 +106,6 @@ fn run(cli: Cli, ui: &Ui) -> Result<Outcome> {
         Verb::Guide(args) => completions::run_guide(&args, ui),
         Verb::Completions(args) => completions::run(&args, Cli::command(), ui),
         Verb::Man(args) => completions::run_man(&args, Cli::command(), ui),
-        Verb::Demo(args) => args.fail("demo"),
     }
 }
 
@@ -125,19 +119,16 @@ pub fn run_program<C: CommandFactory + FromArgMatches>(
     let name = command.get_name().to_owned();
     let parsed = command.try_get_matches().and_then(|matches| {
         workdir::announce(verb_path(&name, &matches));
-        let verb = matches.subcommand_name().filter(|_| name == "orator").unwrap_or_default().to_owned();
-        Ok((C::from_arg_matches(&matches)?, verb))
+        C::from_arg_matches(&matches)
     });
-    let (cli, verb) = match parsed {
-        Ok(parsed) => parsed,
+    let cli = match parsed {
+        Ok(cli) => cli,
         Err(error) => {
             let _ = error.print();
             return if error.use_stderr() { ExitCode::from(1) } else { ExitCode::SUCCESS };
         }
     };
-    let arguments = std::env::args_os().skip(1).map(|argument| argument.to_string_lossy().into_owned());
-    renamed::flag_notes(&verb, arguments).iter().for_each(|note| ui::note(note));
-    let ui = Ui::new(json(&cli), verb);
+    let ui = Ui::new(json(&cli));
     match run(cli, &ui) {
         Ok(_) if ui.has_output_error() => ExitCode::from(1),
         Ok(Outcome::Done) => ExitCode::SUCCESS,

@@ -1,6 +1,5 @@
 //! Output of a verb: progress bars on standard error, a final summary (or one JSON object) on standard output.
 
-use super::renamed::with_old_keys;
 use super::signals::StopRequest;
 use indicatif::{MultiProgress, ProgressBar, ProgressState, ProgressStyle};
 use orator_base::stage::progress::{PARTS, Progress, Task};
@@ -15,29 +14,22 @@ use std::time::{Duration, Instant};
 /// The terminal, if any. Failing to write output never stops the work.
 pub struct Ui {
     json: bool,
-    verb: String,
     bars: MultiProgress,
     has_output_error: AtomicBool,
     stop: StopRequest,
 }
 
 impl Ui {
-    /// With `json` the summary is one JSON object, which also contains the old names of renamed keys of `verb`. Bars go
-    /// to standard error and are hidden if that is not a terminal.
-    pub fn new(json: bool, verb: String) -> Self {
-        Self {
-            json,
-            verb,
-            bars: MultiProgress::new(),
-            has_output_error: AtomicBool::new(false),
-            stop: StopRequest::default(),
-        }
+    /// With `json` the summary is one JSON object. Bars go to standard error and are hidden if that is not a terminal.
+    pub fn new(json: bool) -> Self {
+        let (bars, has_output_error) = (MultiProgress::new(), AtomicBool::new(false));
+        Self { json, bars, has_output_error, stop: StopRequest::default() }
     }
 
     /// Prints the result of a verb: the summary and the next command to type, or `facts` with `--json`.
     pub fn summary(&self, text: &str, next: Option<&str>, facts: serde_json::Value) {
         if self.json {
-            return self.print(&with_old_keys(&self.verb, facts).to_string());
+            return self.print(&facts.to_string());
         }
         let next = next.map(|next| format!("\nnext: {next}")).unwrap_or_default();
         self.print(&format!("{}{next}", text.trim_end()));

@@ -13,7 +13,6 @@ const GROUPS: [(&str, &[&str]); 5] = [
             "run",
             "status",
             "report",
-            "sheet",
             StageName::Lift.as_str(),
             "import",
             "transcribe",

@@ -4,6 +4,7 @@
 //! lists them and rejects the others); convolution, batch norm and recurrent layers are implemented here. The layers
 //! of the lifters are channels first; those of the GAN (`gan::generator`) are channels last, which avoids unfolding.
 
+pub mod card;
 pub mod cpu;
 #[cfg(feature = "cuda")]
 pub mod cuda;

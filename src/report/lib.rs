@@ -1,10 +1,8 @@
-//! HTML reports and pictures: pages on a speaker's `videos`, on a `training` and on an `evaluation`, written with
-//! `html`, and contact sheets (`sheet`).
+//! HTML reports: pages on a speaker's `videos`, on a `training` and on an `evaluation`, written with `html`.
 
 pub mod evaluation;
 pub mod html;
 pub mod preview;
-pub mod sheet;
 pub mod training;
 pub mod videos;
 

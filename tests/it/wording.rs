@@ -131,10 +131,9 @@ const PHRASES: [(&str, &str); 40] = [
     ("who speaks among", "the speaking person of"),
 ];
 
-/// Files with texts that data files and hashes of metrics contain already, and with former names.
-const STORED: [&str; 7] = [
+/// Files with texts that data files and hashes of metrics contain already.
+const STORED: [&str; 6] = [
     "src/base/stage/rejection.rs",
-    "src/cli/renamed.rs",
     "src/dataset/card.rs",
     "src/gesture/metrics/",
     "src/pipeline/speech/speech_rule.rs",

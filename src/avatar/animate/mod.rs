@@ -1,4 +1,4 @@
-//! Animation of joint positions: rigs, rotations, avatars, exported files (BVH, GLB, FBX, MP4, contact sheets).
+//! Animation of joint positions: rigs, rotations, avatars, exported files (BVH, GLB, FBX, MP4).
 
 pub mod avatar;
 pub mod draw;

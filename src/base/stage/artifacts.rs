@@ -44,7 +44,7 @@ impl StageName {
         }
     }
 
-    /// Name of the stage in earlier versions of the program, if it was different.
+    /// Name of the stage in records of earlier versions of the program, if it was different.
     pub const fn former(self) -> Option<&'static str> {
         match self {
             Self::Dataset => Some("shard"),
@@ -62,9 +62,8 @@ impl fmt::Display for StageName {
 impl FromStr for StageName {
     type Err = anyhow::Error;
 
-    /// Parses a current or a former name.
     fn from_str(name: &str) -> anyhow::Result<Self> {
-        match Self::ALL.into_iter().find(|stage| stage.as_str() == name || stage.former() == Some(name)) {
+        match Self::ALL.into_iter().find(|stage| stage.as_str() == name) {
             Some(stage) => Ok(stage),
             None => bail!("unknown stage `{name}`: expected one of {}", Self::ALL.map(Self::as_str).join(", ")),
         }
@@ -179,11 +178,10 @@ mod tests {
     use super::*;
 
     #[test]
-    fn stages_parse_by_current_and_by_former_name() {
+    fn stages_parse_by_name() {
         for stage in StageName::ALL {
             assert_eq!(stage.as_str().parse::<StageName>().unwrap(), stage);
         }
-        assert_eq!("shard".parse::<StageName>().unwrap(), StageName::Dataset);
         assert!("lit".parse::<StageName>().unwrap_err().to_string().contains("segment, lift, transcribe, dataset"));
     }
 }

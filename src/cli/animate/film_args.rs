@@ -4,9 +4,6 @@ use orator_avatar::animate::export::film_avatar::FilmCamera;
 
 #[derive(clap::Args)]
 pub(super) struct FilmArgs {
-    /// Removed: only its former default is accepted.
-    #[arg(long = "style", hide = true, value_parser = former_style)]
-    _style: Option<String>,
     /// Camera of an .mp4 output; `source` uses the camera fitted to the video of --compare and draws the avatar over
     /// its frames.
     #[arg(long, value_enum, default_value = "front")]
@@ -37,11 +34,4 @@ impl FilmArgs {
     pub(super) fn is_given(&self) -> bool {
         self.camera != CameraName::Front
     }
-}
-
-fn former_style(style: &str) -> Result<String, String> {
-    if style == "avatar" {
-        return Ok(style.to_owned());
-    }
-    Err("--style was removed: videos show the avatar, and `orator sheet` draws the joints".to_owned())
 }

@@ -89,10 +89,10 @@ pub struct Args {
     audio: Option<PathBuf>,
     /// Second panel of an .mp4 output: the source video, whose audio is used if there is no other, or another motion
     /// (.npy, .txt, .npz, .bvh), which is converted in the same way.
-    #[arg(long, alias = "beside", value_name = "FILE", conflicts_with = "format")]
+    #[arg(long, value_name = "FILE", conflicts_with = "format")]
     compare: Option<PathBuf>,
     /// Time in the video of --compare at which the motion begins, seconds.
-    #[arg(long, value_name = "SECS", default_value_t = 0.0, requires = "compare", alias = "beside-from")]
+    #[arg(long, value_name = "SECS", default_value_t = 0.0, requires = "compare")]
     compare_start: f64,
     /// Labels of the two motions with --compare, such as `prediction truth`; default to the file names.
     #[arg(long, value_names = ["FIRST", "SECOND"], num_args = 2, requires = "compare")]
@@ -104,7 +104,7 @@ pub struct Args {
     units: Option<LengthUnit>,
     /// Frame rate of a .npy or .txt input that does not state one; defaults to 15. It is an error if the file states
     /// another rate.
-    #[arg(long, value_name = "RATE", alias = "in-fps")]
+    #[arg(long, value_name = "RATE")]
     input_fps: Option<FrameRate>,
     #[command(flatten)]
     body: BodyArgs,

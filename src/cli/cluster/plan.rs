@@ -39,10 +39,10 @@ pub(crate) struct Args {
     #[arg(long, value_name = "HOURS")]
     hours: Option<f64>,
     /// Length of the parts into which a long video is split for workers, minutes.
-    #[arg(long, alias = "piece", value_name = "MINUTES", default_value_t = PART_SECS / 60.0)]
+    #[arg(long, value_name = "MINUTES", default_value_t = PART_SECS / 60.0)]
     max_part: f64,
     /// Do not time the stages, and print no estimates.
-    #[arg(long, alias = "untimed", conflicts_with_all = ["workers", "hours"])]
+    #[arg(long, conflicts_with_all = ["workers", "hours"])]
     no_timing: bool,
 }
 

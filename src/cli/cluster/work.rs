@@ -38,11 +38,11 @@ pub(crate) struct Args {
     #[arg(long)]
     no_wait: bool,
     /// Interval between heartbeats, seconds.
-    #[arg(long, alias = "beat", value_name = "SECONDS", default_value_t = 15.0)]
+    #[arg(long, value_name = "SECONDS", default_value_t = 15.0)]
     heartbeat: f64,
     /// Time without a heartbeat after which another worker counts as dead, seconds; must exceed the cache time of the
     /// network file system.
-    #[arg(long, alias = "dead-after", value_name = "SECONDS", default_value_t = DEAD_AFTER.as_secs_f64())]
+    #[arg(long, value_name = "SECONDS", default_value_t = DEAD_AFTER.as_secs_f64())]
     claim_timeout: f64,
 }
 

@@ -52,14 +52,14 @@ pub struct Args {
     #[arg(long, default_value_t = 64, value_name = "N")]
     min_frames: usize,
     /// Maximum difference in duration between audio and motion, seconds.
-    #[arg(long, alias = "max-apart", default_value_t = 0.5, value_name = "SECS")]
+    #[arg(long, default_value_t = 0.5, value_name = "SECS")]
     max_length_difference: f64,
     /// Unit of length of BVH files; detected from the length of the arms by default.
     #[arg(long, value_name = "m|cm|mm|inch")]
     units: Option<LengthUnit>,
     /// Import captures without audio: audio files are ignored and silence is stored instead. Such a dataset is for
     /// lifters and evaluation.
-    #[arg(long, alias = "no-sound", conflicts_with = "max_length_difference")]
+    #[arg(long, conflicts_with = "max_length_difference")]
     no_audio: bool,
     /// Fraction of the takes for validation, 0 to 0.9; takes are assigned by a hash of their content.
     #[arg(long, default_value_t = 0.15, value_name = "FRACTION")]

@@ -3,7 +3,6 @@
 use super::speakers;
 use crate::cli::Outcome;
 use crate::cli::config_args::{ConfigArgs, DeviceArgs, split};
-use crate::cli::moved::MovedVerb;
 use crate::cli::sandbox::enter_sandbox;
 use crate::cli::train::stopped::same_command;
 use crate::cli::ui::Ui;
@@ -51,10 +50,6 @@ pub struct Args {
 #[derive(clap::Subcommand)]
 enum EvaluateMode {
     Compare(CompareArgs),
-    #[command(hide = true)]
-    Lifter(MovedVerb),
-    #[command(hide = true)]
-    People(MovedVerb),
 }
 
 #[derive(clap::Args)]
@@ -70,7 +65,7 @@ struct MotionArgs {
     #[arg(long, value_name = "PATH", requires = "truth")]
     audio: Option<PathBuf>,
     /// Frame rate of files that do not state one (.npy, .txt), such as 15 or 30000/1001; defaults to 15.
-    #[arg(long, alias = "fps", value_name = "RATE", requires = "truth")]
+    #[arg(long, value_name = "RATE", requires = "truth")]
     input_fps: Option<FrameRate>,
     /// Dataset folder of `orator run` or `orator import`, instead of files.
     #[arg(long, value_name = "DIR", conflicts_with = "truth", requires = "checkpoint")]
@@ -128,9 +123,7 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
         enter_sandbox(report.as_deref(), dataset.iter().chain(checkpoint).map(PathBuf::as_path));
     }
     match args.mode {
-        Some(EvaluateMode::Lifter(args)) => args.fail("evaluate lifter"),
         Some(EvaluateMode::Compare(args)) => compare_results(&args, ui),
-        Some(EvaluateMode::People(args)) => args.fail("evaluate people"),
         None => motion(&args.motion, &device, ui),
     }
 }

@@ -82,7 +82,7 @@ pub struct Args {
     #[arg(long, value_name = "EXTENSION", value_delimiter = ',', default_value = "bvh", conflicts_with = "audio")]
     format: Vec<String>,
     /// Regenerate outputs of --audio-folder and --batch that are up to date.
-    #[arg(long, alias = "again", conflicts_with = "audio")]
+    #[arg(long, conflicts_with = "audio")]
     force: bool,
     #[command(flatten)]
     device: DeviceArgs,

@@ -45,7 +45,7 @@ pub struct Args {
     keypoints: PathBuf,
     /// Frame rate of the keypoints, frames per second; defaults to that of the file. Required for formats of other
     /// programs that do not state one; the .npz of this program is then read at 15.
-    #[arg(long, alias = "fps", value_name = "RATE")]
+    #[arg(long, value_name = "RATE")]
     input_fps: Option<FrameRate>,
     /// Width and height of the image, pixels, such as 1280x720; coordinates from 0 to 1 are multiplied by it.
     #[arg(long, value_name = "WIDTHxHEIGHT", value_parser = size)]

@@ -9,7 +9,7 @@ use crate::cli::signals;
 use crate::cli::train::stopped::{report_stopped, stop_on_signal};
 use crate::cli::ui::Ui;
 use anyhow::Result;
-use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
+use clap::builder::{PossibleValuesParser, TypedValueParser};
 use orator_base::stage::artifacts::StageName;
 use orator_base::stage::progress::{Event, Progress};
 use orator_base::text::{counted, first_three};
@@ -57,10 +57,9 @@ pub struct Args {
     train: bool,
 }
 
-/// Parser for the name of a stage; former names are aliases.
+/// Parser for the name of a stage.
 fn stage_parser() -> impl TypedValueParser<Value = StageName> {
-    let name = |stage: StageName| PossibleValue::new(stage.as_str()).aliases(stage.former());
-    PossibleValuesParser::new(StageName::ALL.map(name)).try_map(|name| name.parse::<StageName>())
+    PossibleValuesParser::new(StageName::ALL.map(StageName::as_str)).try_map(|name| name.parse::<StageName>())
 }
 
 pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {

@@ -45,18 +45,15 @@ pub struct Args {
     /// precedence.
     #[arg(long, value_name = "POINTS", default_value_t = 10.0)]
     bound: f64,
-    /// Number of sign flips and of bootstrap draws of participants; defaults to the registered number, else to 10000.
+    /// Number of bootstrap draws of participants; defaults to the registered number, else to 10000.
     #[arg(long, value_name = "N")]
     draws: Option<usize>,
     /// Random seed of the draws; defaults to the registered one, else to 1.
     #[arg(long, value_name = "N")]
     seed: Option<u64>,
-    /// Also write an HTML page with plots, all statistics and the methods paragraph.
+    /// Also write an HTML page with plots and all statistics.
     #[arg(long, value_name = "PAGE.html")]
     report: Option<PathBuf>,
-    /// Also write the methods paragraph as text.
-    #[arg(long, value_name = "FILE.txt")]
-    methods: Option<PathBuf>,
 }
 
 pub fn columns(text: &str) -> Result<ColumnNames, String> {
@@ -74,8 +71,7 @@ pub fn run(args: &Args, ui: &Ui) -> Result<Outcome> {
         ensure!((100..=1_000_000).contains(&draws), "--draws {draws}: expected 100 to 1000000");
     }
     check_report(args)?;
-    let outputs = args.report.iter().chain(&args.methods).map(PathBuf::as_path);
-    enter_sandbox(outputs, args.source.is_dir().then_some(args.source.as_path()));
+    enter_sandbox(args.report.as_deref(), args.source.is_dir().then_some(args.source.as_path()));
     let analysis = analysis(args)?;
     let mut shown = text::text(&analysis);
     if let Some(path) = &args.report {
@@ -83,26 +79,19 @@ pub fn run(args: &Args, ui: &Ui) -> Result<Outcome> {
         workdir::write_file(path, html.as_bytes())?;
         let _ = writeln!(shown, "\nwrote {}", path.display());
     }
-    if let Some(path) = &args.methods {
-        workdir::write_file(path, format!("{}\n", analysis.methods).as_bytes())?;
-        let _ = writeln!(shown, "\nwrote {}", path.display());
-    }
-    let next = args.report.is_none().then(|| {
-        format!("orator study analyse {} --report analysis.html --methods methods.txt", args.source.display())
-    });
-    let facts = json!({ "analysis": analysis, "report": args.report, "methods": args.methods });
+    let next = format!("orator study analyse {} --report analysis.html", args.source.display());
+    let next = args.report.is_none().then_some(next);
+    let facts = json!({ "analysis": analysis, "report": args.report });
     ui.summary(&shown, next.as_deref(), facts);
     Ok(if analysis.rejected.is_empty() { Outcome::Done } else { Outcome::SomeFailed })
 }
 
-/// Checks that the page and the paragraph do not overwrite an input.
+/// Checks that the page does not overwrite an input.
 fn check_report(args: &Args) -> Result<()> {
-    for (path, ending) in [(&args.report, "html"), (&args.methods, "txt")] {
-        let Some(path) = path else { continue };
-        let fits = path.extension().is_some_and(|found| found.eq_ignore_ascii_case(ending));
-        ensure!(fits, "{}: expected a file that ends in .{ending}", path.display());
-        ensure!(!path.is_dir(), "{} is a folder, expected a file", path.display());
-    }
+    let Some(path) = &args.report else { return Ok(()) };
+    let fits = path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("html"));
+    ensure!(fits, "{}: expected a file that ends in .html", path.display());
+    ensure!(!path.is_dir(), "{} is a folder, expected a file", path.display());
     Ok(())
 }
 

@@ -81,7 +81,7 @@ pub fn read(text: &str, sets: &[String], folders: &Folders) -> Given {
     match DeTable::parse(text) {
         Ok(mut document) => {
             let location_at = |span| SourceLocation::Line(line_of(text, span));
-            reader.notes.extend(former::rename(document.get_mut(), &location_at));
+            reader.notes.extend(former::rename_recipe(document.get_mut(), &location_at));
             reader.merge(document.get_ref(), &mut table, "", &location_at);
         }
         Err(error) => {
@@ -156,8 +156,8 @@ impl Reader {
             let plain = key.replacen(&format!(".{ADVANCED}."), ".", 1);
             let Some(default) = table.get_mut(name.get_ref().as_ref()) else {
                 let advanced = is_section.then(|| ADVANCED.to_owned());
-                let near = match former::REPLACED.iter().find(|(replaced, _)| plain == *replaced) {
-                    Some((_, by)) => format!(": {by}"),
+                let near = match former::renamed(&plain) {
+                    Some(by) => format!(": {by}"),
                     None => did_you_mean(name.get_ref(), table.keys().chain(&advanced)),
                 };
                 self.problem(&key, location, format!("unknown key{near}"));
@@ -276,7 +276,7 @@ impl Reader {
         let parsed = DeTable::parse(&as_toml).or_else(|_| DeTable::parse(&as_string));
         match parsed {
             Ok(mut document) if is_key => {
-                self.notes.extend(former::rename(document.get_mut(), &|_| SourceLocation::CommandLine));
+                self.notes.extend(former::rename_recipe(document.get_mut(), &|_| SourceLocation::CommandLine));
                 self.merge(document.get_ref(), table, "", &|_| SourceLocation::CommandLine);
             }
             _ => self.problem(

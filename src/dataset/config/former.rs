@@ -1,17 +1,14 @@
-//! Former names of configuration keys. `pipeline.toml` and `--set` accept them with a note that names the current key;
-//! records and checkpoints keep storing them, so that those of version 0.1 remain up to date.
+//! Former names of configuration keys. Records and checkpoints keep storing them, so that those of version 0.1 remain up
+//! to date; in `pipeline.toml` and `--set` they are errors that name the current key, except a value of version 0.2.
 
 use super::file::{ADVANCED, SourceLocation};
 use serde::Serialize;
 use serde_json::Value;
-use std::ops::Range;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-/// Former names of keys and sections, with their current names.
-pub(super) const RENAMED: [(&str, &str); 12] = [
-    ("shard", "dataset"),
-    ("segment.max_bone_change", "lift.max_bone_change"),
+/// Former names of keys, with their current names.
+const RENAMED: [(&str, &str); 10] = [
     ("segment.max_people", "segment.max_persons"),
     ("segment.max_still_secs", "segment.max_static_secs"),
     ("pose2d.person_follow", "pose2d.box_smoothing"),
@@ -24,9 +21,12 @@ pub(super) const RENAMED: [(&str, &str); 12] = [
     ("seq2seq.hears_context", "seq2seq.audio_context"),
 ];
 
-/// Former keys whose values have no equivalent, with what replaced them.
-pub(super) const REPLACED: [(&str, &str); 1] =
-    [("segment.min_lip_sync", "replaced by min_own_voice, a probability instead of a correlation")];
+/// Other former keys and sections, with what replaced them.
+const REPLACED: [(&str, &str); 3] = [
+    ("shard", "renamed to dataset"),
+    ("segment.max_bone_change", "renamed to lift.max_bone_change"),
+    ("segment.min_lip_sync", "replaced by min_own_voice, a probability instead of a correlation"),
+];
 
 /// Former value of `gan.recipe`, with its current name.
 const RENAMED_RECIPE: (&str, &str) = ("paper", "rebol2021");
@@ -37,7 +37,7 @@ pub fn to_stored(section: &str, settings: &impl Serialize) -> serde_json::Result
     let stored_name = |key: String| {
         let current = format!("{section}.{key}");
         let former = RENAMED.iter().find(|(_, now)| *now == current).and_then(|(former, _)| former.split_once('.'));
-        former.filter(|(of, _)| *of == section).map_or(key, |(_, name)| name.to_owned())
+        former.map_or(key, |(_, name)| name.to_owned())
     };
     Ok(match serde_json::to_value(settings)? {
         Value::Object(keys) => {
@@ -49,82 +49,32 @@ pub fn to_stored(section: &str, settings: &impl Serialize) -> serde_json::Result
     })
 }
 
-/// Moves values given under former names, in a section or in its advanced table, to the current names; if both are
-/// given, the current name takes precedence. Returns a note for each.
-pub(super) fn rename(written: &mut DeTable<'_>, location_at: &dyn Fn(usize) -> SourceLocation) -> Vec<String> {
+/// What replaced the former key `key`, if it is one.
+pub(super) fn renamed(key: &str) -> Option<String> {
+    let renamed = RENAMED.iter().find(|(former, _)| *former == key).map(|(_, now)| format!("renamed to {now}"));
+    renamed.or_else(|| REPLACED.iter().find(|(former, _)| *former == key).map(|(_, by)| (*by).to_owned()))
+}
+
+/// Replaces a former value of `gan.recipe`, in the section or in its advanced table. Returns a note for each.
+pub(super) fn rename_recipe(written: &mut DeTable<'_>, location_at: &dyn Fn(usize) -> SourceLocation) -> Vec<String> {
+    let (old, new) = RENAMED_RECIPE;
     let mut notes = Vec::new();
-    let split = |name: &'static str| name.rsplit_once('.').map_or((None, name), |(table, key)| (Some(table), key));
-    for (former, now) in RENAMED {
-        let ((from, old), (to, new)) = (split(former), split(now));
-        for is_advanced in [false, true].into_iter().filter(|advanced| !advanced || from.is_some()) {
-            let Some((name, value)) = section(written, from, is_advanced).and_then(|table| table.remove_entry(old))
-            else {
-                continue;
-            };
-            let location = location_at(name.span().start);
-            notes.push(format!("{location}{former} was renamed: write {now} (the old name works until version 0.3)"));
-            let Some(table) = create_section(written, to, is_advanced, &name.span()) else { continue };
-            match (table.get_mut(new).map(Spanned::get_mut), value.into_inner()) {
-                (Some(DeValue::Table(table)), DeValue::Table(old)) => {
-                    let missing = old.into_iter().filter(|(key, _)| !table.contains_key(key)).collect::<Vec<_>>();
-                    table.extend(missing);
-                }
-                (Some(_), _) => {}
-                (None, value) => {
-                    table.insert(Spanned::new(name.span(), new.into()), Spanned::new(name.span(), value));
-                }
-            }
-        }
-    }
-    for is_advanced in [false, true] {
-        let Some(value) = section(written, Some("gan"), is_advanced).and_then(|gan| gan.get_mut("recipe")) else {
-            continue;
+    let Some(DeValue::Table(gan)) = written.get_mut("gan").map(Spanned::get_mut) else { return notes };
+    let mut rename = |section: &mut DeTable<'_>| {
+        let Some(value) = section.get_mut("recipe").filter(|value| value.get_ref().as_str() == Some(old)) else {
+            return;
         };
-        if value.get_ref().as_str() == Some(RENAMED_RECIPE.0) {
-            let location = location_at(value.span().start);
-            let (old, new) = RENAMED_RECIPE;
-            notes.push(format!(
-                "{location}gan.recipe = {old:?} was renamed: write {new:?} (the old name works until version 0.3)"
-            ));
-            *value.get_mut() = DeValue::String(new.into());
-        }
+        let location = location_at(value.span().start);
+        notes.push(format!(
+            "{location}gan.recipe = {old:?} was renamed: write {new:?} (the old name works until version 0.4)"
+        ));
+        *value.get_mut() = DeValue::String(new.into());
+    };
+    rename(gan);
+    if let Some(DeValue::Table(advanced)) = gan.get_mut(ADVANCED).map(Spanned::get_mut) {
+        rename(advanced);
     }
     notes
-}
-
-/// Table of the section `name`, or its advanced table; the top-level table for `None`.
-fn section<'t, 'a>(written: &'t mut DeTable<'a>, name: Option<&str>, is_advanced: bool) -> Option<&'t mut DeTable<'a>> {
-    let Some(name) = name else { return Some(written) };
-    let DeValue::Table(table) = written.get_mut(name)?.get_mut() else { return None };
-    if !is_advanced {
-        return Some(table);
-    }
-    match table.get_mut(ADVANCED)?.get_mut() {
-        DeValue::Table(table) => Some(table),
-        _ => None,
-    }
-}
-
-/// [`section`], created at `span` if it does not exist.
-fn create_section<'t, 'a>(
-    written: &'t mut DeTable<'a>,
-    name: Option<&'static str>,
-    is_advanced: bool,
-    span: &Range<usize>,
-) -> Option<&'t mut DeTable<'a>> {
-    let insert = |table: &mut DeTable<'a>, key: &'static str| {
-        if !table.contains_key(key) {
-            let empty = DeValue::Table(DeTable::new());
-            table.insert(Spanned::new(span.clone(), key.into()), Spanned::new(span.clone(), empty));
-        }
-    };
-    if let Some(name) = name {
-        insert(written, name);
-        if is_advanced {
-            insert(section(written, Some(name), false)?, ADVANCED);
-        }
-    }
-    section(written, name, is_advanced)
 }
 
 #[cfg(test)]

@@ -8,6 +8,8 @@ use candle_core::{DType, Device, Result, Tensor};
 use ndarray::{Array2, Array3, ArrayView2};
 use orator_base::types::pose3d::Motion;
 use orator_base::types::skeleton::{N_BONES, N_JOINTS, NECK, is_duplicate, parent};
+use orator_nn::card::launch::is_on_device;
+use orator_nn::card::poses;
 use serde::{Deserialize, Serialize};
 
 /// Smallest standard deviation of a direction coordinate, so that bones that hardly turn are not amplified.
@@ -139,7 +141,7 @@ impl Representation {
         let Self::Bones { mean, std } = self else { return Ok(PoseDecoder { kinematics: None }) };
         let table = |values: Vec<f64>, shape: &[usize]| Tensor::from_vec(values, shape, device)?.to_dtype(dtype);
         let column = |values: &[f32]| table(values.iter().map(|v| f64::from(*v)).collect(), &[1, N_FEATURES, 1]);
-        let lengths = (1..N_JOINTS).map(|joint| f64::from(bone_length(joint, normal))).collect();
+        let lengths: Vec<f64> = (1..N_JOINTS).map(|joint| f64::from(bone_length(joint, normal))).collect();
         // The row of a joint is 1 at every bone on the path from the neck to the joint.
         let mut path = vec![0.0; N_BONES * N_BONES];
         for joint in 1..N_JOINTS {
@@ -149,8 +151,12 @@ impl Representation {
                 at = parent(at).unwrap_or(NECK);
             }
         }
+        let parents = (1..N_JOINTS).map(|joint| parent(joint).unwrap_or(NECK) as f64 - 1.0);
+        let of_features = [mean, std, &normal.mean, &normal.std].into_iter().flatten();
+        let tables = of_features.map(|v| f64::from(*v)).chain(lengths.iter().copied()).chain(parents).collect();
         Ok(PoseDecoder {
             kinematics: Some(Kinematics {
+                tables: table(tables, &[14 * N_BONES])?,
                 direction_mean: column(mean)?,
                 direction_std: column(std)?,
                 lengths: table(lengths, &[1, N_BONES, 1, 1])?,
@@ -186,12 +192,17 @@ struct Kinematics {
     path: Tensor,
     mean: Tensor,
     std: Tensor,
+    /// All of these for the kernels of a card (`poses::kinematics`).
+    tables: Tensor,
 }
 
 impl PoseDecoder {
     /// Converts raw features [B, 144 or more, T] to normalised positions; trailing channels are passed through.
     pub fn poses(&self, raw: &Tensor) -> Result<Tensor> {
         let Some(k) = &self.kinematics else { return Ok(raw.clone()) };
+        if is_on_device(raw) {
+            return poses::kinematics(raw, &k.tables);
+        }
         let (batch, n_features, n_frames) = raw.dims3()?;
         if n_features > N_FEATURES {
             let channels = raw.narrow(1, N_FEATURES, n_features - N_FEATURES)?;

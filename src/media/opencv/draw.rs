@@ -24,18 +24,12 @@ pub fn line(image: &mut Image, from: [f32; 2], to: [f32; 2], width_px: f32, rgb:
 
 /// Draws a filled circle.
 pub fn circle(image: &mut Image, centre: [f32; 2], radius_px: f32, rgb: [u8; 3]) -> anyhow::Result<()> {
-    ring(image, centre, radius_px, imgproc::FILLED, rgb)
-}
-
-/// Draws the outline of a circle, `width_px` wide.
-pub fn circle_outline(
-    image: &mut Image,
-    centre: [f32; 2],
-    radius_px: f32,
-    width_px: f32,
-    rgb: [u8; 3],
-) -> anyhow::Result<()> {
-    ring(image, centre, radius_px, width_px.round().clamp(1.0, 1000.0) as i32, rgb)
+    let Some(centre) = fixed(centre) else { return Ok(()) };
+    if !radius_px.is_finite() || radius_px < 0.0 {
+        return Ok(());
+    }
+    let radius = (radius_px.min(MAX_COORDINATE_PX) * (1 << SHIFT) as f32).round() as i32;
+    draw_on(image, |mat| imgproc::circle(mat, centre, radius, colour(rgb), imgproc::FILLED, imgproc::LINE_AA, SHIFT))
 }
 
 /// Draws a filled convex polygon; fewer than 3 corners draw nothing.
@@ -119,15 +113,6 @@ pub fn paste(image: &mut Image, cell: &Image, [left, top]: [usize; 2]) {
 fn font(height_px: f32) -> (f64, i32) {
     let height = f64::from(height_px.clamp(4.0, 500.0));
     (height / 21.0, (height / 14.0).round().max(1.0) as i32)
-}
-
-fn ring(image: &mut Image, centre: [f32; 2], radius_px: f32, width: i32, rgb: [u8; 3]) -> anyhow::Result<()> {
-    let Some(centre) = fixed(centre) else { return Ok(()) };
-    if !radius_px.is_finite() || radius_px < 0.0 {
-        return Ok(());
-    }
-    let radius = (radius_px.min(MAX_COORDINATE_PX) * (1 << SHIFT) as f32).round() as i32;
-    draw_on(image, |mat| imgproc::circle(mat, centre, radius, colour(rgb), width, imgproc::LINE_AA, SHIFT))
 }
 
 fn colour([r, g, b]: [u8; 3]) -> Scalar {

@@ -8,6 +8,7 @@ use super::kernel::{MAX_ROWS, TileSteps};
 use super::packed_matrix::{PackedWeights, StepBlock, WeightOrder};
 use super::spin_pool::parallel_for;
 use super::tensor::{Scalar, SharedOutputPtr, scratch, written};
+use super::winograd::{FilterTaps, WinogradPass, WinogradTiles};
 use std::ops::Range;
 
 /// Maximum number of input values that a task copies (but at least some rows), and number of summation steps whose
@@ -55,17 +56,21 @@ pub fn forward<T: Scalar>(
 ) -> Vec<T> {
     assert!(x.len() == s.len_in() && weight.len() == s.len_weight() && bias.len() == s.n_out);
     let pass = forward_pass(s);
-    let panels = PackedWeights::pack(weight, &pass.order(s.n_in * s.kernel_len(), s.kernel_len()));
+    let weights = PackedWeights::pack(weight, &pass.order(s.n_in * s.kernel_len(), s.kernel_len()));
     let per_row = s.axes[1].n_out * s.n_out;
     // SAFETY: the chunks are disjoint and together cover every row of every output.
     unsafe {
         written(s.len_out(), |to: SharedOutputPtr<T>| {
+            if let Some(taps) = FilterTaps::of(s) {
+                WinogradPass { pass: &pass, from: x, weights: &weights, begin: bias }.run(taps, to, finish);
+                return;
+            }
             let chunks = pass.chunks();
             parallel_for(chunks.len(), |number| {
                 let (b, rows) = chunks[number].clone();
                 let start = to.at((b * s.axes[0].n_out + rows.start) * per_row);
                 let n = rows.len() * per_row;
-                pass.run(x, &panels, bias, to, b, rows);
+                pass.run(x, &weights, bias, to, b, rows);
                 finish(number, std::slice::from_raw_parts_mut(start, n));
             });
         })
@@ -73,6 +78,9 @@ pub fn forward<T: Scalar>(
 }
 
 pub fn n_chunks(s: &ConvSizes) -> usize {
+    if FilterTaps::of(s).is_some() {
+        return WinogradTiles::forward(s).n_parts();
+    }
     forward_pass(s).chunks().len()
 }
 
@@ -89,6 +97,7 @@ fn forward_pass(s: &ConvSizes) -> ConvPass {
 pub fn gradient_of_input<T: Scalar>(s: &ConvSizes, weight: &[T], grad: &[T]) -> Vec<T> {
     assert!(grad.len() == s.len_out() && weight.len() == s.len_weight());
     let zeros = vec![T::zero(); s.n_in];
+    let taps = FilterTaps::of(s);
     // SAFETY: the chunks of all phases are disjoint and together cover every position.
     unsafe {
         written(s.len_in(), |to: SharedOutputPtr<T>| {
@@ -101,11 +110,16 @@ pub fn gradient_of_input<T: Scalar>(s: &ConvSizes, weight: &[T], grad: &[T]) -> 
                         windows: [rows.clone(), columns],
                         kernel: s.axes.map(|axis| axis.kernel),
                     };
-                    let panels = PackedWeights::pack(weight, &pass.order(s.kernel_len(), s.n_in * s.kernel_len()));
+                    let weights = PackedWeights::pack(weight, &pass.order(s.kernel_len(), s.n_in * s.kernel_len()));
+                    if let Some(taps) = taps {
+                        let pass = WinogradPass { pass: &pass, from: grad, weights: &weights, begin: &zeros };
+                        pass.run(taps, to, |_, _| ());
+                        continue;
+                    }
                     let chunks = pass.chunks();
                     parallel_for(chunks.len(), |number| {
                         let (b, rows) = chunks[number].clone();
-                        pass.run(grad, &panels, &zeros, to, b, rows);
+                        pass.run(grad, &weights, &zeros, to, b, rows);
                     });
                 }
             }
@@ -114,17 +128,17 @@ pub fn gradient_of_input<T: Scalar>(s: &ConvSizes, weight: &[T], grad: &[T]) -> 
 }
 
 /// One convolution over padded rows: forward, or one phase of the backward pass.
-struct ConvPass {
-    batch: usize,
-    n_from: usize,
-    n_to: usize,
-    windows: [AxisWindows; 2],
+pub(super) struct ConvPass {
+    pub(super) batch: usize,
+    pub(super) n_from: usize,
+    pub(super) n_to: usize,
+    pub(super) windows: [AxisWindows; 2],
     /// Size of the complete kernel.
-    kernel: [usize; 2],
+    pub(super) kernel: [usize; 2],
 }
 
 impl ConvPass {
-    fn order(&self, per_column: usize, per_channel: usize) -> WeightOrder {
+    pub(super) fn order(&self, per_column: usize, per_channel: usize) -> WeightOrder {
         let [rows, columns] = &self.windows;
         let kernel_offsets = rows
             .kernel_offsets
@@ -135,7 +149,7 @@ impl ConvPass {
     }
 
     /// Returns sample and window rows of each chunk of work, independent of the number of threads.
-    fn chunks(&self) -> Vec<(usize, Range<usize>)> {
+    pub(super) fn chunks(&self) -> Vec<(usize, Range<usize>)> {
         let [rows, columns] = &self.windows;
         let per_row = columns.receptive_field(columns.n) * self.n_from;
         let n_rows = ((CHUNK / per_row.max(1)).saturating_sub(rows.kernel_offsets.len()) / rows.step + 1)
@@ -151,7 +165,7 @@ impl ConvPass {
     ///
     /// # Safety
     /// `to` has room for the batch's results, and no other thread writes to those of these windows.
-    unsafe fn run<T: Scalar>(
+    pub(super) unsafe fn run<T: Scalar>(
         &self,
         from: &[T],
         panels: &PackedWeights<T>,
@@ -163,8 +177,17 @@ impl ConvPass {
         let [rows, columns] = &self.windows;
         let (width, n_from) = (columns.receptive_field(columns.n), self.n_from);
         let per_row = width * n_from;
-        scratch(rows.receptive_field(chunk.len()) * per_row, |padded: &mut [T]| {
-            self.copy(from, padded, b, chunk.start);
+        let first = rows.first + (chunk.start * rows.step) as isize;
+        let n_rows = rows.receptive_field(chunk.len());
+        let is_inside = width == columns.n_from && first >= 0 && first as usize + n_rows <= rows.n_from;
+        let copied = if is_inside && columns.first == 0 { 0 } else { n_rows * per_row };
+        scratch(copied, |padded: &mut [T]| {
+            let padded = if copied > 0 {
+                self.copy(from, padded, b, chunk.start);
+                &*padded
+            } else {
+                &from[(b * rows.n_from + first as usize) * per_row..]
+            };
             let positions = chunk.clone().flat_map(|row| (0..columns.n).map(move |column| (row, column)));
             let positions: Vec<(usize, usize)> = positions
                 .map(|(row, column)| {

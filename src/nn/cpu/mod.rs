@@ -24,3 +24,5 @@ pub mod tensor;
 pub mod transformer;
 pub mod vectorised;
 pub mod weight_gradient;
+pub mod winograd;
+pub mod winograd_transforms;

@@ -114,6 +114,8 @@ impl<T: Scalar> PackedMatrix<T> {
 /// Weights in tile order: consecutive panels of columns; each panel has one row per summation step.
 pub struct PackedWeights<T> {
     pub data: Vec<T>,
+    /// End of the last panel in `data`.
+    end: usize,
     pub panels: Vec<WeightPanel>,
 }
 
@@ -210,7 +212,24 @@ impl<T: Scalar> PackedWeights<T> {
             })
         };
         panels.iter_mut().for_each(|panel| panel.start += first);
-        Self { data, panels }
+        Self { data, end: first + n_numbers, panels }
+    }
+}
+
+impl<T: Scalar> PackedWeights<T> {
+    /// Where all steps of a panel are in `data`.
+    pub fn steps(&self, panel: usize) -> Range<usize> {
+        self.panels[panel].start..self.panels.get(panel + 1).map_or(self.end, |next| next.start)
+    }
+
+    /// Zero weights of the same panels with a `share`-th of the steps.
+    pub fn with_share(&self, share: usize) -> Self {
+        let from = self.panels.first().map_or(0, |panel| panel.start);
+        let n = (self.end - from) / share;
+        let data = vec![T::zero(); n + LANES];
+        let first = aligned(data.as_ptr());
+        let panel = |panel: &WeightPanel| WeightPanel { start: first + (panel.start - from) / share, ..*panel };
+        Self { panels: self.panels.iter().map(panel).collect(), end: first + n, data }
     }
 }
 

@@ -5,6 +5,7 @@ use super::direct_conv::ConvSizes;
 use super::kernel::{MAX_ROWS, TileJob, TileSteps, panels};
 use super::spin_pool::{parallel_for, parallel_map};
 use super::tensor::{Scalar, SharedOutputPtr, scratch, written};
+use super::winograd::{self, FilterTaps};
 use rayon::prelude::*;
 use std::ops::Range;
 
@@ -18,32 +19,33 @@ const CHANNELS: usize = 11 * MAX_ROWS;
 
 pub fn gradient_of_weight<T: Scalar>(s: &ConvSizes, x: &[T], grad: &[T]) -> Vec<T> {
     assert!(x.len() == s.len_in() && grad.len() == s.len_out());
-    // Only runs along the second axis are contiguous in memory, so a single axis is moved there.
-    let turned = s.axes[1].n_in == 1 && s.axes[1].kernel == 1 && s.axes[1].n_out == 1;
-    let s = &if turned { ConvSizes { axes: [s.axes[1], s.axes[0]], ..*s } } else { *s };
     let kernel = T::kernel();
     let panels = panels(&kernel, s.n_out);
-    let (padded, n_columns) = pad_channels(grad, s.n_out, kernel.lanes);
-    let grad = padded.as_deref().unwrap_or(grad);
-    let rows = s.axes[0];
     let n_chunks = s.n_in.div_ceil(CHANNELS);
-    let tasks: Vec<(usize, usize, usize)> = (0..panels.len())
-        .flat_map(|panel| {
-            (0..rows.kernel)
-                .flat_map(move |kernel_offset| (0..n_chunks).map(move |chunk| (panel, kernel_offset, chunk)))
-        })
-        .collect();
     let chunk = |chunk: usize| chunk * CHANNELS..s.n_in.min((chunk + 1) * CHANNELS);
-    let sums: Vec<Vec<T>> = parallel_map(tasks.len(), |task| {
-        let (panel, kernel_offset, of_chunk) = tasks[task];
-        sum_products(s, x, grad, n_columns, panels[panel], kernel_offset, chunk(of_chunk))
-    });
+    // For each panel and chunk of channels: [kernel offsets, channels, width of the panel].
+    let sums = match FilterTaps::of(s) {
+        Some(taps) => {
+            let mut points: Vec<Vec<T>> = Vec::new();
+            let mut n_points = 1;
+            winograd::gradient_tiles(taps, s, [x, grad], |tiles| {
+                let some = sums_of_tasks(&tiles.sizes, [tiles.x, tiles.grad], tiles.n_points);
+                n_points = tiles.n_points;
+                match points.is_empty() {
+                    true => points = some,
+                    false => points.iter_mut().flatten().zip(some.iter().flatten()).for_each(|(sum, v)| *sum += *v),
+                }
+            });
+            parallel_map(panels.len() * n_chunks, |i| {
+                winograd::gradients_of_taps(taps, &points[i * n_points..][..n_points], s.axes[0].stride)
+            })
+        }
+        None => sums_of_tasks(s, [x, grad], 1),
+    };
     let scatter = |gradient: SharedOutputPtr<T>, (panel, of_chunk): (usize, usize)| {
         let ((first, n_vectors), channels) = (panels[panel], chunk(of_chunk));
         let width = n_vectors * kernel.lanes;
-        let of_row = tasks.iter().zip(&sums).filter(|((p, _, c), _)| (*p, *c) == (panel, of_chunk));
-        let of_row: Vec<&[T]> = of_row.map(|(_, sums)| &sums[..]).collect();
-        let kernel_offsets = of_row.iter().flat_map(|sums| sums.chunks_exact(channels.len() * width));
+        let kernel_offsets = sums[panel * n_chunks + of_chunk].chunks_exact(channels.len() * width);
         let kernel_offsets: Vec<&[T]> = kernel_offsets.collect();
         let n_at_once = (AT_ONCE / s.kernel_len()).max(1);
         for some in (0..channels.len()).step_by(n_at_once).map(|c| c..channels.len().min(c + n_at_once)) {
@@ -67,6 +69,29 @@ pub fn gradient_of_weight<T: Scalar>(s: &ConvSizes, x: &[T], grad: &[T]) -> Vec<
             parallel_for(parts.len(), |part| scatter(gradient, parts[part]));
         })
     }
+}
+
+/// Sums of products, [kernel offsets, channels, width of the panel], for each panel, chunk of channels and point, of
+/// `n_points` inputs and gradients that follow each other in memory.
+fn sums_of_tasks<T: Scalar>(s: &ConvSizes, [x, grad]: [&[T]; 2], n_points: usize) -> Vec<Vec<T>> {
+    // Only runs along the second axis are contiguous in memory, so a single axis is moved there.
+    let is_turned = s.axes[1].n_in == 1 && s.axes[1].kernel == 1 && s.axes[1].n_out == 1;
+    let s = &if is_turned { ConvSizes { axes: [s.axes[1], s.axes[0]], ..*s } } else { *s };
+    let kernel = T::kernel();
+    let panels = panels(&kernel, s.n_out);
+    let (padded, n_columns) = pad_channels(grad, s.n_out, kernel.lanes);
+    let grad = padded.as_deref().unwrap_or(grad);
+    let (n_chunks, n_rows) = (s.n_in.div_ceil(CHANNELS), s.axes[0].kernel);
+    let rows = parallel_map(panels.len() * n_chunks * n_points * n_rows, |task| {
+        let (row_offset, task) = (task % n_rows, task / n_rows);
+        let (point, task) = (task % n_points, task / n_points);
+        let (chunk, panel) = (task % n_chunks, task / n_chunks);
+        let part = |n: usize| point * n / n_points..(point + 1) * n / n_points;
+        let (x, grad) = (&x[part(x.len())], &grad[part(grad.len())]);
+        let channels = chunk * CHANNELS..s.n_in.min((chunk + 1) * CHANNELS);
+        sum_products(s, x, grad, n_columns, panels[panel], row_offset, channels)
+    });
+    if n_rows == 1 { rows } else { rows.chunks(n_rows).map(<[Vec<T>]>::concat).collect() }
 }
 
 /// Pads the channels with zeros to complete vectors (`None` if they are already complete); returns their number.

@@ -2,6 +2,8 @@
 //! every fourth frame as real or generated (Ginosar et al. 2019).
 
 use super::generator::{ConvBlock, MOMENTUM, SLOPE};
+use crate::card::launch::is_on_device;
+use crate::card::passes::chain;
 use crate::ops::conv2d::Conv;
 use crate::ops::resize;
 use crate::params::Params;
@@ -32,11 +34,21 @@ impl Discriminator {
 
     /// Scores differences [B, n_in, T - 1]: [B, 1, about T / 4]; 1 means real, 0 generated.
     pub fn forward(&self, motion: &Tensor, train: bool) -> Result<Tensor> {
+        if is_on_device(motion) {
+            return self.scores_of_groups(motion, train, 1);
+        }
         let mut x = candle_nn::ops::leaky_relu(&self.first.forward(&resize::transposed(motion)?)?, SLOPE)?;
         for block in &self.blocks {
             x = block.forward(&x, train)?;
         }
         resize::transposed(&self.last.forward(&x)?)
+    }
+
+    /// [`Self::forward`] on a card, of equal parts of a batch as if one after the other.
+    pub fn scores_of_groups(&self, motion: &Tensor, train: bool, groups: usize) -> Result<Tensor> {
+        let blocks = self.blocks.iter().map(ConvBlock::on_device);
+        let layers = std::iter::once(self.first.on_device(SLOPE)).chain(blocks).chain([self.last.on_device(1.0)]);
+        chain(layers.collect(), motion, train, groups)
     }
 }
 

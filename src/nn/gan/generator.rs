@@ -5,6 +5,9 @@
 
 use super::speaker_layer::SpeakerLayer;
 use super::words::{WordFrames, WordLayer};
+use crate::card::launch::is_on_device;
+use crate::card::layer::DeviceLayer;
+use crate::card::passes::{self, UnetLayers, chain};
 use crate::ops::batch_norm::BatchNorm;
 use crate::ops::conv_norm::conv_norm;
 use crate::ops::conv2d::{self, Conv};
@@ -169,10 +172,15 @@ impl Generator {
     /// Encodes `mels` [B, n_mels, T_mel] to [B, about T_mel / 8, width]. `speakers` has the index of each sample's
     /// speaker; it is ignored by networks for one speaker.
     pub fn encode(&self, mels: &Tensor, speakers: &[u32], train: bool) -> Result<Tensor> {
-        let mels = resize::transposed(mels)?;
         let encoded = match self.preset {
-            Preset::Light => through(&self.audio_encoder, mels, train)?,
-            Preset::Paper => through(&self.audio_encoder, mels.unsqueeze(3)?, train)?.squeeze(2)?,
+            Preset::Light if is_on_device(mels) => chain(on_device(&self.audio_encoder), mels, train, 1)?.t()?,
+            Preset::Paper if is_on_device(mels) => {
+                chain(on_device(&self.audio_encoder), &mels.t()?.unsqueeze(1)?, train, 1)?.squeeze(3)?.t()?
+            }
+            Preset::Light => through(&self.audio_encoder, resize::transposed(mels)?, train)?,
+            Preset::Paper => {
+                through(&self.audio_encoder, resize::transposed(mels)?.unsqueeze(3)?, train)?.squeeze(2)?
+            }
         };
         match &self.speakers {
             None => Ok(encoded),
@@ -195,6 +203,9 @@ impl Generator {
                 (x.narrow(2, 0, width)?.contiguous()?, Some(x.narrow(2, width, width)?))
             }
         };
+        if is_on_device(x) {
+            return self.decode_on_device(&encoded.t()?, direct.as_ref(), train);
+        }
         let mut x = through(&self.enter, encoded, train)?;
         let mut skips = Vec::new();
         for block in &self.downs {
@@ -208,6 +219,24 @@ impl Generator {
         let x = direct.map_or(Ok(x.clone()), |direct| x + direct)?;
         resize::transposed(&self.last.forward(&x)?)
     }
+
+    /// [`Self::decode`] with channels first, [B, width, T] to [B, n_out, T]; `direct` [B, T, width] is added before the
+    /// last layer.
+    fn decode_on_device(&self, encoded: &Tensor, direct: Option<&Tensor>, train: bool) -> Result<Tensor> {
+        let [enter, downs, ups, mut decoder] =
+            [&self.enter, &self.downs, &self.ups, &self.decoder].map(|blocks| on_device(blocks));
+        let last = self.last.on_device(1.0);
+        let Some(direct) = direct else {
+            decoder.push(last);
+            return passes::unet(UnetLayers { enter, downs, ups, decoder }, encoded, train);
+        };
+        let decoded = passes::unet(UnetLayers { enter, downs, ups, decoder }, encoded, train)?;
+        chain(vec![last], &(decoded + direct.t()?)?, train, 1)
+    }
+}
+
+fn on_device(blocks: &[ConvBlock]) -> Vec<DeviceLayer> {
+    blocks.iter().map(ConvBlock::on_device).collect()
 }
 
 fn through(blocks: &[ConvBlock], x: Tensor, train: bool) -> Result<Tensor> {
@@ -268,6 +297,9 @@ impl ConvBlock {
 
     /// Maps [B, T, C] to [B, ceil(T / stride), C'], or [B, T, F, C] to [B, T', F', C'].
     pub fn forward(&self, x: &Tensor, train: bool) -> Result<Tensor> {
+        if is_on_device(x) {
+            return passes::channels_last(self.on_device(), x, train);
+        }
         let Self { weight, bias, norm, .. } = self;
         if !self.full_height {
             return conv_norm(x, weight, bias, norm, conv2d::same(x, weight, self.stride)?, train);
@@ -277,6 +309,19 @@ impl ConvBlock {
         let x = x.contiguous()?.reshape((batch, time, frequencies * channels))?;
         let weight = weight.permute((0, 3, 1, 2))?.contiguous()?.reshape((n_out, (), kernel))?;
         conv_norm(&x, &weight, bias, norm, conv2d::valid(&x, &weight)?, train)?.unsqueeze(2)
+    }
+
+    /// Layer for a card.
+    pub(super) fn on_device(&self) -> DeviceLayer {
+        let Self { weight, bias, norm, stride, full_height } = self;
+        DeviceLayer {
+            weight: weight.clone(),
+            bias: bias.clone(),
+            slope: norm.slope,
+            norm: Some(norm.clone()),
+            stride: *stride,
+            is_padded: !full_height,
+        }
     }
 }
 

@@ -1,7 +1,6 @@
 //! Batch normalisation followed by leaky ReLU as one operator, forward and backward, with a third of the memory passes
 //! of two operators. Training uses the batch's statistics and updates the running ones; evaluation uses these.
 
-use super::fallback;
 use super::operator::{CpuOperator, CustomOperator, Gradients, Operand};
 use crate::cpu::tensor::{GRAIN, LANES, Scalar, sum};
 use crate::cpu::vectorised::{DropMask, drop_out};
@@ -18,13 +17,14 @@ pub struct Statistics {
 
 /// Batch norm layer. Tensors with their initial values: `<name>.weight` (1), `<name>.bias` (0), `<name>.running_mean`
 /// (0) and `<name>.running_var` (1), each [C].
+#[derive(Clone)]
 pub struct BatchNorm {
     pub(crate) weight: Tensor,
     pub(crate) bias: Tensor,
-    running_mean: Var,
-    running_var: Var,
+    pub(crate) running_mean: Var,
+    pub(crate) running_var: Var,
     pub(crate) eps: f64,
-    momentum: f64,
+    pub(crate) momentum: f64,
     pub(crate) slope: f64,
 }
 
@@ -65,20 +65,6 @@ impl BatchNorm {
         Ok(y)
     }
 
-    /// [`Self::forward`] with candle's operators, on any device.
-    pub fn forward_fallback(&self, x: &Tensor, train: bool) -> Result<Tensor> {
-        let (mean, variance) = if train {
-            fallback::statistics(x)?
-        } else {
-            (self.running_mean.as_detached_tensor(), self.running_var.as_detached_tensor())
-        };
-        let y = fallback::normalise(x, (&mean, &variance), &self.weight, &self.bias, self.eps, self.slope)?;
-        if train {
-            self.update_running_tensors(&mean.detach(), &variance.detach(), x.elem_count() / mean.elem_count())?;
-        }
-        Ok(y)
-    }
-
     pub fn running(&self) -> Result<Statistics> {
         let values = |var: &Var| var.to_dtype(candle_core::DType::F64)?.to_vec1();
         Ok(Statistics { mean: values(&self.running_mean)?, variance: values(&self.running_var)? })
@@ -86,18 +72,14 @@ impl BatchNorm {
 
     /// Updates the running statistics with those of a batch of `n` values per channel, using the unbiased variance.
     pub fn update_running(&self, batch: &Statistics, n: usize) -> Result<()> {
-        let tensor = |values: &[f64]| Tensor::new(values, &Device::Cpu)?.to_dtype(self.running_mean.dtype());
-        self.update_running_tensors(&tensor(&batch.mean)?, &tensor(&batch.variance)?, n)
-    }
-
-    fn update_running_tensors(&self, mean: &Tensor, variance: &Tensor, n: usize) -> Result<()> {
         let n = n as f64;
-        let update = |running: &Var, batch: &Tensor, scale: f64| {
+        let update = |running: &Var, batch: &[f64], scale: f64| {
+            let batch = Tensor::new(batch, &Device::Cpu)?.to_dtype(running.dtype())?;
             running
                 .set(&((running.as_detached_tensor() * (1.0 - self.momentum))? + (batch * (self.momentum * scale))?)?)
         };
-        update(&self.running_mean, mean, 1.0)?;
-        update(&self.running_var, variance, n / (n - 1.0).max(1.0))
+        update(&self.running_mean, &batch.mean, 1.0)?;
+        update(&self.running_var, &batch.variance, n / (n - 1.0).max(1.0))
     }
 }
 
@@ -271,13 +253,20 @@ mod tests {
                 let op = BatchNormOp { statistics, eps: 1e-3, slope, train, dropout: None };
                 v[0].apply_op3(&v[1], &v[2], CustomOperator(op))
             };
-            let by_fallback = |v: &[Tensor]| {
-                let of_fixed = |values: &[f64]| Tensor::new(values, &Device::Cpu);
-                let known = || -> Result<_> { Ok((of_fixed(&fixed.mean)?, of_fixed(&fixed.variance)?)) };
-                let (mean, variance) = if train { fallback::statistics(&v[0])? } else { known()? };
-                fallback::normalise(&v[0], (&mean, &variance), &v[1], &v[2], 1e-3, slope)
+            let composed = |v: &[Tensor]| {
+                let moved = v[0].transpose(0, 1)?;
+                let rows = moved.flatten_from(1)?;
+                let own = rows.mean_keepdim(1)?;
+                let of_fixed = |values: &[f64]| Tensor::new(values, &Device::Cpu)?.unsqueeze(1);
+                let (mean, variance) = match train {
+                    true => (own.clone(), rows.broadcast_sub(&own)?.sqr()?.mean_keepdim(1)?),
+                    false => (of_fixed(&fixed.mean)?, of_fixed(&fixed.variance)?),
+                };
+                let y = rows.broadcast_sub(&mean)?.broadcast_div(&(variance + 1e-3)?.sqrt()?)?;
+                let y = y.broadcast_mul(&v[1].unsqueeze(1)?)?.broadcast_add(&v[2].unsqueeze(1)?)?;
+                (y.relu()? - (y.neg()?.relu()? * slope)?)?.reshape(moved.shape())?.transpose(0, 1)?.contiguous()
             };
-            let (off, error) = (max_difference(&inputs, own, by_fallback)?, worst(&inputs, own)?);
+            let (off, error) = (max_difference(&inputs, own, composed)?, worst(&inputs, own)?);
             assert!(off < 1e-11 && error < 1e-7, "{shape:?}, train {train}, slope {slope}: {off:e} {error:e}");
         }
         Ok(())

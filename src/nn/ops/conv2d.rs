@@ -1,8 +1,10 @@
 //! Convolution as an operator on tensors, channels last, with its weights: [B, T, C] over time and [B, T, F, C] over
 //! time and frequency. The sums are computed in `direct_conv`; `conv_norm` includes a subsequent batch norm.
 
-use super::fallback;
 use super::operator::{CpuOperator, CustomOperator, Gradients, Operand};
+use crate::card::launch::is_on_device;
+use crate::card::layer::DeviceLayer;
+use crate::card::passes;
 use crate::cpu::axis::ConvAxis;
 use crate::cpu::direct_conv::{self, ConvSizes};
 use crate::cpu::tensor::Scalar;
@@ -66,14 +68,20 @@ impl Conv {
 
     /// Maps [B, T, C] to [B, T', O].
     pub fn forward(&self, x: &Tensor) -> Result<Tensor> {
+        if is_on_device(x) {
+            return passes::channels_last(self.on_device(1.0), x, false);
+        }
         conv(x, &self.weight, &self.bias, same(x, &self.weight, self.stride)?)
+    }
+
+    /// Layer for a card, followed by a leaky ReLU with this slope.
+    pub(crate) fn on_device(&self, slope: f64) -> DeviceLayer {
+        let Self { weight, bias, stride } = self.clone();
+        DeviceLayer { weight, bias, norm: None, stride, is_padded: true, slope }
     }
 }
 
 pub fn conv(x: &Tensor, weight: &Tensor, bias: &Tensor, sizes: ConvSizes) -> Result<Tensor> {
-    if !x.device().is_cpu() {
-        return fallback::conv(x, weight, bias, &sizes);
-    }
     x.contiguous()?.apply_op3(weight, bias, CustomOperator(ConvOp { sizes }))
 }
 

@@ -3,8 +3,8 @@
 //! stores two values per position: the input of the norm, and the result.
 
 use super::batch_norm::{BatchNorm, Statistics};
+use super::conv2d;
 use super::operator::{CpuOperator, CustomOperator, Gradients, Operand};
-use super::{conv2d, fallback};
 use crate::cpu::channel_stats::{ChannelMoments, Norm};
 use crate::cpu::direct_conv::{self, ConvSizes};
 use crate::cpu::tensor::Scalar;
@@ -21,9 +21,6 @@ pub fn conv_norm(
     sizes: ConvSizes,
     train: bool,
 ) -> Result<Tensor> {
-    if !x.device().is_cpu() {
-        return fallback_conv_norm(x, weight, bias, norm, &sizes, train);
-    }
     let x = x.contiguous()?;
     let channels = Tensor::cat(&[bias, &norm.weight, &norm.bias], 0)?;
     let statistics = Arc::new(OnceLock::new());
@@ -132,16 +129,4 @@ impl CpuOperator for ConvNormOp {
         let [of_x, of_weight] = conv2d::gradients(&self.sizes, &x, &weight, &z);
         Ok([of_x, of_weight, Some(of_channels)])
     }
-}
-
-/// [`conv_norm`] for devices without the kernels.
-pub fn fallback_conv_norm(
-    x: &Tensor,
-    weight: &Tensor,
-    bias: &Tensor,
-    norm: &BatchNorm,
-    s: &ConvSizes,
-    train: bool,
-) -> Result<Tensor> {
-    fallback::last(&norm.forward_fallback(&fallback::conv_first(x, weight, bias, s)?, train)?, x.rank())
 }

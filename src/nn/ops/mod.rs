@@ -1,6 +1,5 @@
 //! Operators with forward and backward passes: convolutions, batch norm, linear layers, dropout, resizing, recurrent
-//! layers. `operator` connects them to candle, `fallback` replaces them on devices without the kernels of `nn::cpu`,
-//! `gradcheck` has the finite differences that check gradients.
+//! layers. `operator` connects them to candle; `gradcheck` has the finite differences that check gradients.
 
 pub mod affine;
 pub mod batch_norm;
@@ -8,7 +7,6 @@ pub mod conv1d;
 pub mod conv2d;
 pub mod conv_norm;
 pub mod dropout;
-pub mod fallback;
 pub mod gradcheck;
 pub mod operator;
 pub mod recurrent;

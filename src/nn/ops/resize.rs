@@ -2,6 +2,8 @@
 //! transposition from channels first to channels last.
 
 use super::operator::{CpuOperator, CustomOperator, Gradients, Operand};
+use crate::card::frames;
+use crate::card::launch::is_on_device;
 use crate::cpu::frames::{FrameInterpolation, transpose};
 use crate::cpu::tensor::Scalar;
 use candle_core::{Result, Shape, Tensor};
@@ -21,10 +23,14 @@ pub fn linear(x: &Tensor, n_out: usize) -> Result<Tensor> {
         return Ok(x.clone());
     }
     let part = ResizedPart { frames: 0..n_out, n_in, n_out };
+    if is_on_device(x) {
+        return frames::interpolate(&x.t()?, &part)?.t();
+    }
     linear_part(&x.narrow(1, 0, part.needed().end)?, &part)
 }
 
 /// A range of frames of a linear interpolation from `n_in` frames to `n_out`.
+#[derive(Clone)]
 pub struct ResizedPart {
     pub frames: Range<usize>,
     pub n_in: usize,
@@ -52,6 +58,9 @@ pub fn linear_part(x: &Tensor, part: &ResizedPart) -> Result<Tensor> {
     if x.dim(1)? != needed.len() || needed.is_empty() || part.frames.is_empty() {
         candle_core::bail!("cannot interpolate frames {:?} from {} of {needed:?}", part.frames, x.dim(1)?);
     }
+    if is_on_device(x) {
+        return frames::interpolate(&x.t()?, part)?.t();
+    }
     let of = part.frames.clone().map(|i| {
         let (before, share) = part.source(i);
         (before - needed.start, (before - needed.start + 1).min(needed.len() - 1), share)
@@ -59,36 +68,21 @@ pub fn linear_part(x: &Tensor, part: &ResizedPart) -> Result<Tensor> {
     mix(x, None, FrameInterpolation { n_in: needed.len(), of: of.collect() })
 }
 
-/// Transposes the last two axes of `x` in memory, [B, C, T] to [B, T, C].
+/// Transposes the last two axes of `x`, [B, C, T] to [B, T, C], in memory, or as a view on a card.
 pub fn transposed(x: &Tensor) -> Result<Tensor> {
-    if !x.device().is_cpu() || x.rank() != 3 {
-        return x.t()?.contiguous();
+    if is_on_device(x) {
+        return x.t();
     }
     let none = Tensor::zeros(0, x.dtype(), x.device())?;
     x.contiguous()?.apply_op3(&none, &none, CustomOperator(TransposeOp))
 }
 
 fn mix(x: &Tensor, skip: Option<&Tensor>, interpolation: FrameInterpolation) -> Result<Tensor> {
-    if !x.device().is_cpu() {
-        return fallback_mix(x, skip, &interpolation);
-    }
     let x = x.contiguous()?;
     let skip = skip.map(Tensor::contiguous).transpose()?;
     let none = Tensor::zeros(0, x.dtype(), x.device())?;
     let op = MixOp { interpolation, plus: skip.is_some() };
     x.apply_op3(skip.as_ref().unwrap_or(&none), &none, CustomOperator(op))
-}
-
-/// [`mix`] with candle's operators, on any device.
-fn fallback_mix(x: &Tensor, skip: Option<&Tensor>, interpolation: &FrameInterpolation) -> Result<Tensor> {
-    let select = |of: Vec<u32>| x.contiguous()?.index_select(&Tensor::new(of, x.device())?, 1);
-    let frames =
-        |which: fn(&(usize, usize, f64)) -> usize| interpolation.of.iter().map(|of| which(of) as u32).collect();
-    let (a, b) = (select(frames(|of| of.0))?, select(frames(|of| of.1))?);
-    let share: Vec<f64> = interpolation.of.iter().map(|of| of.2).collect();
-    let share = Tensor::new(share, x.device())?.to_dtype(x.dtype())?.reshape((1, (), 1))?;
-    let mixed = (&a + (b - &a)?.broadcast_mul(&share)?)?;
-    skip.map_or(Ok(mixed.clone()), |skip| &mixed + skip)
 }
 
 struct MixOp {
@@ -159,9 +153,17 @@ mod tests {
     fn results_equal_those_of_candle() -> Result<()> {
         let (x, skip) = (pattern(&[2, 3, 5], 0.0)?, pattern(&[2, 7, 5], 1.0)?);
         let of = vec![(0, 1, 0.25), (1, 2, 0.5), (2, 2, 0.0), (0, 0, 0.0), (2, 1, 0.9), (1, 1, 0.3), (0, 2, 0.7)];
-        let interpolation = FrameInterpolation { n_in: 3, of };
-        let own = |v: &[Tensor]| mix(&v[0], Some(&v[1]), interpolation.clone());
-        let off = max_difference(&[x, skip], own, |v| fallback_mix(&v[0], Some(&v[1]), &interpolation))?;
+        let composed = |v: &[Tensor]| {
+            let frames = |which: fn(&(usize, usize, f64)) -> usize| {
+                let of: Vec<u32> = of.iter().map(|of| which(of) as u32).collect();
+                v[0].index_select(&Tensor::new(of, &Device::Cpu)?, 1)
+            };
+            let (a, b) = (frames(|of| of.0)?, frames(|of| of.1)?);
+            let share = Tensor::new(of.iter().map(|of| of.2).collect::<Vec<_>>(), &Device::Cpu)?.reshape((1, (), 1))?;
+            (&a + (b - &a)?.broadcast_mul(&share)?)? + &v[1]
+        };
+        let own = |v: &[Tensor]| mix(&v[0], Some(&v[1]), FrameInterpolation { n_in: 3, of: of.clone() });
+        let off = max_difference(&[x, skip], own, composed)?;
         assert!(off < 1e-12, "{off:e}");
         assert!(repeat_frames_and_add(&pattern(&[2, 3, 5], 0.0)?, &pattern(&[2, 5, 5], 0.0)?).is_err());
         Ok(())

@@ -14,7 +14,6 @@ pub mod lengths;
 pub mod lifter;
 pub mod observed;
 pub mod outliers;
-pub mod quality;
 pub mod reject;
 pub mod rest;
 pub mod stage;

@@ -61,8 +61,8 @@ pub(crate) fn match_units(
                 _ => (before[column] - INSERTED, Move::Insert),
             };
             if row > 0 && column > 0 {
-                let (text, heard) = (&text[column - 1], &recognised[row - 1]);
-                let similarity = similarity(&text.letters, &heard.letters);
+                let (text, recognised) = (&text[column - 1], &recognised[row - 1]);
+                let similarity = similarity(&text.letters, &recognised.letters);
                 let is_match = similarity >= MIN_SIMILARITY && may_match(column - 1, row - 1);
                 let n_letters = text.letters.len().min(MAX_LETTERS) as f32;
                 let gain = if is_match { LETTER * n_letters * similarity } else { -DIFFERENT };

@@ -59,18 +59,21 @@ impl Recogniser {
                 Some(request) => request,
                 none => none.insert(self.detect_language(&window.audio)?),
             };
-            let heard = self.transcribe(&window, request, 1, &[])?;
+            let transcribed = self.transcribe(&window, request, 1, &[])?;
             let [start_secs, end_secs] = window.secs();
             let recognised: Vec<RecognisedWord> =
-                heard.segments.into_iter().flat_map(|(segment, _)| segment.words).collect();
+                transcribed.segments.into_iter().flat_map(|(segment, _)| segment.words).collect();
             let n_words = MAX_WORDS + (MAX_RATE * (start_secs - matched_secs).max(0.0)) as usize;
             let candidates = text.candidates(start_secs, end_secs, n_words);
             let spoken = text.place(candidates, &recognised, &request.language, window.range.end == n_samples);
             self.force(&window, request, &mut text, &spoken)?;
             let last = text.found[..text.next].iter().flatten().last().map_or(0.0, |word| word.end_secs);
             let is_matched = last > start_secs;
-            let next_secs =
-                if is_matched { last.max(heard.next_secs.min(end_secs - TAIL_SECS)) } else { heard.next_secs };
+            let next_secs = if is_matched {
+                last.max(transcribed.next_secs.min(end_secs - TAIL_SECS))
+            } else {
+                transcribed.next_secs
+            };
             matched_secs = matched_secs.max(last);
             let earliest = window.range.start + RATE / 2;
             from = ((next_secs * RATE as f64) as usize).clamp(earliest, window.range.end.max(earliest));
@@ -141,9 +144,9 @@ impl TextWords<'_> {
     ) -> Vec<usize> {
         let start = candidates.start;
         let units = units_of(self.words[candidates.clone()].iter().map(String::as_str), language);
-        let heard = units_of(recognised.iter().map(|word| word.word.as_str()), language);
-        let pairs = match_units(&units, &heard, |unit, heard_unit| {
-            let word = &recognised[heard[heard_unit].word];
+        let recognised_units = units_of(recognised.iter().map(|word| word.word.as_str()), language);
+        let pairs = match_units(&units, &recognised_units, |unit, recognised_unit| {
+            let word = &recognised[recognised_units[recognised_unit].word];
             self.may_be_at(start + units[unit].word, word.start_secs, word.end_secs)
         });
         // First and last recognised word of each word of which at least half is matched.
@@ -151,15 +154,15 @@ impl TextWords<'_> {
         for pairs in pairs.chunk_by(|a, b| units[a.0].word == units[b.0].word) {
             let (word, [first, last]) = (units[pairs[0].0].word, [pairs[0].1, pairs[pairs.len() - 1].1]);
             if 2 * pairs.len() >= units.iter().filter(|unit| unit.word == word).count() {
-                matched.push((start + word, heard[first].word, heard[last].word));
+                matched.push((start + word, recognised_units[first].word, recognised_units[last].word));
             }
         }
         let mut spoken = Vec::new();
-        let (mut next, mut next_heard) = (start, 0);
+        let (mut next, mut next_recognised) = (start, 0);
         let end = (candidates.end, recognised.len(), recognised.len());
         for (word, first, last) in matched.iter().copied().chain([end].into_iter().filter(|_| is_last)) {
-            let n_heard = first.saturating_sub(next_heard);
-            let max_extra = EXTRA.0 * n_heard + EXTRA.1;
+            let n_recognised = first.saturating_sub(next_recognised);
+            let max_extra = EXTRA.0 * n_recognised + EXTRA.1;
             // Before the first match and after the last, the nearest words; between matches, all or none.
             let is_inner = next > start && word < candidates.end;
             match word.saturating_sub(next) {
@@ -174,7 +177,7 @@ impl TextWords<'_> {
                 let (word_text, start_secs, end_secs) = (self.words[word].clone(), from.start_secs, to.end_secs);
                 self.found[word] = Some(RecognisedWord { word: word_text, start_secs, end_secs, probability });
                 spoken.push(word);
-                (next, next_heard) = (word + 1, last + 1);
+                (next, next_recognised) = (word + 1, last + 1);
             }
         }
         self.next = self.next.max(next);

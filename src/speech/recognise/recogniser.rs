@@ -79,7 +79,7 @@ impl EncodedWindow {
 }
 
 /// Text of a window.
-pub(crate) struct HeardWindow {
+pub(crate) struct TranscribedWindow {
     /// Segments and their tokens.
     pub(crate) segments: Vec<(RecognisedSegment, Vec<u32>)>,
     /// Second of the sound at which the next window starts.
@@ -132,18 +132,18 @@ impl Recogniser {
                 Some(request) => request,
                 none => none.insert(self.detect_language(&window.audio)?),
             };
-            let heard = self.transcribe(&window, request, options.beam, &previous)?;
-            for (segment, tokens) in heard.segments {
+            let transcribed = self.transcribe(&window, request, options.beam, &previous)?;
+            for (segment, tokens) in transcribed.segments {
                 if spans.overlap(segment.start_secs, segment.end_secs) {
                     segments.push(segment);
                     previous.extend(tokens);
                 }
             }
-            if heard.temperature > MAX_PROMPT_TEMPERATURE {
+            if transcribed.temperature > MAX_PROMPT_TEMPERATURE {
                 previous.clear();
             }
             previous.drain(..previous.len().saturating_sub(self.network.config().max_tokens));
-            let next = ((heard.next_secs * RATE as f64) as usize / HOP * HOP).min(window.range.end);
+            let next = ((transcribed.next_secs * RATE as f64) as usize / HOP * HOP).min(window.range.end);
             from = next.max(window.range.start + HOP);
             progress(from as f64 / RATE as f64);
         }
@@ -158,7 +158,7 @@ impl Recogniser {
         request: &RecognitionRequest,
         beam: usize,
         previous: &[u32],
-    ) -> Result<HeardWindow> {
+    ) -> Result<TranscribedWindow> {
         let decoder = WindowDecoder {
             tokenizer: &self.tokenizer,
             rules: &self.rules,
@@ -170,7 +170,7 @@ impl Recogniser {
         let temperature = decoded.temperature;
         let [start_secs, end_secs] = window.secs();
         if decoded.is_silence() || decoded.is_repetitive() {
-            return Ok(HeardWindow { segments: Vec::new(), next_secs: end_secs, temperature });
+            return Ok(TranscribedWindow { segments: Vec::new(), next_secs: end_secs, temperature });
         }
         let text = split_at_timestamps(&decoded.tokens, self.tokenizer.timestamp_begin(), end_secs - start_secs);
         let WindowText { phrases, next_secs, is_complete } = text;
@@ -195,7 +195,7 @@ impl Recogniser {
         }
         // The end of the last word before its correction, which must not be recognised again.
         let next_secs = if is_complete || last_secs <= 0.0 { next_secs } else { last_secs };
-        Ok(HeardWindow { segments, next_secs: start_secs + next_secs, temperature })
+        Ok(TranscribedWindow { segments, next_secs: start_secs + next_secs, temperature })
     }
 
     /// Encodes a window; `spans` silence the rest.

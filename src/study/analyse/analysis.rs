@@ -1,7 +1,6 @@
 //! Analysis of a study: exclusions, every task with and without them, registration status, notes.
 
 use super::exclusion::exclude;
-use super::methods::methods;
 use super::registration::{Registration, judge};
 use super::result::{StatisticSettings, StudyAnalysis, TaskAnalysis};
 use super::task::task;
@@ -49,12 +48,10 @@ pub fn analyse(
         tasks,
         without_exclusions,
         notes: Vec::new(),
-        methods: String::new(),
     };
     analysis.notes = registration.map(|registration| registration.notes.clone()).unwrap_or_default();
     let more = notes(&analysis, read, registration);
     analysis.notes.extend(more);
-    analysis.methods = methods(&analysis);
     Ok(analysis)
 }
 

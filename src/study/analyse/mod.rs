@@ -1,11 +1,10 @@
 //! Analysis of a study's votes. `votes` reads them, `exclusion` applies the exclusion rules, `outcome` converts
 //! responses to scores, `share` and `pair` test them with `stats`, `task` and `analysis` collect everything in a
-//! `result`, which `conclusions`, `methods`, `text` and `page` present.
+//! `result`, which `conclusions`, `text` and `page` present.
 
 pub mod analysis;
 pub mod conclusions;
 pub mod exclusion;
-pub mod methods;
 pub mod outcome;
 pub mod page;
 pub mod pair;

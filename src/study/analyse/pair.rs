@@ -7,16 +7,12 @@ use super::statistic::{IntervalEstimate, StatisticMethod, StatisticOrigin, Stati
 use crate::plan::TaskDesign;
 use crate::stats::bradley_terry::{self, PairedVote, elo, strength_intervals};
 use crate::stats::cluster::crossed::{crossed_difference, crossed_estimate};
-use crate::stats::cluster::sign_flips::sign_flip_p;
 use crate::stats::cluster::votes::{ClipVote, participant_differences, participant_means};
 use crate::stats::estimate::StatisticsError;
 use crate::stats::rank::{friedman, median_interval, signed_rank};
 use crate::vote::{Response, StudyVote};
 use orator_base::math::order::Ordered;
 use std::collections::BTreeSet;
-
-/// Maximum number of sign-flip draws per pair.
-const MAX_PAIR_DRAWS: usize = 2000;
 
 /// Analyses all pairs of `conditions` that votes compare; differences are first less second.
 pub fn pairs(
@@ -92,10 +88,6 @@ fn compared_pair(
     let mut found = StatisticSet::default();
     if let Some(estimate) = found.ok_or_record(StatisticMethod::Crossed, crossed_estimate(differences)) {
         found.add_estimate(StatisticMethod::Crossed, &estimate, 0.0, settings.confidence);
-        if settings.n_draws > 0 {
-            let n_draws = settings.n_draws.min(MAX_PAIR_DRAWS);
-            found.add_test(StatisticMethod::SignFlip, sign_flip_p(differences, 0.0, n_draws, settings.seed));
-        }
     }
     let all: Vec<f64> = differences.iter().map(|vote| vote.score).collect();
     let ranked = |values: &[f64]| signed_rank(values).map(|test| test.p);

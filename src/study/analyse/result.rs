@@ -1,4 +1,4 @@
-//! Result of an analysis, the source of the page, the summary and the methods paragraph. Every statistic states its
+//! Result of an analysis, the source of the page and the summary. Every statistic states its
 //! method, whether it was registered before the data were seen, and whether it treats votes as independent.
 
 use super::exclusion::ExclusionSummary;
@@ -25,8 +25,6 @@ pub struct StudyAnalysis {
     pub tasks: Vec<TaskAnalysis>,
     pub without_exclusions: Vec<TaskAnalysis>,
     pub notes: Vec<String>,
-    /// Paragraph for the methods section of a paper.
-    pub methods: String,
 }
 
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -66,7 +64,7 @@ pub struct StatisticSettings {
     pub confidence: f64,
     /// Equivalence bound as a proportion: 0.1 is 10 percentage points.
     pub bound: f64,
-    /// Number of sign-flip draws and of bootstrap draws of participants; 0 skips both.
+    /// Number of bootstrap draws of participants; 0 skips them.
     pub n_draws: usize,
     pub seed: u64,
     pub with_models: bool,

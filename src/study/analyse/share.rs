@@ -4,7 +4,7 @@ use super::outcome::{BinaryVote, distinct};
 use super::result::{ModelEstimate, ShareAnalysis, ShareMeasure, StatisticSettings, TestOutcome};
 use super::statistic::{StatisticMethod, StatisticSet, TestResult};
 use crate::stats::cluster::crossed::crossed_estimate;
-use crate::stats::cluster::sign_flips::{SideBlock, side_p, sign_flip_p};
+use crate::stats::cluster::sides::{SideBlock, side_p};
 use crate::stats::cluster::votes::{ClipVote, participant_estimate, participant_sd};
 use crate::stats::glmm::fit::MixedLogit;
 use crate::stats::proportion::{BinomialCount, Equivalence};
@@ -60,10 +60,6 @@ fn add_clustered(found: &mut StatisticSet, cell: &ShareCell, votes: &[ClipVote],
         found.add_estimate(StatisticMethod::Crossed, &estimate, CHANCE, confidence);
         let equivalence = Equivalence::of_estimate(&estimate, CHANCE, settings.bound);
         found.add_equivalence(StatisticMethod::Crossed, equivalence);
-        if settings.n_draws > 0 {
-            let flips = sign_flip_p(votes, CHANCE, settings.n_draws, settings.seed);
-            found.add_test(StatisticMethod::SignFlip, flips);
-        }
     }
     if let Some(blocks) = side_blocks(&cell.votes) {
         found.add_test(StatisticMethod::Sides, side_p(&blocks));

@@ -10,8 +10,6 @@ use serde::Serialize;
 pub enum StatisticMethod {
     /// Crossed standard error and t distribution: generalises to other participants and other clips.
     Crossed,
-    /// Sign flips of all votes of a participant or of a clip.
-    SignFlip,
     /// Exact test over the plan's random assignment of sides.
     Sides,
     /// t test of participants' means, with fixed clips.
@@ -43,7 +41,6 @@ impl StatisticMethod {
     pub fn name(self) -> &'static str {
         match self {
             Self::Crossed => "participants and clips crossed",
-            Self::SignFlip => "sign flips of participants and clips",
             Self::Sides => "exact permutation of sides",
             Self::Participants => "t test of participants' means",
             Self::MixedModel => "mixed logistic regression",

@@ -255,7 +255,7 @@ impl Default for ExclusionRules {
 pub struct AnalysisSettings {
     /// Significance level; confidence intervals cover 1 - `alpha`.
     pub alpha: f64,
-    /// Number of sign-flip draws and of bootstrap draws of participants.
+    /// Number of bootstrap draws of participants.
     pub resamples: usize,
     pub seed: u64,
 }

@@ -3,11 +3,11 @@
 //! Chatbot Arena (Chiang et al. 2024). A tie counts as half a win for each side, a graded preference as its share.
 //! Without a prior, strengths are finite only if every condition reaches every other by a chain of wins (Ford 1957).
 
-use super::cluster::sign_flips::rng_of_draw;
 use super::estimate::{ConfidenceInterval, StatisticsError, at_least, interval_of_draws, within};
 use ndarray::{Array1, Array2, Axis};
 use orator_base::math::cholesky;
-use rand::Rng;
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 
@@ -93,7 +93,9 @@ pub fn strength_intervals(
     votes.iter().for_each(|vote| of_participants.entry(vote.participant).or_default().push(*vote));
     let ballots: Vec<Vec<PairedVote>> = of_participants.into_values().collect();
     let fit = |draw: u64| {
-        let mut rng = rng_of_draw(seed, draw);
+        // Each draw has its own stream, so results do not depend on the number of threads.
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        rng.set_stream(draw);
         let n = ballots.len() as u64;
         let drawn = (0..n).flat_map(|_| &ballots[rng.random_range(0..n) as usize]).copied();
         strengths(&drawn.collect::<Vec<_>>(), n_conditions).ok()

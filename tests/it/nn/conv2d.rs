@@ -1,10 +1,10 @@
 //! Convolutions in two dimensions.
 
+use super::composed;
 use candle_core::{Result, Tensor};
 use orator_nn::cpu::axis::ConvAxis;
 use orator_nn::cpu::direct_conv::ConvSizes;
 use orator_nn::ops::conv2d::{conv, same, valid};
-use orator_nn::ops::fallback;
 use orator_nn::ops::gradcheck::{check_thread_independence, max_difference, pattern, worst};
 
 /// Input, weight and bias of a batch of two.
@@ -34,21 +34,21 @@ fn results_equal_those_of_candle_and_gradients_are_correct() -> Result<()> {
     ] {
         let s = ConvSizes { batch: 2, n_in, n_out, axes };
         let own = |v: &[Tensor]| conv(&v[0], &v[1], &v[2], s);
-        let (off, error) = (max_difference(&inputs(&s)?, own, |v| by_fallback(v, &s))?, worst(&inputs(&s)?, own)?);
+        let (off, error) = (max_difference(&inputs(&s)?, own, |v| by_candle(v, &s))?, worst(&inputs(&s)?, own)?);
         assert!(off < 1e-12 && error < 1e-7, "{s:?}: {off:e} {error:e}");
     }
     Ok(())
 }
 
-fn by_fallback(v: &[Tensor], s: &ConvSizes) -> Result<Tensor> {
-    fallback::conv(&v[0], &v[1], &v[2], s)
+fn by_candle(v: &[Tensor], s: &ConvSizes) -> Result<Tensor> {
+    composed::conv(&v[0], &v[1], &v[2], s)
 }
 
 #[test]
 fn panels_of_every_width_are_correct() -> Result<()> {
     for (n_in, n_out) in [(70, 96), (5, 113)] {
         let s = ConvSizes { batch: 2, n_in, n_out, axes: [ConvAxis::same(6, 4, 2), ConvAxis::same(3, 3, 2)] };
-        let off = max_difference(&inputs(&s)?, |v| conv(&v[0], &v[1], &v[2], s), |v| by_fallback(v, &s))?;
+        let off = max_difference(&inputs(&s)?, |v| conv(&v[0], &v[1], &v[2], s), |v| by_candle(v, &s))?;
         assert!(off < 1e-9, "{n_in} to {n_out}: {off:e}");
     }
     Ok(())

@@ -1,6 +1,8 @@
 //! Layers and networks against plain arithmetic and finite differences.
 
 mod adversarial;
+mod card;
+mod composed;
 mod conv2d;
 mod conv_norm;
 mod decoder;
@@ -12,3 +14,4 @@ mod score_maps;
 mod spin_pool;
 mod transformer;
 mod weights;
+mod winograd;

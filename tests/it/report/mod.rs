@@ -1,8 +1,7 @@
-//! HTML pages and contact sheets.
+//! HTML pages.
 
 pub(crate) mod evaluate_page;
 pub(crate) mod forest;
 pub(crate) mod report;
-pub(crate) mod sheet;
 pub(crate) mod sliders;
 pub(crate) mod videos;

@@ -179,7 +179,8 @@ fn assert_starts_from_nearest_speaker(both: &Path, new: &Dataset) {
         recipe::settings(&settings(), &TrainingMaterial::measure(&[new], 32), InitialWeights::SeveralSpeakers).unwrap();
     let metadata = speakers::metadata(new, &normal, &loader, &of, 1).unwrap();
     let windows = JoinedWindows::new(vec![loader]);
-    let trainer = PretrainedModel::read(both).unwrap().trainer(vec![metadata], of, None, &windows).unwrap();
+    let trainer =
+        PretrainedModel::read(both).unwrap().trainer(vec![metadata], of, None, &windows, &orator::Device::Cpu).unwrap();
     let batch = windows.batch_changed(&(0..windows.len()).collect::<Vec<_>>(), &[]).unwrap();
     let initial_error = trainer.error(&batch).unwrap();
 

@@ -1,7 +1,8 @@
 //! Exponential moving average (EMA) of the weights over the steps (Polyak & Juditsky 1992; Tarvainen & Valpola 2017).
 //! It fluctuates less than the weights of the last step, and is used for validation and generation.
 
-use candle_core::{CpuStorage, InplaceOp2, Layout, Result};
+use candle_core::{CpuStorage, InplaceOp2, Layout, Result, Tensor};
+use orator_nn::card::launch::{address, is_on_device, run};
 use orator_nn::cpu::spin_pool::parallel_for;
 use orator_nn::params::Params;
 use std::sync::Mutex;
@@ -9,16 +10,29 @@ use std::sync::Mutex;
 /// Elements per task.
 const GRAIN: usize = 32 * 1024;
 
-/// Updates each tensor of `mean` with the tensor of the same name in `now`: decay x mean + (1 - decay) x now. The decay
-/// after `step` steps is at most (1 + step) / (10 + step), so that the initial weights soon lose their influence.
-pub fn update(mean: &Params, now: &Params, decay: f64, step: usize) -> Result<()> {
-    let decay = decay.min((1.0 + step as f64) / (10.0 + step as f64));
-    for ((_, mean), (_, now)) in mean.all().zip(now.all()) {
-        if mean.device().is_cpu() {
-            mean.inplace_op2(now.as_tensor(), &EmaUpdate(decay as f32))?;
-        } else {
-            mean.set(&((mean.as_detached_tensor() * decay)? + (now.as_detached_tensor() * (1.0 - decay))?)?)?;
+/// Table for [`update`] of tensors on a card: both addresses and the length of every part of a tensor; `None` on the CPU.
+pub fn parts(mean: &Params, now: &Params) -> Result<Option<Tensor>> {
+    let mut parts = Vec::new();
+    for ((_, mean), (_, now)) in mean.all().zip(now.all()).filter(|((_, mean), _)| is_on_device(mean)) {
+        let (addresses, size) = ([address(mean)?, address(now)?], mean.dtype().size_in_bytes());
+        for first in (0..mean.elem_count()).step_by(GRAIN) {
+            parts.extend(addresses.map(|address| address as i64 + (first * size) as i64));
+            parts.push(GRAIN.min(mean.elem_count() - first) as i64);
         }
+    }
+    if parts.is_empty() { Ok(None) } else { Tensor::new(parts, mean.device()).map(Some) }
+}
+
+/// Updates each tensor of `mean` with the tensor of the same name in `now`: decay x mean + (1 - decay) x now. The decay
+/// after `step` steps is at most (1 + step) / (10 + step), so that the initial weights soon lose their influence. `parts`
+/// lists tensors on a card.
+pub fn update(mean: &Params, now: &Params, parts: Option<&Tensor>, decay: f64, step: usize) -> Result<()> {
+    let decay = decay.min((1.0 + step as f64) / (10.0 + step as f64));
+    if let (Some(parts), Some((_, first))) = (parts, mean.all().next()) {
+        return run("average", &[Some(parts), Some(first.as_tensor())], &[], &[decay], parts.elem_count() / 3);
+    }
+    for ((_, mean), (_, now)) in mean.all().zip(now.all()) {
+        mean.inplace_op2(now.as_tensor(), &EmaUpdate(decay as f32))?;
     }
     Ok(())
 }
@@ -60,9 +74,9 @@ mod tests {
         let (mut mean, mut now) = (Params::frozen(), Params::new(1));
         mean.trainable("w", &[3], Init::Constant(0.0))?;
         now.trainable("w", &[3], Init::Constant(2.0))?;
-        update(&mean, &now, 0.9, 1_000)?;
+        update(&mean, &now, None, 0.9, 1_000)?;
         assert!((mean.tensors()?["w"].to_vec1::<f32>()?[0] - 0.2).abs() < 1e-6);
-        update(&mean, &now, 0.9, 0)?;
+        update(&mean, &now, None, 0.9, 0)?;
         // At step 0 the decay is (1 + 0) / (10 + 0) = 0.1: 0.1 x 0.2 + 0.9 x 2.
         assert!((mean.tensors()?["w"].to_vec1::<f32>()?[2] - (0.02 + 1.8)).abs() < 1e-6);
         Ok(())

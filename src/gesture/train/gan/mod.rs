@@ -6,6 +6,7 @@ pub mod average;
 pub mod block_metrics;
 pub mod interval_rows;
 pub mod losses;
+mod prefetch;
 pub mod pretrained;
 mod rates;
 pub mod recipe;

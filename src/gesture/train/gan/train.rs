@@ -1,14 +1,14 @@
 //! Training of a speaker's generator against the motion discriminator. The same dataset, settings and seed give the
 //! same checkpoints, even if the training was interrupted: the windows of a step depend only on the seed and the step,
-//! and everything else is stored in the checkpoint. While a step runs, a separate thread reads the batch of the next
-//! step.
+//! and everything else is stored in the checkpoint. While a step runs, other threads read the batches of the next steps.
 
+use super::prefetch::{BatchPrefetcher, prefetch};
 use super::pretrained::PretrainedModel;
 use super::recipe::{self, InitialWeights, TrainingMaterial};
 use super::score::Validation;
-use super::step::{GanTrainer, Losses, TrainerState};
+use super::step::{GanTrainer, Losses, StepBatch, TrainerState};
 use super::validate::ValidationIntervals;
-use super::windows::{JoinedWindows, WindowBatch, WindowLoader, needed};
+use super::windows::{JoinedWindows, WindowLoader, needed};
 use super::{augment, speakers, words};
 pub use crate::generate::model::BEST;
 use crate::generate::model::SpeakerMetadata;
@@ -29,9 +29,8 @@ use orator_formats::word_vectors::WordVectors;
 use orator_nn::cpu::spin_pool::with_spinning_workers;
 use orator_nn::gan::generator::FRAMES_MULTIPLE;
 use orator_nn::weights::Contents;
-use rayon::ThreadPoolBuilder;
+use std::ops::Range;
 use std::path::Path;
-use std::sync::mpsc::{self, Receiver, Sender};
 use std::time::{Duration, Instant};
 
 /// Device of a training, and what a new training is initialised from.
@@ -48,6 +47,9 @@ impl Default for TrainingStart<'_> {
         Self { device: &Device::Cpu, from: None, vectors: None }
     }
 }
+
+/// Largest number of threads that read batches for a card.
+const MAX_READERS: usize = 8;
 
 /// Trains on `dataset` until `requested.steps`, resuming from the newest checkpoint in `folder` if there is one; then
 /// the settings of that checkpoint apply, and differences are reported.
@@ -149,22 +151,31 @@ pub fn train_with_callback(
         let material = TrainingMaterial::measure(datasets, window_frames);
         report_settings(&trainer, &loader, &material, pretrained_model.is_some(), progress)?;
     }
-    let settings = trainer.settings.clone();
+    let (settings, network, device) =
+        (trainer.settings.clone(), trainer.speakers.network().clone(), trainer.device().clone());
     let batch = |step: usize| {
         let which = sample_windows(settings.seed, step, settings.batch, loader.len());
-        loader.batch_changed(&which, &augment::changes(&settings, step, loader.fps()))
+        let windows = loader.batch_changed(&which, &augment::changes(&settings, step, loader.fps()))?;
+        let batch = StepBatch::draw(&windows, &settings, &network, step, &device)?;
+        // The copies to a card are complete when another thread uses them.
+        device.synchronize()?;
+        Ok(batch)
     };
-    let (outcome, waiting) = prefetch(settings.steps, &batch, |batches| {
+    // On the CPU all threads but one are busy with the steps; a card leaves them idle.
+    let n_readers = if device.is_cpu() { 1 } else { rayon::current_num_threads().min(MAX_READERS) };
+    let (outcome, waiting) = prefetch(settings.steps, n_readers, &batch, |batches| {
         let mut training = GanTraining {
             names: trainer.speakers.names(),
             is_pretrained: pretrained_model.is_some(),
             trainer: &mut trainer,
             batches,
             held_out: &held_out,
+            last: None,
             stepping: Duration::ZERO,
             waiting: Duration::ZERO,
         };
-        let outcome = with_spinning_workers(|| epochs::run(&mut training, folder, progress, validated))?;
+        let mut run = || epochs::run(&mut training, folder, progress, validated);
+        let outcome = if device.is_cpu() { with_spinning_workers(run) } else { run() }?;
         Ok((outcome, training.waiting.as_secs_f64() / training.stepping.as_secs_f64().max(1e-9)))
     })?;
     Ok(TrainingOutcome { n_examples: loader.len(), n_parameters: trainer.n_parameters(), waiting, ..outcome })
@@ -197,28 +208,32 @@ fn secs_a_step(trainer: &GanTrainer, loader: &JoinedWindows) -> Result<Option<f6
     let mut trial = GanTrainer::new(trainer.speakers.all().to_vec(), trainer.settings.clone(), trainer.device())?;
     let which = sample_windows(trial.settings.seed, 0, trial.settings.batch, loader.len());
     let batch = loader.batch_changed(&which, &[])?;
-    with_spinning_workers(|| {
+    let is_cpu = trial.device().is_cpu();
+    let mut measure = || {
         trial.step(&batch)?;
         let start = Instant::now();
         trial.step(&batch)?;
         trial.step(&batch)?;
         Ok(Some(start.elapsed().as_secs_f64() / 2.0))
-    })
+    };
+    if is_cpu { with_spinning_workers(measure) } else { measure() }
 }
 
-struct GanTraining<'a, 'b> {
+struct GanTraining<'a, 'b, 'c> {
     names: String,
     /// Whether the training was initialised from another model in this run.
     is_pretrained: bool,
     trainer: &'a mut GanTrainer,
-    batches: &'a mut BatchPrefetcher<'b>,
+    batches: &'a mut BatchPrefetcher<'b, 'c, StepBatch>,
     held_out: &'a ValidationIntervals,
+    /// Last losses that were read.
+    last: Option<Losses>,
     /// Total time of the steps, including the wait for their batches.
     stepping: Duration,
     waiting: Duration,
 }
 
-impl ValidatedTraining for GanTraining<'_, '_> {
+impl ValidatedTraining for GanTraining<'_, '_, '_> {
     type Validation = Validation;
 
     fn names(&self) -> (&str, &'static str) {
@@ -226,8 +241,8 @@ impl ValidatedTraining for GanTraining<'_, '_> {
     }
 
     fn schedule(&self) -> EpochSchedule {
-        let GanSettings { steps, epoch_steps, checkpoint_every, patience, .. } = self.trainer.settings;
-        EpochSchedule { steps, epoch_steps, checkpoint_every, patience }
+        let GanSettings { steps, epoch_steps, checkpoint_every, patience, decay_share, .. } = self.trainer.settings;
+        EpochSchedule { steps, epoch_steps, checkpoint_every, patience, decay_share }
     }
 
     fn is_pretrained(&self) -> bool {
@@ -242,16 +257,32 @@ impl ValidatedTraining for GanTraining<'_, '_> {
         &mut self.trainer.best
     }
 
+    fn decay(&self) -> Option<&Range<usize>> {
+        self.trainer.decay.as_ref()
+    }
+
+    fn set_decay(&mut self, decay: Range<usize>) {
+        self.trainer.decay = Some(decay);
+    }
+
     fn step(&mut self) -> Result<StepReport> {
         let before = Instant::now();
         let batch = self.batches.take(self.trainer.step)?;
         self.waiting += before.elapsed();
-        let losses = self.trainer.step(&batch)?;
+        self.trainer.advance(&batch, &mut |_| ())?;
+        let (step, schedule) = (self.trainer.step, self.schedule());
+        let read_every = [epochs::LOG_EVERY, schedule.epoch_steps, schedule.checkpoint_every, schedule.steps];
+        if self.trainer.device().is_cpu() || self.last.is_none() || read_every.iter().any(|n| step.is_multiple_of(*n)) {
+            for (step, losses) in self.trainer.take_losses()? {
+                resume::ensure_not_diverged(step, &losses.named(), losses.gradient_norm)?;
+                self.last = Some(losses);
+            }
+        }
         self.stepping += before.elapsed();
-        let Losses { l1, adversarial, discriminator, gradient_norm, .. } = losses;
-        resume::ensure_not_diverged(self.trainer.step, &losses.named(), gradient_norm)?;
+        let losses = self.last.context("a step without losses")?;
+        let Losses { l1, adversarial, discriminator, .. } = losses;
         let summary = format!("L1 {l1:.3} adv {adversarial:.3} D {discriminator:.3}");
-        Ok(StepReport { line: log::line(self.trainer.step, &losses), summary })
+        Ok(StepReport { line: log::line(step, &losses), summary })
     }
 
     fn validate(&self) -> Result<Validation> {
@@ -315,84 +346,4 @@ fn check(settings: &GanConfig) -> Result<()> {
         "gan.checkpoint_every, gan.epoch_steps and gan.stride_frames must be at least 1"
     );
     Ok(())
-}
-
-pub type BatchOfStep<'a> = &'a (dyn Fn(usize) -> Result<WindowBatch> + Sync);
-
-pub struct BatchPrefetcher<'a> {
-    batch: BatchOfStep<'a>,
-    /// Steps of the training; nothing is prefetched after the last.
-    n_steps: usize,
-    requests: Sender<usize>,
-    results: Receiver<(usize, Result<WindowBatch>)>,
-    /// Step whose batch is being prefetched.
-    pending: Option<usize>,
-}
-
-impl BatchPrefetcher<'_> {
-    /// Returns the batch of `step`, and starts to prefetch that of the next step.
-    pub fn take(&mut self, step: usize) -> Result<WindowBatch> {
-        let prefetched = match self.pending.take() {
-            Some(pending) => Some(self.results.recv().context("the thread that loads batches has stopped")?)
-                .filter(|_| pending == step)
-                .map(|(_, batch)| batch),
-            None => None,
-        };
-        let batch = prefetched.unwrap_or_else(|| (self.batch)(step))?;
-        if step + 1 < self.n_steps && self.requests.send(step + 1).is_ok() {
-            self.pending = Some(step + 1);
-        }
-        Ok(batch)
-    }
-}
-
-/// Calls `work` with prefetched batches, which `batch` reads, of a training of `n_steps`.
-pub fn prefetch<R>(
-    n_steps: usize,
-    batch: BatchOfStep,
-    work: impl FnOnce(&mut BatchPrefetcher) -> Result<R>,
-) -> Result<R> {
-    // One reader thread, since the others are busy with the step.
-    let reader =
-        ThreadPoolBuilder::new().num_threads(1).build().context("cannot start the thread that loads batches")?;
-    std::thread::scope(|scope| {
-        let (requests, requested) = mpsc::channel();
-        let (sender, results) = mpsc::channel();
-        scope.spawn(move || {
-            for step in requested {
-                if sender.send((step, reader.install(|| batch(step)))).is_err() {
-                    break;
-                }
-            }
-        });
-        work(&mut BatchPrefetcher { batch, n_steps, requests, results, pending: None })
-    })
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use candle_core::Tensor;
-    use std::sync::atomic::{AtomicUsize, Ordering};
-
-    #[test]
-    fn every_step_gets_its_own_batch_and_none_is_read_after_the_last() {
-        let last = AtomicUsize::new(0);
-        let batch = |step: usize| -> Result<WindowBatch> {
-            last.fetch_max(step, Ordering::Relaxed);
-            anyhow::ensure!(step != 6, "step 6 cannot be read");
-            let tensor = || Tensor::full(step as f32, 1, &Device::Cpu);
-            let speakers = vec![step as u32];
-            Ok(WindowBatch { mels: tensor()?, poses: tensor()?, mask: tensor()?, speakers, words: None })
-        };
-        let taken = prefetch(10, &batch, |batches| {
-            // A step may be repeated or skipped.
-            [0, 1, 2, 2, 3, 5].into_iter().map(|step| Ok(batches.take(step)?.speakers[0])).collect::<Result<Vec<u32>>>()
-        });
-        assert_eq!(taken.unwrap(), [0, 1, 2, 2, 3, 5]);
-        let failed = prefetch(10, &batch, |batches| batches.take(5).and_then(|_| batches.take(6)).map(drop));
-        assert_eq!(failed.unwrap_err().to_string(), "step 6 cannot be read");
-        prefetch(10, &batch, |batches| batches.take(9).map(drop)).unwrap();
-        assert_eq!(last.load(Ordering::Relaxed), 9);
-    }
 }

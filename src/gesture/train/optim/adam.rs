@@ -1,17 +1,20 @@
 //! Adam (Kingma & Ba 2015), or AMSGrad (Reddi et al. 2018), as a candle optimiser with moments that can be saved and
 //! gradient norm clipping. Each tensor is updated in one pass, bit for bit the same for any number of threads.
 
-use super::adam_fallback::{self, AdamScalars};
+use super::device_adam::DeviceAdam;
 use anyhow::{Context, ensure};
 use candle_core::backprop::GradStore;
 use candle_core::{CpuStorage, Device, InplaceOp2, Layout, Result, Tensor, Var};
 use candle_nn::Optimizer;
+use orator_nn::card::launch::{is_on_device, read};
 use orator_nn::cpu::spin_pool::{parallel_for, parallel_map};
 use orator_nn::params::Params;
 use std::cell::RefCell;
 use std::collections::BTreeMap;
 use std::sync::Mutex;
 
+/// Suffixes of the moments in a checkpoint.
+const KINDS: [&str; 3] = ["first", "second", "largest"];
 /// Elements per task; fixed, so that results do not depend on the number of threads.
 const GRAIN: usize = 32 * 1024;
 
@@ -43,6 +46,8 @@ pub struct Adam {
     /// Norm of the last gradient, before clipping.
     norm: f64,
     slots: Vec<AdamSlot>,
+    /// Moments of tensors on a card.
+    device: Option<DeviceAdam>,
 }
 
 struct AdamSlot {
@@ -50,16 +55,26 @@ struct AdamSlot {
     var: Var,
     /// Factors of the learning rate and of the weight decay for this tensor.
     factors: [f64; 2],
-    moments: MomentStorage,
+    moments: RefCell<AdamMoments>,
 }
 
-enum MomentStorage {
-    Cpu(RefCell<AdamMoments>),
-    /// Tensors on another device, updated by the fallback.
-    Device(adam_fallback::DeviceMoments),
+/// Factors of a gradient and of an update, equal for all elements of a tensor.
+#[derive(Clone, Copy)]
+struct AdamScalars {
+    beta1: f32,
+    beta2: f32,
+    eps: f32,
+    /// Factor that clips the gradients.
+    scale: f32,
+    /// Learning rate divided by the bias correction of the first moment.
+    rate: f32,
+    /// Square root of the inverse bias correction of the second moment.
+    correction: f32,
+    /// Factor of the weights that applies the weight decay.
+    keep: f32,
 }
 
-/// First moment, second moment, largest second moment (empty without AMSGrad).
+/// First moment, second moment, largest second moment (empty without AMSGrad); all empty on a card.
 #[derive(Clone, Default)]
 struct AdamMoments {
     first: Vec<f32>,
@@ -76,12 +91,22 @@ impl Adam {
     /// Like `new`, with factors of the learning rate and of the weight decay for each tensor by its name; a tensor whose
     /// learning rate has the factor 0 is frozen.
     pub fn with_rates(params: &Params, config: Config, factors: impl Fn(&str) -> [f64; 2]) -> Result<Self> {
-        let (names, vars): (Vec<&str>, Vec<Var>) = params.trainables().map(|(name, var)| (name, var.clone())).unzip();
-        let mut adam = <Self as Optimizer>::new(vars, config)?;
-        for (slot, name) in adam.slots.iter_mut().zip(names) {
-            (slot.name, slot.factors) = (name.to_owned(), factors(name));
-        }
-        Ok(adam)
+        let slot = |(name, var): (&str, &Var)| (name.to_owned(), var.clone(), factors(name));
+        Self::of(params.trainables().map(slot).collect(), config)
+    }
+
+    fn of(tensors: Vec<(String, Var, [f64; 2])>, config: Config) -> Result<Self> {
+        let is_on_device = tensors.first().is_some_and(|(_, var, _)| is_on_device(var));
+        let on_device = || tensors.iter().map(|(_, var, factors)| (var.clone(), *factors)).collect();
+        let device = if is_on_device { Some(DeviceAdam::new(on_device(), &config)?) } else { None };
+        let slot = |(name, var, factors): (String, Var, [f64; 2])| {
+            let zeros = vec![0.0; if is_on_device { 0 } else { var.elem_count() }];
+            let largest = if config.amsgrad { zeros.clone() } else { Vec::new() };
+            let moments = RefCell::new(AdamMoments { first: zeros.clone(), second: zeros, largest });
+            AdamSlot { name, var, factors, moments }
+        };
+        let slots = tensors.into_iter().map(slot).collect();
+        Ok(Self { config, learning_rate: 1e-3, step: 0, norm: 0.0, slots, device })
     }
 
     /// Runs one update at this learning rate; a tensor without a gradient is unchanged. Returns the gradient norm
@@ -92,14 +117,28 @@ impl Adam {
         Ok(self.norm)
     }
 
+    /// Runs one update with the gradients of `loss`, of tensors on a card; writes the gradient norm before clipping to
+    /// `norm` [1], without reading it.
+    pub fn minimise(&mut self, loss: &Tensor, learning_rate: f64, norm: &Tensor) -> Result<()> {
+        let Some(device) = &self.device else { candle_core::bail!("Adam: expected tensors on a card") };
+        device.add_gradients_of(loss)?;
+        self.step += 1;
+        device.update(&self.config, self.step, learning_rate, Some(norm))?;
+        Ok(())
+    }
+
     /// Moments and step count for a checkpoint: `<prefix><tensor>.first`, `.second`, `.largest`, and `<prefix>step`.
     pub fn tensors(&self, prefix: &str) -> Result<BTreeMap<String, Tensor>> {
         let mut tensors = BTreeMap::new();
         // f32, the only type in a checkpoint, represents two halves of 24 bits exactly.
         let halves = [(self.step >> 24) as f32, (self.step & 0xff_ffff) as f32];
         tensors.insert(format!("{prefix}step"), Tensor::new(&halves, &Device::Cpu)?);
-        for slot in &self.slots {
-            for (kind, tensor) in slot.kinds()? {
+        for (number, slot) in self.slots.iter().enumerate() {
+            let moments = match &self.device {
+                Some(device) => KINDS.into_iter().zip(device.moments(number)?).collect(),
+                None => slot.moments()?,
+            };
+            for (kind, tensor) in moments {
                 tensors.insert(format!("{prefix}{}.{kind}", slot.name), tensor);
             }
         }
@@ -114,22 +153,23 @@ impl Adam {
             Ok(tensor.flatten_all()?.to_vec1()?)
         };
         let halves = values(format!("{prefix}step"), 2)?;
-        for slot in &mut self.slots {
+        for (number, slot) in self.slots.iter_mut().enumerate() {
             let of_kind = |kind: &str, n: usize| match n {
                 0 => Ok(Vec::new()),
                 n => values(format!("{prefix}{}.{kind}", slot.name), n),
             };
-            match &mut slot.moments {
-                MomentStorage::Cpu(moments) => {
-                    let moments = moments.get_mut();
-                    *moments = AdamMoments {
-                        first: of_kind("first", moments.first.len())?,
-                        second: of_kind("second", moments.second.len())?,
-                        largest: of_kind("largest", moments.largest.len())?,
-                    };
-                }
-                MomentStorage::Device(moments) => moments.load(of_kind)?,
+            if let Some(device) = &self.device {
+                let n_kinds = if self.config.amsgrad { 3 } else { 2 };
+                let all = KINDS[..n_kinds].iter().map(|kind| of_kind(kind, slot.var.elem_count()));
+                device.set_moments(number, all.collect::<anyhow::Result<_>>()?)?;
+                continue;
             }
+            let moments = slot.moments.get_mut();
+            *moments = AdamMoments {
+                first: of_kind("first", moments.first.len())?,
+                second: of_kind("second", moments.second.len())?,
+                largest: of_kind("largest", moments.largest.len())?,
+            };
         }
         self.step = ((halves[0] as u64) << 24) + halves[1] as u64;
         Ok(())
@@ -141,12 +181,7 @@ impl Optimizer for Adam {
 
     /// Optimiser of unnamed tensors with learning rate 0.001.
     fn new(vars: Vec<Var>, config: Config) -> Result<Self> {
-        let slot = |var: Var| -> Result<AdamSlot> {
-            let moments = MomentStorage::zeros(&var, config.amsgrad)?;
-            Ok(AdamSlot { name: String::new(), var, factors: [1.0; 2], moments })
-        };
-        let slots = vars.into_iter().map(slot).collect::<Result<_>>()?;
-        Ok(Self { config, learning_rate: 1e-3, step: 0, norm: 0.0, slots })
+        Self::of(vars.into_iter().map(|var| (String::new(), var, [1.0; 2])).collect(), config)
     }
 
     fn learning_rate(&self) -> f64 {
@@ -159,6 +194,13 @@ impl Optimizer for Adam {
 
     fn step(&mut self, gradients: &GradStore) -> Result<()> {
         let learning_rate = self.learning_rate;
+        if let Some(device) = &self.device {
+            device.add(gradients)?;
+            let norm = device.update(&self.config, self.step + 1, learning_rate, None)?;
+            self.norm = f64::from(read(norm)?[0]);
+            self.step += u64::from(self.norm.is_finite());
+            return Ok(());
+        }
         let gradients: Vec<Option<Tensor>> = self
             .slots
             .iter()
@@ -166,11 +208,7 @@ impl Optimizer for Adam {
             .collect::<Result<_>>()?;
         let mut squares = 0.0;
         for gradient in gradients.iter().flatten() {
-            squares += if gradient.device().is_cpu() {
-                orator_nn::cpu::tensor::read::<f32, _>(gradient, |g| Ok(sum_of_squares(g)))?
-            } else {
-                adam_fallback::sum_of_squares(gradient)?
-            };
+            squares += orator_nn::cpu::tensor::read::<f32, _>(gradient, |g| Ok(sum_of_squares(g)))?;
         }
         let norm = squares.sqrt();
         self.norm = norm;
@@ -190,41 +228,24 @@ impl Optimizer for Adam {
             correction: (1.0 / (1.0 - beta2.powi(age))).sqrt() as f32,
             keep: 1.0,
         };
-        for (slot, gradient) in self.slots.iter_mut().zip(&gradients) {
+        for (slot, gradient) in self.slots.iter().zip(&gradients) {
             let [share, decay] = slot.factors;
             let Some(gradient) = gradient.as_ref().filter(|_| share > 0.0) else { continue };
             let keep = if slot.var.rank() > 1 { 1.0 - learning_rate * share * decay * weight_decay } else { 1.0 };
             let rate = learning_rate * share / (1.0 - beta1.powi(age));
             let scalars = AdamScalars { rate: rate as f32, keep: keep as f32, ..scalars };
-            match &mut slot.moments {
-                MomentStorage::Cpu(moments) => slot.var.inplace_op2(gradient, &AdamUpdate { moments, scalars })?,
-                MomentStorage::Device(moments) => moments.update(&slot.var, gradient, &scalars)?,
-            }
+            slot.var.inplace_op2(gradient, &AdamUpdate { moments: &slot.moments, scalars })?;
         }
         Ok(())
     }
 }
 
-impl MomentStorage {
-    fn zeros(var: &Var, amsgrad: bool) -> Result<Self> {
-        if !var.device().is_cpu() {
-            return Ok(Self::Device(adam_fallback::DeviceMoments::zeros(var, amsgrad)?));
-        }
-        let zeros = vec![0.0; var.elem_count()];
-        let largest = if amsgrad { zeros.clone() } else { Vec::new() };
-        Ok(Self::Cpu(RefCell::new(AdamMoments { first: zeros.clone(), second: zeros, largest })))
-    }
-}
-
 impl AdamSlot {
-    /// CPU copies of the existing moments by kind.
-    fn kinds(&self) -> Result<Vec<(&'static str, Tensor)>> {
-        let moments = match &self.moments {
-            MomentStorage::Cpu(moments) => moments.borrow(),
-            MomentStorage::Device(moments) => return moments.tensors(),
-        };
-        let kinds = [("first", &moments.first), ("second", &moments.second), ("largest", &moments.largest)];
-        let there = kinds.into_iter().filter(|(_, values)| !values.is_empty());
+    /// Copies of the existing moments by kind.
+    fn moments(&self) -> Result<Vec<(&'static str, Tensor)>> {
+        let moments = self.moments.borrow();
+        let there = KINDS.into_iter().zip([&moments.first, &moments.second, &moments.largest]);
+        let there = there.filter(|(_, values)| !values.is_empty());
         there.map(|(kind, values)| Ok((kind, Tensor::from_slice(values, self.var.shape(), &Device::Cpu)?))).collect()
     }
 }
@@ -354,32 +375,6 @@ mod tests {
         for (w, (name, share)) in tensors.iter().zip(shares) {
             let w = f64::from(w.flatten_all()?.to_vec1::<f32>()?[1]);
             assert!((w - reference(&gradients, 0.1 * share, false)).abs() < 1e-5, "{name}: {w}");
-        }
-        Ok(())
-    }
-
-    #[test]
-    fn the_fallback_agrees_with_the_fused_update() -> anyhow::Result<()> {
-        for amsgrad in [false, true] {
-            let config = Config { amsgrad, max_norm: Some(2.0), ..Config::default() };
-            let descend_through = |by_fallback: bool| -> anyhow::Result<Vec<f32>> {
-                let mut params = Params::new(3);
-                let w = params.trainable("w", &[5, 4], Init::Glorot)?;
-                let mut adam = Adam::new(&params, config)?;
-                for step in 0..6 {
-                    if by_fallback && step % 3 == 0 {
-                        // Use the fallback from the first step, and restore its saved moments later.
-                        let saved = adam.tensors("")?;
-                        adam.slots[0].moments =
-                            MomentStorage::Device(adam_fallback::DeviceMoments::zeros(&w, amsgrad)?);
-                        adam.load("", &saved)?;
-                    }
-                    adam.step(&(&w * (f64::from(step) - 2.5))?.sqr()?.sum_all()?.backward()?, 0.1)?;
-                }
-                Ok(w.flatten_all()?.to_vec1()?)
-            };
-            let (fused, by_fallback) = (descend_through(false)?, descend_through(true)?);
-            assert!(fused.iter().zip(&by_fallback).all(|(a, b)| (a - b).abs() < 1e-6), "{fused:?} {by_fallback:?}");
         }
         Ok(())
     }

@@ -1,4 +1,4 @@
-//! The optimiser: Adam with a fused CPU kernel, and its fallback for devices without that kernel.
+//! The optimiser: Adam with fused kernels, for the CPU and for a card.
 
 pub mod adam;
-pub mod adam_fallback;
+mod device_adam;

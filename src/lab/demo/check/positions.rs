@@ -12,6 +12,7 @@ use orator_test_support::rule::speech_dataset;
 use orator_test_support::rule::speech_gestures::{self, SpeechGestures};
 use orator_test_support::rule::words::{N_TARGETS, WordGesture, gesture};
 use serde::Serialize;
+use serde::ser::SerializeStruct;
 
 /// Shortest time in seconds to the nearest other word with a gesture for a word to count as isolated.
 const ISOLATED_SECS: f64 = 5.0;
@@ -19,7 +20,7 @@ const ISOLATED_SECS: f64 = 5.0;
 const Z: f64 = 1.96;
 
 /// Counts of words, and of those whose hand at the end of the stroke is nearest to the target of the word.
-#[derive(Clone, Copy, Debug, Default, Serialize)]
+#[derive(Clone, Copy, Debug, Default)]
 pub struct PositionShare {
     pub n_words: usize,
     pub n_correct: usize,
@@ -52,6 +53,18 @@ impl PositionShare {
         let centre = share + Z * Z / (2.0 * n);
         let half = Z * (share * (1.0 - share) / n + Z * Z / (4.0 * n * n)).sqrt();
         [-half, half].map(|half| (centre + half) / (1.0 + Z * Z / n))
+    }
+}
+
+/// The counts, their share and its 95 % interval.
+impl Serialize for PositionShare {
+    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let mut fields = serializer.serialize_struct("PositionShare", 4)?;
+        fields.serialize_field("n_words", &self.n_words)?;
+        fields.serialize_field("n_correct", &self.n_correct)?;
+        fields.serialize_field("share", &self.share())?;
+        fields.serialize_field("interval", &self.interval())?;
+        fields.end()
     }
 }
 

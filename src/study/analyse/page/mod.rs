@@ -1,4 +1,4 @@
-//! Page of an analysis: conclusions, charts, statistics with registration status, exclusions, the methods paragraph.
+//! Page of an analysis: conclusions, charts, statistics with registration status, exclusions.
 
 mod charts;
 mod page;

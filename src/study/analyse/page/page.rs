@@ -16,7 +16,6 @@ pub fn html(analysis: &StudyAnalysis) -> String {
         section("charts", "Estimates and intervals", per_task(&analysis.tasks, |task| charts::task(task, analysis))),
         section("figures", "All statistics", statistics(analysis)),
         section("exclusions", "Exclusions", tables::exclusions(analysis)),
-        section("methods", "Methods paragraph", methods(analysis)),
     ]);
     let page = Page {
         title: analysis.title.clone(),
@@ -83,9 +82,4 @@ fn statistics(analysis: &StudyAnalysis) -> Vec<Node> {
         body.extend(per_task(&analysis.without_exclusions, tables::task));
     }
     body
-}
-
-fn methods(analysis: &StudyAnalysis) -> Vec<Node> {
-    let about = "Ready to paste; a click selects the complete text.";
-    vec![node("p").text(about), node("div").class("methods").attr("tabindex", "0").text(&analysis.methods)]
 }

@@ -153,8 +153,11 @@ pub(super) fn hypotheses(analysis: &StudyAnalysis) -> Vec<Node> {
     });
     let head = [("Scope", ""), ("p", "num"), ("Outcome", "")]
         .map(|(title, class)| node("th").attr("scope", "col").class(class).text(title));
-    let about = "Fixed and sealed before the first participant. \"Not shown\" does not mean refuted: a test that is \
-        not significant shows nothing.";
+    let seal = analysis.seal.as_ref().map(|seal| format!(" (BLAKE3 {seal})")).unwrap_or_default();
+    let about = format!(
+        "Fixed and sealed before the first participant{seal}. \"Not shown\" does not mean refuted: a test that is not \
+         significant shows nothing."
+    );
     vec![node("p").text(about), node("div").class("scroll").attr("tabindex", "0").child(table("figures", head, rows))]
 }
 

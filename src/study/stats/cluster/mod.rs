@@ -4,5 +4,5 @@
 //! rejected whenever some of the chosen clips happen to be easy, the second is not.
 
 pub mod crossed;
-pub mod sign_flips;
+pub mod sides;
 pub mod votes;

@@ -1,10 +1,12 @@
 //! A generator and its discriminator in training: one optimiser step, and saving to and loading from checkpoints.
 
-use super::losses::{self, number};
-use super::score::Validation;
-use super::speakers::SpeakerSet;
-use super::windows::WindowBatch;
-use super::{augment, average, rates, words};
+use super::super::losses::{self, number};
+use super::super::score::Validation;
+use super::super::speakers::SpeakerSet;
+use super::super::windows::WindowBatch;
+use super::super::{average, rates};
+use super::batch::StepBatch;
+use super::loss_log::{LossLog, Losses};
 use crate::generate::model::{BEST, GENERATOR, SpeakerMetadata};
 use crate::train::optim::adam::{self, Adam};
 use crate::train::{resume, word_vectors};
@@ -13,14 +15,15 @@ use candle_core::{Device, Tensor};
 use orator_dataset::config::{GanConfig, GanSettings, to_stored};
 use orator_formats::checkpoint;
 use orator_formats::word_vectors::WordVectors;
+use orator_nn::card::launch::is_on_device;
 use orator_nn::gan::discriminator::{Discriminator, motion};
 use orator_nn::gan::generator::Generator;
 use orator_nn::gan::words::WORDS;
 use orator_nn::params::Params;
 use orator_nn::weights::Contents;
-use rand::Rng;
 use serde_json::Value;
 use std::collections::BTreeMap;
+use std::ops::Range;
 use std::path::Path;
 
 /// Prefix of the generator without averaging, if the generator of the checkpoint is the average over the steps (EMA).
@@ -28,30 +31,11 @@ const LAST_STEP: &str = "training.generator.";
 const DISCRIMINATOR: &str = "discriminator.";
 const ADAM_G: &str = "adam.generator.";
 const ADAM_D: &str = "adam.discriminator.";
-/// Seed modifier that makes dropout independent of the other random numbers of a step.
-const DROPOUT: u64 = 0x6472_6f70;
-const WORD_DROPOUT: u64 = 0x776f_7264;
 /// Largest gradient norm of each network; larger gradients are clipped.
 pub const MAX_NORM: f64 = 10.0;
 
 /// Settings that a resumed training takes from the configuration; all others come from the checkpoint.
 const OVERRIDABLE_ON_RESUME: [&str; 4] = ["steps", "patience", "checkpoint_every", "keep_checkpoints"];
-
-/// Unweighted losses of one step, and the gradient norm of the generator.
-#[derive(Clone, Copy, Debug, serde::Serialize)]
-pub struct Losses {
-    pub l1: f64,
-    /// `None` if its weight is 0, and so for `energy`.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub speed: Option<f64>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub energy: Option<f64>,
-    pub velocity: f64,
-    pub bone: f64,
-    pub adversarial: f64,
-    pub discriminator: f64,
-    pub gradient_norm: f64,
-}
 
 #[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
 pub struct TrainerState {
@@ -63,6 +47,9 @@ pub struct TrainerState {
     pub step: usize,
     /// Step and score of the best validation so far.
     pub best: Option<(usize, f32)>,
+    /// Steps of the last decay of the learning rate, once it has begun.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub decay: Option<Range<usize>>,
 }
 
 /// Networks and optimisers of a training, with its step count.
@@ -70,16 +57,21 @@ pub struct GanTrainer {
     pub speakers: SpeakerSet,
     pub settings: GanSettings,
     pub generator: Generator,
-    generator_params: Params,
+    pub(super) generator_params: Params,
     /// Exponential moving average of the generator, if `ema_decay` is above 0.
-    ema: Option<(Generator, Params)>,
-    discriminator: Discriminator,
+    pub(super) ema: Option<(Generator, Params)>,
+    /// Tensors of both on a card.
+    pub(super) ema_parts: Option<Tensor>,
+    pub(super) discriminator: Discriminator,
     discriminator_params: Params,
-    adam_g: Adam,
-    adam_d: Adam,
+    pub(super) adam_g: Adam,
+    pub(super) adam_d: Adam,
+    pub(super) losses: LossLog,
     pub step: usize,
     /// Step and score of the best validation so far.
     pub best: Option<(usize, f32)>,
+    /// Steps of the last decay of the learning rate, once it has begun.
+    pub decay: Option<Range<usize>>,
 }
 
 impl GanTrainer {
@@ -105,6 +97,8 @@ impl GanTrainer {
         Ok(Self {
             adam_g: Adam::with_rates(&generator_params, decaying, factors)?,
             adam_d: Adam::new(&discriminator_params, adam)?,
+            ema_parts: ema.as_ref().map(|(_, ema)| average::parts(ema, &generator_params)).transpose()?.flatten(),
+            losses: LossLog::default(),
             generator_params,
             generator,
             ema,
@@ -114,6 +108,7 @@ impl GanTrainer {
             settings,
             step: 0,
             best: None,
+            decay: None,
         })
     }
 
@@ -125,17 +120,40 @@ impl GanTrainer {
         self.generator_params.device()
     }
 
-    /// Runs one step of the discriminator, then one of the generator, on the same windows.
+    /// Runs one step of the discriminator, then one of the generator, on the same windows; returns its losses.
     pub fn step(&mut self, batch: &WindowBatch) -> Result<Losses> {
         self.step_in_phases(batch, &mut |_| ())
     }
 
-    /// Like `step`; calls `phase` with its name at the end of each phase, for profiling.
+    /// Like `step`; calls `phase` with its name at the end of each phase, for profiling (on the CPU).
     pub fn step_in_phases(&mut self, batch: &WindowBatch, phase: &mut dyn FnMut(&'static str)) -> Result<Losses> {
-        let batch = batch.on(self.device())?;
+        let batch = StepBatch::draw(batch, &self.settings, self.speakers.network(), self.step, self.device())?;
+        self.advance(&batch, phase)?;
+        let (_, losses) = self.take_losses()?.pop().context("a step without losses")?;
+        Ok(losses)
+    }
+
+    /// Losses of the steps since the last call, with the number of their step. On a card this waits for all of its work.
+    pub fn take_losses(&mut self) -> Result<Vec<(usize, Losses)>> {
+        self.losses.take(&self.settings)
+    }
+
+    /// Runs a step like `step`, without reading its losses on a card; `batch` is on the device of the training.
+    pub fn advance(&mut self, batch: &StepBatch, phase: &mut dyn FnMut(&'static str)) -> Result<()> {
+        if is_on_device(&batch.windows.poses) {
+            return self.advance_on_device(batch);
+        }
+        let (noise, drawn, batch) = (&batch.noise, batch, &batch.windows);
+        let n_windows = batch.poses.dim(0)?;
+        // Noise of real motion (0) or generated motion (1).
+        let with_noise = |motion: Tensor, which: usize| match noise {
+            Some(noise) => motion + noise.narrow(0, which * n_windows, n_windows)?,
+            None => Ok(motion),
+        };
         let GanSettings { lambda_l1, lambda_speed, lambda_energy, lambda_velocity, lambda_bone, .. } = self.settings;
-        let (lambda_gan, learning_rate) = (self.settings.adversarial_weight(self.step), self.settings.rate(self.step));
-        let raw = self.predict(&batch)?;
+        let lambda_gan = self.settings.adversarial_weight(self.step);
+        let learning_rate = self.settings.rate(self.step, self.decay.as_ref());
+        let raw = self.predict(drawn)?;
         let generated = self.speakers.poses(&raw, &batch.speakers)?;
         // Differences are masked where either frame is, so that missing joints look the same in real and generated
         // motion.
@@ -144,9 +162,9 @@ impl GanTrainer {
         phase("generator forward");
 
         let mut discriminator_loss_value = 0.0;
-        let generated_motion = if lambda_gan > 0.0 { self.with_noise(generated_motion, 0)? } else { generated_motion };
+        let generated_motion = if lambda_gan > 0.0 { with_noise(generated_motion, 1)? } else { generated_motion };
         if lambda_gan > 0.0 {
-            let real_motion = self.with_noise((motion(&batch.poses)? * &mask)?, 1)?;
+            let real_motion = with_noise((motion(&batch.poses)? * &mask)?, 0)?;
             let real_scores = self.discriminator.forward(&real_motion, true)?;
             let generated_scores = self.discriminator.forward(&generated_motion.detach(), true)?;
             let loss = losses::discriminator_loss(self.settings.adversarial, &real_scores, &generated_scores)?;
@@ -187,20 +205,13 @@ impl GanTrainer {
         let gradient_norm = self.adam_g.step(&gradients, learning_rate)?;
         phase("generator's Adam");
         if let Some((_, ema)) = &self.ema {
-            average::update(ema, &self.generator_params, self.settings.ema_decay, self.step)?;
+            average::update(ema, &self.generator_params, None, self.settings.ema_decay, self.step)?;
         }
         self.step += 1;
-        let l1 = number(&l1)?;
-        Ok(Losses {
-            l1,
-            speed,
-            energy,
-            velocity,
-            bone,
-            adversarial,
-            discriminator: discriminator_loss_value,
-            gradient_norm,
-        })
+        let (l1, discriminator) = (number(&l1)?, discriminator_loss_value);
+        let losses = Losses { l1, speed, energy, velocity, bone, adversarial, discriminator, gradient_norm };
+        self.losses.push(self.step, losses);
+        Ok(())
     }
 
     /// L1 error of the averaged generator (`ema_generator`) on a batch of windows.
@@ -213,32 +224,15 @@ impl GanTrainer {
     }
 
     /// Raw poses of a batch in training mode, with dropout of words and of whole channels of the encoded audio.
-    fn predict(&self, batch: &WindowBatch) -> Result<Tensor> {
-        let (n_frames, dropout) = (self.settings.window_frames, self.settings.dropout);
-        let rng = &mut resume::step_rng(self.settings.seed ^ WORD_DROPOUT, self.step);
-        let n_indices = self.speakers.network().vocabulary;
-        let words = batch.words.as_ref().map(|words| words::dropped(words, n_indices, rng)).transpose()?;
-        let encoded = self.generator.frames(&batch.mels, &batch.speakers, words.as_ref(), n_frames, true)?;
-        if dropout == 0.0 {
-            return Ok(self.generator.decode(&encoded, true)?);
-        }
-        let (n_windows, _, n_channels) = encoded.dims3()?;
-        let mut rng = resume::step_rng(self.settings.seed ^ DROPOUT, self.step);
-        let factor = |_| if rng.random_bool(dropout) { 0.0 } else { 1.0 / (1.0 - dropout) as f32 };
-        let factors: Vec<f32> = (0..n_windows * n_channels).map(factor).collect();
-        let factors = Tensor::from_vec(factors, (n_windows, 1, n_channels), encoded.device())?;
-        Ok(self.generator.decode(&encoded.broadcast_mul(&factors)?, true)?)
-    }
-
-    /// Input of the discriminator: motion with noise, which keeps the discriminator from memorising the windows
-    /// (Arjovsky & Bottou 2017). `which` selects the random numbers.
-    fn with_noise(&self, motion: Tensor, which: u64) -> Result<Tensor> {
-        let std = self.settings.augment_pose_noise;
-        if std == 0.0 {
-            return Ok(motion);
-        }
-        let noise = augment::gaussian(motion.elem_count(), std, self.settings.seed ^ which, self.step);
-        Ok((&motion + Tensor::from_vec(noise, motion.shape(), motion.device())?)?)
+    pub(super) fn predict(&self, batch: &StepBatch) -> Result<Tensor> {
+        let StepBatch { windows, dropout, .. } = batch;
+        let n_frames = self.settings.window_frames;
+        let encoded =
+            self.generator.frames(&windows.mels, &windows.speakers, windows.words.as_ref(), n_frames, true)?;
+        Ok(match dropout {
+            Some(factors) => self.generator.decode(&encoded.broadcast_mul(factors)?, true)?,
+            None => self.generator.decode(&encoded, true)?,
+        })
     }
 
     /// Generator for validation and generation: the average over the steps if there is one, else that of the last step.
@@ -278,7 +272,8 @@ impl GanTrainer {
         let mut speakers = self.speakers.all().iter().cloned();
         let speaker = speakers.next().context("no speaker to train")?;
         let other_speakers = speakers.collect();
-        let state = TrainerState { speaker, other_speakers, settings, step: self.step, best: self.best };
+        let (step, best, decay) = (self.step, self.best, self.decay.clone());
+        let state = TrainerState { speaker, other_speakers, settings, step, best, decay };
         let mut facts = serde_json::to_value(&state)?;
         facts["settings"] = to_stored("gan", &self.settings)?;
         if let Some(stored) = facts["settings"].as_object_mut() {
@@ -287,6 +282,7 @@ impl GanTrainer {
                 ("channels", self.settings.channels == defaults.channels),
                 ("bone_loss", self.settings.bone_loss == defaults.bone_loss),
                 ("words", self.settings.words == defaults.words),
+                ("decay_share", self.settings.decay_share == defaults.decay_share),
             ];
             is_default.iter().filter(|(_, is_default)| *is_default).for_each(|(key, _)| {
                 stored.shift_remove(*key);
@@ -341,7 +337,7 @@ impl GanTrainer {
         self.discriminator_params.load(&contents.part(DISCRIMINATOR))?;
         self.adam_g.load(ADAM_G, &contents.tensors)?;
         self.adam_d.load(ADAM_D, &contents.tensors)?;
-        (self.step, self.best) = (stored.step, stored.best);
+        (self.step, self.best, self.decay) = (stored.step, stored.best, stored.decay.clone());
         Ok(())
     }
 }
@@ -370,18 +366,5 @@ impl TrainerState {
     /// Settings of the resumed training, and a message for each difference from `requested`.
     pub fn settings(&self, requested: &GanConfig) -> Result<(GanSettings, Vec<String>)> {
         resume::settings(&self.settings, requested, "gan", &OVERRIDABLE_ON_RESUME)
-    }
-}
-
-impl Losses {
-    /// Losses by name, for the check that the training has not diverged.
-    pub fn named(&self) -> [(&'static str, f64); 5] {
-        [
-            ("L1", self.l1),
-            ("velocity", self.velocity),
-            ("bone", self.bone),
-            ("adversarial", self.adversarial),
-            ("discriminator", self.discriminator),
-        ]
     }
 }
