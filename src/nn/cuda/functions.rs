@@ -53,11 +53,13 @@ libraries! {
     "libcublas.so.13":
         cublasCreate_v2 cublasDestroy_v2 cublasDgemmStridedBatched cublasGemmStridedBatchedEx cublasSetStream_v2;
     "libcudnn.so.9":
-        cudnnConvolutionForward cudnnCreate cudnnCreateConvolutionDescriptor cudnnCreateFilterDescriptor
-        cudnnCreateTensorDescriptor cudnnDestroy cudnnDestroyConvolutionDescriptor cudnnDestroyFilterDescriptor
-        cudnnDestroyTensorDescriptor cudnnGetConvolutionForwardAlgorithm_v7
-        cudnnGetConvolutionForwardWorkspaceSize cudnnSetConvolution2dDescriptor cudnnSetFilter4dDescriptor
-        cudnnSetStream cudnnSetTensor4dDescriptor cudnnSetTensor4dDescriptorEx;
+        cudnnConvolutionBackwardData cudnnConvolutionBackwardFilter cudnnConvolutionForward cudnnCreate
+        cudnnCreateConvolutionDescriptor cudnnCreateFilterDescriptor cudnnCreateTensorDescriptor cudnnDestroy
+        cudnnDestroyConvolutionDescriptor cudnnDestroyFilterDescriptor cudnnDestroyTensorDescriptor
+        cudnnGetConvolutionBackwardDataWorkspaceSize cudnnGetConvolutionBackwardFilterWorkspaceSize
+        cudnnGetConvolutionForwardAlgorithm_v7 cudnnGetConvolutionForwardWorkspaceSize
+        cudnnSetConvolution2dDescriptor cudnnSetFilter4dDescriptor cudnnSetStream cudnnSetTensor4dDescriptor
+        cudnnSetTensor4dDescriptorEx;
     "libcurand.so.10":
         curandCreateGenerator curandDestroyGenerator curandGenerateNormal curandGenerateNormalDouble
         curandGenerateUniform curandGenerateUniformDouble curandSetPseudoRandomGeneratorSeed curandSetStream;
