@@ -115,7 +115,7 @@ mod tests {
     fn advanced_keys() -> BTreeSet<String> {
         let (mut section, mut keys) = ("", BTreeSet::new());
         for line in include_str!("../../guide/configuration.md").lines() {
-            if let Some(of) = line.strip_prefix("### `[").and_then(|rest| rest.strip_suffix(".advanced]`")) {
+            if let Some(of) = line.strip_prefix("| **`[").and_then(|rest| rest.strip_suffix(".advanced]`** | | | |")) {
                 section = of;
             }
             let cells: Vec<&str> =

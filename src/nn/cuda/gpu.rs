@@ -18,14 +18,13 @@ pub fn list() -> Result<Vec<String>> {
         let memory = unsafe { result::device::total_mem(gpu) }? as f64 / f64::from(1 << 30);
         Ok(format!("{}, {memory:.0} GiB", result::device::get_name(gpu)?))
     };
-    let listed = || {
+    let listed = || -> Result<Vec<String>, DriverError> {
         result::init()?;
         let mut version = 0;
         // SAFETY: `version` is writable.
         unsafe { sys::cuDriverGetVersion(&raw mut version) }.result()?;
         let driver = format!("the driver supports CUDA {}.{}", version / 1000, version % 1000 / 10);
-        let gpus = (0..result::device::get_count()?).map(|number| Ok(format!("{}; {driver}", describe(number)?)));
-        gpus.collect()
+        (0..result::device::get_count()?).map(|number| Ok(format!("{}; {driver}", describe(number)?))).collect()
     };
     listed().map_err(failed)
 }
@@ -47,8 +46,9 @@ pub fn open(number: usize) -> Result<Device> {
 /// Largest memory that tensors on an opened GPU have used, in bytes; without that of libraries and kernels.
 ///
 /// # Errors
-/// The driver does not count it.
+/// A library is missing, or the driver does not count it.
 pub fn peak_memory(number: usize) -> Result<u64> {
+    libraries::load()?;
     let (name, mut peak) = (sys::CUmemPool_attribute::CU_MEMPOOL_ATTR_USED_MEM_HIGH, 0u64);
     // SAFETY: the value of this attribute is a `u64`.
     let read =

@@ -1,5 +1,5 @@
-//! The shared libraries of CUDA: found beside the program, in `ORATOR_CUDA`, in Python packages or by the system's search,
-//! and loaded once, before the first GPU is opened.
+//! The shared libraries of CUDA: found in `ORATOR_CUDA`, beside the program, in Python packages or by the system's
+//! search, and loaded once, before the first GPU is opened.
 
 use super::functions::{CudaLibrary, LIBRARIES};
 use anyhow::{Result, ensure};
@@ -30,14 +30,10 @@ pub fn status() -> &'static [LibraryStatus] {
 /// # Errors
 /// A library is missing or too old.
 pub fn load() -> Result<()> {
-    let problems: Vec<&str> =
-        status().iter().filter_map(|(_, found)| found.as_ref().err()).map(String::as_str).collect();
-    // Without a driver the other libraries are of no use.
-    ensure!(
-        problems.is_empty(),
-        "{}",
-        if status()[0].1.is_err() { problems[0].to_owned() } else { problems.join("; ") }
-    );
+    let problems = status().iter().filter_map(|(_, found)| found.as_ref().err());
+    // Without a driver, the first, the other libraries are of no use.
+    let problems: Vec<&str> = problems.map(String::as_str).take(if status()[0].1.is_err() { 1 } else { 9 }).collect();
+    ensure!(problems.is_empty(), "{}", problems.join("; "));
     Ok(())
 }
 
@@ -55,7 +51,7 @@ fn load_library(library: &CudaLibrary, folders: &[PathBuf]) -> Result<PathBuf, S
     let path = loaded_path(&named);
     for (name, address) in library.functions {
         // SAFETY: only the address is used.
-        let function = unsafe { loaded.get::<unsafe extern "C" fn()>(name) };
+        let function = unsafe { loaded.get::<unsafe extern "C" fn()>(*name) };
         let function = function.map_err(|_| {
             let needed = if is_driver { "the driver must be release 580 or newer" } else { "CUDA 13 is needed" };
             format!("{} has no function {name}: {needed}", path.display())
@@ -82,7 +78,7 @@ fn loaded_path(named: &Path) -> PathBuf {
 /// Folders in which libraries are searched for before the system's, in this order.
 fn folders() -> Vec<PathBuf> {
     let program = std::env::current_exe().and_then(std::fs::canonicalize).unwrap_or_default();
-    let chosen = std::env::var_os(VARIABLE).map(PathBuf::from).into_iter();
+    let chosen = std::env::var_os(VARIABLE).and_then(|folder| std::path::absolute(folder).ok()).into_iter();
     let chosen =
         chosen.flat_map(|folder| [vec![folder.join("lib"), folder.clone()], package_folders(&folder)].concat());
     let beside = program.ancestors().skip(1).flat_map(|folder| ["lib/orator", "lib"].map(|lib| folder.join(lib)));

@@ -1,5 +1,5 @@
-//! NVIDIA GPUs, in builds with the feature `cuda`: the program starts without a driver and without CUDA's libraries, and
-//! loads them when it opens a GPU.
+//! NVIDIA GPUs, in builds with the feature `cuda`: the program starts without a driver and without the libraries of
+//! CUDA, and loads them when it opens a GPU.
 
 mod functions;
 pub mod gpu;
