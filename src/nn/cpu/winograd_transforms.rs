@@ -1,5 +1,5 @@
-//! Transforms of Winograd's filtering by the method of Toom and Cook: polynomials evaluated at the points 0, 1, -1, 2,
-//! (-2) and infinity. They apply to rows of columns, a vector of columns at a time.
+//! Transforms of Winograd's filtering: values of polynomials at the points 0, 1, -1, 2, (-2) and infinity. They apply to
+//! rows of columns, a vector of columns at a time.
 
 use super::tensor::{LANES, Scalar};
 use std::ops::{Add, Mul, Sub};
