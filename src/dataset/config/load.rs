@@ -121,7 +121,7 @@ mod tests {
             let cells: Vec<&str> =
                 line.trim_matches('|').split('|').map(|cell| cell.trim().trim_matches('`')).collect();
             let [name, default, _, range] = cells[..] else { continue };
-            if section.is_empty() || name == "key" || name.starts_with('-') {
+            if section.is_empty() || name == "key" || name.starts_with(['-', '*']) {
                 continue;
             }
             let key = format!("{section}.{name}");

@@ -25,4 +25,4 @@ pub mod transformer;
 pub mod vectorised;
 pub mod weight_gradient;
 pub mod winograd;
-pub mod winograd_transforms;
+pub mod winograd_filter;

@@ -9,7 +9,7 @@ use super::kernel::MAX_ROWS;
 use super::packed_matrix::PackedWeights;
 use super::spin_pool::parallel_for;
 use super::tensor::{Scalar, SharedOutputPtr, scratch};
-use super::winograd_transforms::{Filter, Lanes, TILE, ThreeTaps, TwoTaps, transform};
+use super::winograd_filter::{Lanes, TILE, ThreeTaps, TwoTaps, WinogradFilter, transform};
 use std::ops::Range;
 
 /// Number of tiles (twice as many for two taps), and of channels on either side, below which the transforms cost more than
@@ -161,7 +161,7 @@ impl<T: Scalar> WinogradPass<'_, T> {
         }
     }
 
-    unsafe fn run_filter<F: Filter<TAPS, POINTS>, const TAPS: usize, const POINTS: usize>(
+    unsafe fn run_filter<F: WinogradFilter<TAPS, POINTS>, const TAPS: usize, const POINTS: usize>(
         &self,
         to: SharedOutputPtr<T>,
         finish: impl Fn(usize, &mut [T]) + Sync,
@@ -226,7 +226,7 @@ impl<T: Scalar> WinogradPass<'_, T> {
     ///
     /// # Safety
     /// As for [`Self::run`].
-    unsafe fn write_tile<F: Filter<TAPS, POINTS>, const TAPS: usize, const POINTS: usize>(
+    unsafe fn write_tile<F: WinogradFilter<TAPS, POINTS>, const TAPS: usize, const POINTS: usize>(
         &self,
         tile: usize,
         n_tiles: usize,
@@ -259,7 +259,7 @@ impl<T: Scalar> WinogradPass<'_, T> {
 }
 
 /// Transforms packed weights, whose steps are `TAPS` times `phases` rows: those of a point have one row per phase.
-fn transform_weights<T: Scalar, F: Filter<TAPS, POINTS>, const TAPS: usize, const POINTS: usize>(
+fn transform_weights<T: Scalar, F: WinogradFilter<TAPS, POINTS>, const TAPS: usize, const POINTS: usize>(
     weights: &PackedWeights<T>,
     phases: usize,
 ) -> [PackedWeights<T>; POINTS] {
@@ -304,7 +304,7 @@ pub(super) fn gradient_tiles<T: Scalar>(
     }
 }
 
-fn gradient_tiles_of<T: Scalar, F: Filter<TAPS, POINTS>, const TAPS: usize, const POINTS: usize>(
+fn gradient_tiles_of<T: Scalar, F: WinogradFilter<TAPS, POINTS>, const TAPS: usize, const POINTS: usize>(
     s: &ConvSizes,
     [x, grad]: [&[T]; 2],
     mut add: impl FnMut(GradientTiles<T>),
@@ -336,7 +336,7 @@ fn gradient_tiles_of<T: Scalar, F: Filter<TAPS, POINTS>, const TAPS: usize, cons
 
 /// Gradients of the rows of taps, [offsets of rows, ...], from those of the points, each [phases, ...].
 pub(super) fn gradients_of_taps<T: Scalar>(taps: FilterTaps, points: &[Vec<T>], phases: usize) -> Vec<T> {
-    fn of<T: Scalar, F: Filter<TAPS, POINTS>, const TAPS: usize, const POINTS: usize>(
+    fn of<T: Scalar, F: WinogradFilter<TAPS, POINTS>, const TAPS: usize, const POINTS: usize>(
         points: &[Vec<T>],
         phases: usize,
     ) -> Vec<T> {

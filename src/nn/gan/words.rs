@@ -30,7 +30,7 @@ pub struct WordFrames {
 }
 
 impl WordFrames {
-    /// The same words on another device.
+    /// Copies the words to a device.
     pub fn on(&self, device: &Device) -> Result<Self> {
         let added = self.added.as_ref().map(|added| added.to_device(device)).transpose()?;
         Ok(Self { numbers: self.numbers.to_device(device)?, times: self.times.to_device(device)?, added })

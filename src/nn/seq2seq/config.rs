@@ -123,7 +123,7 @@ pub struct Segment {
 }
 
 impl Segment {
-    /// The same segments on another device.
+    /// Copies the segments to a device.
     pub fn on(&self, device: &Device) -> Result<Self> {
         let words = self.words.as_ref().map(|words| words.to_device(device)).transpose()?;
         Ok(Self { audio: self.audio.to_device(device)?, previous: self.previous.to_device(device)?, words })

@@ -50,7 +50,7 @@ fn forward_and_gradients_are_those_of_the_definition() {
         (9, 32, 35, [same(22), same(5)]),
         (13, 32, 40, [half(61), alone]),
         (5, 33, 32, [half(77), alone]),
-        (9, 32, 35, [half(23), half(7)]),
+        (17, 32, 35, [half(23), half(7)]),
     ] {
         let s = ConvSizes { batch, n_in, n_out, axes };
         assert!(FilterTaps::of(&s).is_some());

@@ -214,5 +214,6 @@ fn a_checkpoint_generates_its_original_motion() {
     assert_eq!(expected.joints.dim(), generated.joints.dim());
     let difference = expected.joints.iter().zip(&generated.joints).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
     eprintln!("difference: {difference:e} m at most");
-    assert!(difference <= 1e-6, "{difference:e} m");
+    // Convolutions are computed by another algorithm since.
+    assert!(difference <= 5e-6, "{difference:e} m");
 }

@@ -124,9 +124,9 @@ fn patience_ends_a_training_whose_score_does_not_fall() {
     let folder = tempfile::tempdir().unwrap();
     let dataset = dataset(&folder.path().join("dataset"));
     let out = folder.path().join("out");
-    // Steps are too small to change anything: no score is better than the first.
+    // Steps are too small to change weights; the running statistics of the norms still settle.
     let settings = GanConfig {
-        steps: 40.into(),
+        steps: 60.into(),
         epoch_steps: 1.into(),
         patience: 3.into(),
         learning_rate: 1e-30.into(),
@@ -134,7 +134,7 @@ fn patience_ends_a_training_whose_score_does_not_fall() {
         ..settings()
     };
     let outcome = train(&dataset, &settings, &out, &Silent).unwrap();
-    assert!(outcome.stopped_early && outcome.steps < 40, "{outcome:?}");
+    assert!(outcome.stopped_early && outcome.steps < 60, "{outcome:?}");
     assert_eq!(outcome.steps, outcome.best_step + 3);
     let again = train(&dataset, &settings, &out, &Silent).unwrap();
     assert!(again.stopped_early && again.began_at == outcome.steps);
@@ -206,7 +206,7 @@ fn a_few_windows_are_memorised_and_generated() {
         representation: MotionRepresentation::Bones,
         adversarial: AdversarialLoss::LeastSquares,
         batch: 4.into(),
-        steps: 60.into(),
+        steps: 80.into(),
         learning_rate: 2e-3.into(),
         lambda_gan: 0.0.into(),
         epoch_steps: 1_000.into(),

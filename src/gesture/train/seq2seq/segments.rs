@@ -41,7 +41,7 @@ impl SegmentBatch {
         (predicted * &self.known)? + &self.filled
     }
 
-    /// The same segments on another device.
+    /// Copies the segments to a device.
     pub fn on(&self, device: &Device) -> candle_core::Result<Self> {
         let on = |tensor: &Tensor| tensor.to_device(device);
         let segment = self.segment.on(device)?;

@@ -8,7 +8,7 @@ use std::ops::{Add, Mul, Sub};
 pub const TILE: usize = 4;
 
 /// Transforms of a filter; those of gradients are transposes of the others.
-pub trait Filter<const TAPS: usize, const POINTS: usize> {
+pub trait WinogradFilter<const TAPS: usize, const POINTS: usize> {
     fn inputs<T: Scalar>(rows: [Lanes<T>; POINTS]) -> [Lanes<T>; POINTS];
 
     fn taps<T: Scalar>(taps: [Lanes<T>; TAPS]) -> [Lanes<T>; POINTS];
@@ -24,7 +24,7 @@ pub trait Filter<const TAPS: usize, const POINTS: usize> {
 pub struct TwoTaps;
 pub struct ThreeTaps;
 
-impl Filter<2, 5> for TwoTaps {
+impl WinogradFilter<2, 5> for TwoTaps {
     #[inline(always)]
     fn inputs<T: Scalar>([a, b, c, d, e]: [Lanes<T>; 5]) -> [Lanes<T>; 5] {
         let (near, far) = (d - b, d - c);
@@ -54,7 +54,7 @@ impl Filter<2, 5> for TwoTaps {
     }
 }
 
-impl Filter<3, 6> for ThreeTaps {
+impl WinogradFilter<3, 6> for ThreeTaps {
     #[inline(always)]
     fn inputs<T: Scalar>([a, b, c, d, e, f]: [Lanes<T>; 6]) -> [Lanes<T>; 6] {
         let (even, odd, half_even, half_odd) = (e - c * 4.0, d - b * 4.0, e - c, (d - b) * 2.0);
