@@ -205,7 +205,7 @@ impl<T: Scalar> WinogradPass<'_, T> {
                 let sums = |point: usize| &sums[(point * n + tile - tiles.start) * to_len..][..to_len];
                 // SAFETY: only this task writes the rows of these tiles.
                 unsafe {
-                    self.write_tile::<F, TAPS, POINTS>(tile, all_tiles.per_sample, std::array::from_fn(sums), to)
+                    self.write_tile::<F, TAPS, POINTS>(tile, all_tiles.per_sample, std::array::from_fn(sums), to);
                 };
             }
             if rows.to_step == 1 && columns.n == columns.n_to {

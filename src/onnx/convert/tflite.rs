@@ -248,22 +248,7 @@ impl<'a> TfliteConverter<'a> {
                     _ => value,
                 }
             }
-            23 => {
-                let mode = match (options()?.byte(2)?, options()?.byte(3)?) {
-                    (0, 0) => "asymmetric",
-                    (0, _) => "half_pixel",
-                    _ => "align_corners",
-                };
-                let [_, height, width, _] = four("the output", &output)?;
-                let (value, [_, old_height, old_width, _]) =
-                    (self.value(first)?, four("the input", &self.shapes[first])?);
-                ensure!(
-                    height % old_height == 0 && width % old_width == 0,
-                    "unsupported resize of {old_height}x{old_width} to {height}x{width}: expected integer factors"
-                );
-                let mode = [("mode", Text("linear")), ("coordinate_transformation_mode", Text(mode))];
-                self.graph.scaled(&value, [height / old_height, width / old_width], &mode)?
-            }
+            23 => self.resize(first, &output, [options()?.byte(2)?, options()?.byte(3)?])?,
             34 => {
                 let pads = self.integers(needed(1)?)?;
                 ensure!(pads.len() == 8, "expected 2 padding values for each of 4 axes, found {}", pads.len());
@@ -294,6 +279,23 @@ impl<'a> TfliteConverter<'a> {
         };
         self.values.insert(operator.output, value);
         Ok(())
+    }
+
+    /// Bilinear enlargement to the size of `output`; `flags`: whether corners and half pixel centres are aligned.
+    fn resize(&mut self, input: usize, output: &[usize], flags: [i8; 2]) -> Result<String> {
+        let mode = match flags {
+            [0, 0] => "asymmetric",
+            [0, _] => "half_pixel",
+            _ => "align_corners",
+        };
+        let [_, height, width, _] = four("the output", output)?;
+        let (value, [_, old_height, old_width, _]) = (self.value(input)?, four("the input", &self.shapes[input])?);
+        ensure!(
+            height % old_height == 0 && width % old_width == 0,
+            "unsupported resize of {old_height}x{old_width} to {height}x{width}: expected integer factors"
+        );
+        let mode = [("mode", Text("linear")), ("coordinate_transformation_mode", Text(mode))];
+        self.graph.scaled(&value, [height / old_height, width / old_width], &mode)
     }
 
     /// `slope * x + (1 - slope) * max(x, 0)` as depthwise convolutions: ONNX Runtime computes them in the layout of the
