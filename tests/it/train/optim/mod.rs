@@ -1,3 +1,4 @@
-//! Optimisers.
+//! Optimisers, and steps on a card.
 
 mod adam;
+mod card;
