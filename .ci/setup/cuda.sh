@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Installs compiler and libraries of CUDA from Python packages (proprietary, free of charge) in the folder ORATOR_CUDA, for
-# `cargo build --features cuda`: no card and no driver are needed. Sourcing its file `environment` selects them.
+# `cargo build --features cuda`: no GPU and no driver are needed. Sourcing its file `environment` selects them.
 . "$(dirname "$0")/lib.sh"
 
 list=tests/cuda.txt
@@ -10,7 +10,7 @@ need_packages g++
 find_python 3 python3 /usr/bin/python3 || fail 'no pip for any python3'
 pip_folder "$list" "$folder"
 
-# Names for the linker, without contents: the program loads the libraries when it opens a card (src/nn/cuda).
+# Names for the linker, without contents: the program loads the libraries when it opens a GPU (src/nn/cuda).
 home=$folder/nvidia/cu13
 mkdir -p "$home/lib/stubs"
 for library in cuda cudart cublas cublasLt curand nvrtc cudnn; do
@@ -33,8 +33,8 @@ exec "$home/bin/nvcc" "\$@"
 END
 chmod +x "$folder/bin/nvcc"
 
-# The kernels are PTX, which the driver compiles for its card: that of compute capability 8.0 runs on every card since
-# 2020, whereas the build of candle compiles 9.0 for these cards only.
+# The kernels are PTX, which the driver compiles for its GPU: that of compute capability 8.0 runs on every GPU since
+# 2020, whereas the build of candle compiles 9.0 for these GPUs only.
 cat >"$folder/environment" <<END
 export ORATOR_CUDA=$folder CUDA_HOME=$home NVCC=$folder/bin/nvcc CUDARC_CUDA_VERSION=13000
 export CUDA_COMPUTE_CAP=\${CUDA_COMPUTE_CAP:-80}

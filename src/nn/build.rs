@@ -1,4 +1,4 @@
-//! Compiles the kernels of the networks for a card, with the feature `cuda` only: `nvcc` is that of the environment variable
+//! Compiles the kernels of the networks for a GPU, with the feature `cuda` only: `nvcc` is that of the environment variable
 //! `NVCC`, of the folder `CUDA_HOME`, or of the search path.
 
 use std::env::var;
@@ -6,7 +6,7 @@ use std::io::Write;
 use std::process::Command;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
-    let mut instructions = String::from("cargo:rerun-if-changed=card\n");
+    let mut instructions = String::from("cargo:rerun-if-changed=gpu\n");
     for variable in ["NVCC", "CUDA_HOME", "CUDA_COMPUTE_CAP"] {
         instructions += &format!("cargo:rerun-if-env-changed={variable}\n");
     }
@@ -16,10 +16,10 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     }
     let nvcc = var("NVCC").or_else(|_| var("CUDA_HOME").map(|home| format!("{home}/bin/nvcc")));
     let nvcc = nvcc.unwrap_or_else(|_| "nvcc".to_owned());
-    // The driver compiles PTX for its card, which may be newer.
+    // The driver compiles PTX for its GPU, which may be newer.
     let architecture = format!("-arch=compute_{}", var("CUDA_COMPUTE_CAP").unwrap_or_else(|_| "80".to_owned()));
     let output = format!("{}/kernels.ptx", var("OUT_DIR")?);
-    let arguments = ["-ptx", "-O3", "--std=c++17", &architecture, "-o", &output, "card/training.cu"];
+    let arguments = ["-ptx", "-O3", "--std=c++17", &architecture, "-o", &output, "gpu/training.cu"];
     match Command::new(&nvcc).args(arguments).status() {
         Ok(status) if status.success() => Ok(()),
         result => {

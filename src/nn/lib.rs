@@ -4,12 +4,12 @@
 //! lists them and rejects the others); convolution, batch norm and recurrent layers are implemented here. The layers
 //! of the lifters are channels first; those of the GAN (`gan::generator`) are channels last, which avoids unfolding.
 
-pub mod card;
 pub mod cpu;
 #[cfg(feature = "cuda")]
 pub mod cuda;
 pub mod device;
 pub mod gan;
+pub mod gpu;
 pub mod lifter;
 pub mod motion_encoder;
 pub mod ops;

@@ -216,14 +216,14 @@ fn strings_outside(home: &str, is_misplaced: impl Fn(&str, bool) -> bool) -> Vec
 #[test]
 fn unsafe_code_is_confined_to_nine_modules() {
     let modules = [
-        "src/nn/card/",
+        "src/nn/gpu/",
         "src/nn/cpu/",
         "src/nn/cuda/",
         "src/media/ffmpeg/",
         "src/media/file_memory.rs",
         "src/media/sandbox/stop_signals.rs",
         "src/process.rs",
-        "tests/it/fixtures/card_shim.rs",
+        "tests/it/fixtures/gpu_shim.rs",
         "tests/it/robustness/sandbox.rs",
     ];
     let texts = rust_texts().into_iter().filter(|(name, _)| !modules.iter().any(|home| name.starts_with(home)));

@@ -8,8 +8,8 @@ use candle_core::{DType, Device, Result, Tensor};
 use ndarray::{Array2, Array3, ArrayView2};
 use orator_base::types::pose3d::Motion;
 use orator_base::types::skeleton::{N_BONES, N_JOINTS, NECK, is_duplicate, parent};
-use orator_nn::card::launch::is_on_device;
-use orator_nn::card::poses;
+use orator_nn::gpu::launch::is_on_device;
+use orator_nn::gpu::poses;
 use serde::{Deserialize, Serialize};
 
 /// Smallest standard deviation of a direction coordinate, so that bones that hardly turn are not amplified.
@@ -192,7 +192,7 @@ struct Kinematics {
     path: Tensor,
     mean: Tensor,
     std: Tensor,
-    /// All of these for the kernels of a card (`poses::kinematics`).
+    /// All of these for the kernels of a GPU (`poses::kinematics`).
     tables: Tensor,
 }
 

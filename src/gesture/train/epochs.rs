@@ -90,7 +90,7 @@ pub trait ValidatedTraining {
     fn score_and_alarm(validation: &Self::Validation) -> (f64, Option<&str>);
     /// Short text with the main metrics of a validation.
     fn summary(validation: &Self::Validation) -> String;
-    fn save(&self, folder: &Path) -> Result<()>;
+    fn save(&mut self, folder: &Path) -> Result<()>;
     fn save_best(&self, folder: &Path, validation: &Self::Validation) -> Result<()>;
 }
 

@@ -135,7 +135,7 @@ impl<T: Scalar> TileRows<'_, T> {
     }
 }
 
-/// A pass, of which every row of windows reads `step` phases of `TAPS` rows each.
+/// A pass whose windows read `TAPS` rows of each phase; a convolution of stride 2 has two phases of rows.
 #[derive(Clone, Copy)]
 pub(super) struct WinogradPass<'a, T> {
     pub pass: &'a ConvPass,

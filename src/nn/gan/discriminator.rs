@@ -2,8 +2,8 @@
 //! every fourth frame as real or generated (Ginosar et al. 2019).
 
 use super::generator::{ConvBlock, MOMENTUM, SLOPE};
-use crate::card::launch::is_on_device;
-use crate::card::passes::chain;
+use crate::gpu::launch::is_on_device;
+use crate::gpu::passes::chain;
 use crate::ops::conv2d::Conv;
 use crate::ops::resize;
 use crate::params::Params;
@@ -44,7 +44,7 @@ impl Discriminator {
         resize::transposed(&self.last.forward(&x)?)
     }
 
-    /// [`Self::forward`] on a card, of equal parts of a batch as if one after the other.
+    /// [`Self::forward`] on a GPU, of equal parts of a batch as if one after the other.
     pub fn scores_of_groups(&self, motion: &Tensor, train: bool, groups: usize) -> Result<Tensor> {
         let blocks = self.blocks.iter().map(ConvBlock::on_device);
         let layers = std::iter::once(self.first.on_device(SLOPE)).chain(blocks).chain([self.last.on_device(1.0)]);

@@ -5,9 +5,9 @@
 
 use super::speaker_layer::SpeakerLayer;
 use super::words::{WordFrames, WordLayer};
-use crate::card::launch::is_on_device;
-use crate::card::layer::DeviceLayer;
-use crate::card::passes::{self, UnetLayers, chain};
+use crate::gpu::launch::is_on_device;
+use crate::gpu::layer::DeviceLayer;
+use crate::gpu::passes::{self, UnetLayers, chain};
 use crate::ops::batch_norm::BatchNorm;
 use crate::ops::conv_norm::conv_norm;
 use crate::ops::conv2d::{self, Conv};
@@ -311,7 +311,7 @@ impl ConvBlock {
         conv_norm(&x, &weight, bias, norm, conv2d::valid(&x, &weight)?, train)?.unsqueeze(2)
     }
 
-    /// Layer for a card.
+    /// Layer for a GPU.
     pub(super) fn on_device(&self) -> DeviceLayer {
         let Self { weight, bias, norm, stride, full_height } = self;
         DeviceLayer {

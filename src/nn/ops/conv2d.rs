@@ -2,13 +2,13 @@
 //! time and frequency. The sums are computed in `direct_conv`; `conv_norm` includes a subsequent batch norm.
 
 use super::operator::{CpuOperator, CustomOperator, Gradients, Operand};
-use crate::card::launch::is_on_device;
-use crate::card::layer::DeviceLayer;
-use crate::card::passes;
 use crate::cpu::axis::ConvAxis;
 use crate::cpu::direct_conv::{self, ConvSizes};
 use crate::cpu::tensor::Scalar;
 use crate::cpu::{channel_stats, weight_gradient};
+use crate::gpu::launch::is_on_device;
+use crate::gpu::layer::DeviceLayer;
+use crate::gpu::passes;
 use crate::params::{Init, Params};
 use candle_core::{Result, Shape, Tensor};
 
@@ -74,7 +74,7 @@ impl Conv {
         conv(x, &self.weight, &self.bias, same(x, &self.weight, self.stride)?)
     }
 
-    /// Layer for a card, followed by a leaky ReLU with this slope.
+    /// Layer for a GPU, followed by a leaky ReLU with this slope.
     pub(crate) fn on_device(&self, slope: f64) -> DeviceLayer {
         let Self { weight, bias, stride } = self.clone();
         DeviceLayer { weight, bias, norm: None, stride, is_padded: true, slope }

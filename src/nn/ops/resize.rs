@@ -2,10 +2,10 @@
 //! transposition from channels first to channels last.
 
 use super::operator::{CpuOperator, CustomOperator, Gradients, Operand};
-use crate::card::frames;
-use crate::card::launch::is_on_device;
 use crate::cpu::frames::{FrameInterpolation, transpose};
 use crate::cpu::tensor::Scalar;
+use crate::gpu::frames;
+use crate::gpu::launch::is_on_device;
 use candle_core::{Result, Shape, Tensor};
 use std::ops::Range;
 
@@ -68,7 +68,7 @@ pub fn linear_part(x: &Tensor, part: &ResizedPart) -> Result<Tensor> {
     mix(x, None, FrameInterpolation { n_in: needed.len(), of: of.collect() })
 }
 
-/// Transposes the last two axes of `x`, [B, C, T] to [B, T, C], in memory, or as a view on a card.
+/// Transposes the last two axes of `x`, [B, C, T] to [B, T, C], in memory, or as a view on a GPU.
 pub fn transposed(x: &Tensor) -> Result<Tensor> {
     if is_on_device(x) {
         return x.t();

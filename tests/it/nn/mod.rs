@@ -1,12 +1,12 @@
 //! Layers and networks against plain arithmetic and finite differences.
 
 mod adversarial;
-mod card;
 mod composed;
 mod conv2d;
 mod conv_norm;
 mod decoder;
 mod device;
+mod gpu;
 mod gru;
 mod networks;
 mod params;

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 
 /// Calls of stock operators that are broken (found by finite differences, batch 2) or slow, each with the reason.
 const BROKEN: [(&str, &str); 16] = [
-    (".conv2d(", "its gradient allows no slack, and is slow on a card; use nn::conv2d"),
+    (".conv2d(", "its gradient allows no slack, and is slow on a GPU; use nn::conv2d"),
     (".conv1d(", "its weight gradient is wrong for every batch larger than one; use nn::conv1d"),
     ("candle_nn::conv1d", "the same; use nn::conv1d"),
     ("Conv1dConfig", "the same; use nn::conv1d"),

@@ -2,15 +2,15 @@
 //! It fluctuates less than the weights of the last step, and is used for validation and generation.
 
 use candle_core::{CpuStorage, InplaceOp2, Layout, Result, Tensor};
-use orator_nn::card::launch::{address, is_on_device, run};
 use orator_nn::cpu::spin_pool::parallel_for;
+use orator_nn::gpu::launch::{address, is_on_device, run};
 use orator_nn::params::Params;
 use std::sync::Mutex;
 
 /// Elements per task.
 const GRAIN: usize = 32 * 1024;
 
-/// Table for [`update`] of tensors on a card: both addresses and the length of every part of a tensor; `None` on the CPU.
+/// Table for [`update`] of tensors on a GPU: both addresses and the length of every part of a tensor; `None` on the CPU.
 pub fn parts(mean: &Params, now: &Params) -> Result<Option<Tensor>> {
     let mut parts = Vec::new();
     for ((_, mean), (_, now)) in mean.all().zip(now.all()).filter(|((_, mean), _)| is_on_device(mean)) {
@@ -25,7 +25,7 @@ pub fn parts(mean: &Params, now: &Params) -> Result<Option<Tensor>> {
 
 /// Updates each tensor of `mean` with the tensor of the same name in `now`: decay x mean + (1 - decay) x now. The decay
 /// after `step` steps is at most (1 + step) / (10 + step), so that the initial weights soon lose their influence. `parts`
-/// lists tensors on a card.
+/// lists tensors on a GPU.
 pub fn update(mean: &Params, now: &Params, parts: Option<&Tensor>, decay: f64, step: usize) -> Result<()> {
     let decay = decay.min((1.0 + step as f64) / (10.0 + step as f64));
     if let (Some(parts), Some((_, first))) = (parts, mean.all().next()) {

@@ -48,7 +48,7 @@ impl Default for TrainingStart<'_> {
     }
 }
 
-/// Largest number of threads that read batches for a card.
+/// Largest number of threads that read batches for a GPU.
 const MAX_READERS: usize = 8;
 
 /// Trains on `dataset` until `requested.steps`, resuming from the newest checkpoint in `folder` if there is one; then
@@ -157,11 +157,11 @@ pub fn train_with_callback(
         let which = sample_windows(settings.seed, step, settings.batch, loader.len());
         let windows = loader.batch_changed(&which, &augment::changes(&settings, step, loader.fps()))?;
         let batch = StepBatch::draw(&windows, &settings, &network, step, &device)?;
-        // The copies to a card are complete when another thread uses them.
+        // The copies to a GPU are complete when another thread uses them.
         device.synchronize()?;
         Ok(batch)
     };
-    // On the CPU all threads but one are busy with the steps; a card leaves them idle.
+    // On the CPU all threads but one are busy with the steps; a GPU leaves them idle.
     let n_readers = if device.is_cpu() { 1 } else { rayon::current_num_threads().min(MAX_READERS) };
     let (outcome, waiting) = prefetch(settings.steps, n_readers, &batch, |batches| {
         let mut training = GanTraining {
@@ -233,6 +233,17 @@ struct GanTraining<'a, 'b, 'c> {
     waiting: Duration,
 }
 
+impl GanTraining<'_, '_, '_> {
+    /// Reads the losses of the steps since the last call, and checks that the training has not diverged.
+    fn read_losses(&mut self) -> Result<()> {
+        for (step, losses) in self.trainer.take_losses()? {
+            resume::ensure_not_diverged(step, &losses.named(), losses.gradient_norm)?;
+            self.last = Some(losses);
+        }
+        Ok(())
+    }
+}
+
 impl ValidatedTraining for GanTraining<'_, '_, '_> {
     type Validation = Validation;
 
@@ -273,10 +284,7 @@ impl ValidatedTraining for GanTraining<'_, '_, '_> {
         let (step, schedule) = (self.trainer.step, self.schedule());
         let read_every = [epochs::LOG_EVERY, schedule.epoch_steps, schedule.checkpoint_every, schedule.steps];
         if self.trainer.device().is_cpu() || self.last.is_none() || read_every.iter().any(|n| step.is_multiple_of(*n)) {
-            for (step, losses) in self.trainer.take_losses()? {
-                resume::ensure_not_diverged(step, &losses.named(), losses.gradient_norm)?;
-                self.last = Some(losses);
-            }
+            self.read_losses()?;
         }
         self.stepping += before.elapsed();
         let losses = self.last.context("a step without losses")?;
@@ -297,7 +305,9 @@ impl ValidatedTraining for GanTraining<'_, '_, '_> {
         validation.summary()
     }
 
-    fn save(&self, folder: &Path) -> Result<()> {
+    fn save(&mut self, folder: &Path) -> Result<()> {
+        // On a GPU, the losses of the last steps may not have been read.
+        self.read_losses()?;
         self.trainer.save(folder)
     }
 

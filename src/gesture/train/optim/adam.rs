@@ -6,8 +6,8 @@ use anyhow::{Context, ensure};
 use candle_core::backprop::GradStore;
 use candle_core::{CpuStorage, Device, InplaceOp2, Layout, Result, Tensor, Var};
 use candle_nn::Optimizer;
-use orator_nn::card::launch::{is_on_device, read};
 use orator_nn::cpu::spin_pool::{parallel_for, parallel_map};
+use orator_nn::gpu::launch::{is_on_device, read};
 use orator_nn::params::Params;
 use std::cell::RefCell;
 use std::collections::BTreeMap;
@@ -46,7 +46,7 @@ pub struct Adam {
     /// Norm of the last gradient, before clipping.
     norm: f64,
     slots: Vec<AdamSlot>,
-    /// Moments of tensors on a card.
+    /// Moments of tensors on a GPU.
     device: Option<DeviceAdam>,
 }
 
@@ -74,7 +74,7 @@ struct AdamScalars {
     keep: f32,
 }
 
-/// First moment, second moment, largest second moment (empty without AMSGrad); all empty on a card.
+/// First moment, second moment, largest second moment (empty without AMSGrad); all empty on a GPU.
 #[derive(Clone, Default)]
 struct AdamMoments {
     first: Vec<f32>,
@@ -117,10 +117,10 @@ impl Adam {
         Ok(self.norm)
     }
 
-    /// Runs one update with the gradients of `loss`, of tensors on a card; writes the gradient norm before clipping to
+    /// Runs one update with the gradients of `loss`, of tensors on a GPU; writes the gradient norm before clipping to
     /// `norm` [1], without reading it.
     pub fn minimise(&mut self, loss: &Tensor, learning_rate: f64, norm: &Tensor) -> Result<()> {
-        let Some(device) = &self.device else { candle_core::bail!("Adam: expected tensors on a card") };
+        let Some(device) = &self.device else { candle_core::bail!("Adam: expected tensors on a GPU") };
         device.add_gradients_of(loss)?;
         self.step += 1;
         device.update(&self.config, self.step, learning_rate, Some(norm))?;

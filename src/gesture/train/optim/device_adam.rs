@@ -1,11 +1,11 @@
-//! Adam on a card: gradients and moments in one flat tensor each, and one kernel for the norm and one for the update of all
-//! tensors. Results equal those of the kernel for the CPU up to rounding; nothing is read from the card.
+//! Adam on a GPU: gradients and moments in one flat tensor each, and one kernel for the norm and one for the update of all
+//! tensors. Results equal those of the kernel for the CPU up to rounding; nothing is read from the GPU.
 
 use super::adam::Config;
 use candle_core::backprop::GradStore;
 use candle_core::{Device, Result, Tensor, Var};
-use orator_nn::card::gradients::{FlatGradients, backward};
-use orator_nn::card::launch::{address, run};
+use orator_nn::gpu::gradients::{FlatGradients, backward};
+use orator_nn::gpu::launch::{address, run};
 use std::sync::Arc;
 
 /// Values per block of the update.

@@ -1,4 +1,4 @@
-//! The optimiser: Adam with fused kernels, for the CPU and for a card.
+//! The optimiser: Adam with fused kernels, for the CPU and for a GPU.
 
 pub mod adam;
 mod device_adam;

@@ -273,7 +273,7 @@ impl ValidatedTraining for SequenceTraining<'_> {
         format!("{split} L1 {l1:.3} (mean pose {mean_pose_l1:.3}), energy {:.0} %", 100.0 * energy)
     }
 
-    fn save(&self, folder: &Path) -> Result<()> {
+    fn save(&mut self, folder: &Path) -> Result<()> {
         self.trainer.save(folder)
     }
 

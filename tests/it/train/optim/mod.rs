@@ -1,4 +1,4 @@
-//! Optimisers, and steps on a card.
+//! Optimisers, and steps on a GPU.
 
 mod adam;
-mod card;
+mod gpu;

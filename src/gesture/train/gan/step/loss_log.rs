@@ -1,10 +1,10 @@
-//! Losses of the steps of a training. On a card they remain in its memory until several steps are read at once, since a read
+//! Losses of the steps of a training. On a GPU they remain in its memory until several steps are read at once, since a read
 //! waits for all of its work.
 
 use anyhow::Result;
 use candle_core::{Device, Tensor};
 use orator_dataset::config::GanSettings;
-use orator_nn::card::launch::read;
+use orator_nn::gpu::launch::read;
 
 /// Number of steps that are read at once at most.
 const N_STEPS: usize = 10;
@@ -38,7 +38,7 @@ impl Losses {
     }
 }
 
-/// Values of a step on a card, in their order in memory.
+/// Values of a step on a GPU, in their order in memory.
 #[derive(Clone, Copy)]
 pub(super) enum StepValue {
     /// Followed by `speed` and `energy`.
@@ -56,12 +56,12 @@ const N_VALUES: usize = 9;
 #[derive(Default)]
 pub(super) struct LossLog {
     losses: Vec<(usize, Losses)>,
-    /// Values of [`N_STEPS`] steps on the card, and the steps of those that have been written.
+    /// Values of [`N_STEPS`] steps on the GPU, and the steps of those that have been written.
     values: Option<Tensor>,
     written: Vec<usize>,
 }
 
-/// Place of the values of one step on a card.
+/// Place of the values of one step on a GPU.
 pub(super) struct StepValues(Tensor);
 
 impl StepValues {
@@ -96,7 +96,7 @@ impl LossLog {
         Ok(StepValues(of_step))
     }
 
-    /// Reads the values on the card, and starts with new ones.
+    /// Reads the values on the GPU, and starts with new ones.
     fn read(&mut self, settings: &GanSettings) -> Result<()> {
         let Some(values) = self.values.take() else { return Ok(()) };
         let values = read(&values)?;

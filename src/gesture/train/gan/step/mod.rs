@@ -1,4 +1,4 @@
-//! Steps of the training of a generator and its discriminator, on the CPU (`trainer`) or on a card (`on_device`), with the
+//! Steps of the training of a generator and its discriminator, on the CPU (`trainer`) or on a GPU (`on_device`), with the
 //! random numbers of a step (`batch`) and its losses (`loss_log`).
 
 mod batch;

@@ -1,4 +1,4 @@
-//! A step on a card: the losses of `gan::losses` in the kernels of `nn::card`, the discriminator on real and generated
+//! A step on a GPU: the losses of `gan::losses` in the kernels of `nn::gpu`, the discriminator on real and generated
 //! motion at once, and no value is read.
 
 use super::super::{average, losses};
@@ -9,7 +9,7 @@ use crate::generate::normalisation::N_FEATURES;
 use anyhow::Result;
 use candle_core::Tensor;
 use orator_dataset::config::AdversarialLoss;
-use orator_nn::card::poses::{ScoreTerm, motion, pose_losses, score_losses};
+use orator_nn::gpu::poses::{ScoreTerm, motion, pose_losses, score_losses};
 
 /// Terms of the scores of real and generated motion in the discriminator's loss, and of the latter in the generator's.
 fn terms(loss: AdversarialLoss) -> [ScoreTerm; 3] {

@@ -15,10 +15,10 @@ use candle_core::{Device, Tensor};
 use orator_dataset::config::{GanConfig, GanSettings, to_stored};
 use orator_formats::checkpoint;
 use orator_formats::word_vectors::WordVectors;
-use orator_nn::card::launch::is_on_device;
 use orator_nn::gan::discriminator::{Discriminator, motion};
 use orator_nn::gan::generator::Generator;
 use orator_nn::gan::words::WORDS;
+use orator_nn::gpu::launch::is_on_device;
 use orator_nn::params::Params;
 use orator_nn::weights::Contents;
 use serde_json::Value;
@@ -60,7 +60,7 @@ pub struct GanTrainer {
     pub(super) generator_params: Params,
     /// Exponential moving average of the generator, if `ema_decay` is above 0.
     pub(super) ema: Option<(Generator, Params)>,
-    /// Tensors of both on a card.
+    /// Tensors of both on a GPU.
     pub(super) ema_parts: Option<Tensor>,
     pub(super) discriminator: Discriminator,
     discriminator_params: Params,
@@ -133,12 +133,12 @@ impl GanTrainer {
         Ok(losses)
     }
 
-    /// Losses of the steps since the last call, with the number of their step. On a card this waits for all of its work.
+    /// Losses of the steps since the last call, with the number of their step. On a GPU this waits for all of its work.
     pub fn take_losses(&mut self) -> Result<Vec<(usize, Losses)>> {
         self.losses.take(&self.settings)
     }
 
-    /// Runs a step like `step`, without reading its losses on a card; `batch` is on the device of the training.
+    /// Runs a step like `step`, without reading its losses on a GPU; `batch` is on the device of the training.
     pub fn advance(&mut self, batch: &StepBatch, phase: &mut dyn FnMut(&'static str)) -> Result<()> {
         if is_on_device(&batch.windows.poses) {
             return self.advance_on_device(batch);

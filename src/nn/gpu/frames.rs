@@ -1,4 +1,4 @@
-//! Resizing of frames on a card, channels first: linear interpolation as in `ops::resize`, and doubling.
+//! Resizing of frames on a GPU, channels first: linear interpolation as in `ops::resize`, and doubling.
 
 use super::launch::{blocks, result, run};
 use super::layer::attached;

@@ -62,7 +62,7 @@ fn backward(
 /// Layers of a UNet over time.
 pub struct UnetLayers {
     pub enter: Vec<DeviceLayer>,
-    /// Layers that halve the frame rate, and as many after a doubling of it.
+    /// Layers that halve the frame rate, and as many that follow an upsampling.
     pub downs: Vec<DeviceLayer>,
     pub ups: Vec<DeviceLayer>,
     pub decoder: Vec<DeviceLayer>,

@@ -1,4 +1,4 @@
-//! Forward kinematics and the losses of poses and scores on a card, each in one to three kernels. Poses are
+//! Forward kinematics and the losses of poses and scores on a GPU, each in one to three kernels. Poses are
 //! [B, features, T] with three features per joint; further features follow those of the joints.
 
 use super::launch::{blocks, result, run};

@@ -1,6 +1,6 @@
-//! Training steps with the kernels of a card, compiled for the CPU, agree with those of the CPU.
+//! Training steps with the kernels of a GPU, compiled for the CPU, agree with those of the CPU.
 
-use crate::fixtures::card_shim::CardShim;
+use crate::fixtures::gpu_shim::GpuShim;
 use anyhow::Result;
 use candle_core::{Device, Tensor};
 use ndarray::Array2;
@@ -144,7 +144,7 @@ fn cases() -> Vec<Case> {
 /// CPU alone as well: here the rate is 50 times lower.
 #[test]
 fn twenty_steps_from_one_checkpoint_agree() -> Result<()> {
-    let Some(card) = CardShim::with_threads(1) else { return Ok(()) };
+    let Some(gpu) = GpuShim::with_threads(1) else { return Ok(()) };
     for mut case in cases() {
         (case.1.learning_rate, case.1.warmup_steps) = (2e-5, 0);
         let folder = tempfile::tempdir()?;
@@ -152,12 +152,12 @@ fn twenty_steps_from_one_checkpoint_agree() -> Result<()> {
         let from = checkpoint::path(folder.path(), 4);
         let n = if case.0 == "rebol2021" { 4 } else { 20 };
         let (own, own_trainer) = steps(&case, Some(&from), n)?;
-        let (of_card, card_trainer) = card.run(|| steps(&case, Some(&from), n))?;
-        let off = difference(&own, &of_card);
+        let (of_gpu, gpu_trainer) = gpu.run(|| steps(&case, Some(&from), n))?;
+        let off = difference(&own, &of_gpu);
         assert!(off < if case.0 == "light" { 1e-3 } else { 5e-3 }, "{}: {off:e}", case.0);
         // Validation uses the average and the running statistics.
         let windows = windows(case.2, case.3 > 0, 99)?;
-        let (own_error, card_error) = (own_trainer.error(&windows)?, card.run(|| card_trainer.error(&windows))?);
+        let (own_error, card_error) = (own_trainer.error(&windows)?, gpu.run(|| gpu_trainer.error(&windows))?);
         assert!((own_error / card_error - 1.0).abs() < 1e-3, "{}: {own_error} {card_error}", case.0);
     }
     Ok(())
@@ -165,19 +165,19 @@ fn twenty_steps_from_one_checkpoint_agree() -> Result<()> {
 
 #[test]
 fn each_of_twenty_steps_at_the_rate_of_the_recipe_agrees() -> Result<()> {
-    let Some(card) = CardShim::with_threads(1) else { return Ok(()) };
+    let Some(gpu) = GpuShim::with_threads(1) else { return Ok(()) };
     let (case, folder) = (&cases()[0], tempfile::tempdir()?);
     let mut own = trainer(case, None)?;
     for step in 0..20 {
         own.save(folder.path())?;
         let from = checkpoint::path(folder.path(), step);
         let losses = own.step(&windows(1, false, step)?)?;
-        let (of_card, card_trainer) = card.run(|| steps(case, Some(&from), 1))?;
-        let (off, norms) = (difference(&[losses], &of_card), [losses.gradient_norm, of_card[0].gradient_norm]);
+        let (of_gpu, gpu_trainer) = gpu.run(|| steps(case, Some(&from), 1))?;
+        let (off, norms) = (difference(&[losses], &of_gpu), [losses.gradient_norm, of_gpu[0].gradient_norm]);
         // A value at the kink of a leaky ReLU changes the norm, which bounds the gradients.
         let off_norm = (norms[0] / norms[1] - 1.0).abs();
         assert!(off < 1e-4 && off_norm < 1e-2, "step {step}: {off:e} {off_norm:e}");
-        let others = card.run(|| card_trainer.generator_tensors())?;
+        let others = gpu.run(|| gpu_trainer.generator_tensors())?;
         for (name, tensor) in own.generator_tensors()? {
             let off = (tensor - &others[&name])?.abs()?.max_all()?.to_scalar::<f32>()?;
             assert!(f64::from(off) < 0.1 * case.1.learning_rate, "step {step}, {name}: {off:e}");
@@ -188,26 +188,26 @@ fn each_of_twenty_steps_at_the_rate_of_the_recipe_agrees() -> Result<()> {
 
 #[test]
 fn a_checkpoint_of_either_device_continues_on_the_other() -> Result<()> {
-    let Some(card) = CardShim::with_threads(1) else { return Ok(()) };
+    let Some(gpu) = GpuShim::with_threads(1) else { return Ok(()) };
     let case = &cases()[0];
     let folders = [tempfile::tempdir()?, tempfile::tempdir()?];
     let whole = steps(case, None, 6)?.0;
     steps(case, None, 3)?.1.save(folders[0].path())?;
-    card.run(|| steps(case, None, 3)?.1.save(folders[1].path()))?;
+    gpu.run(|| steps(case, None, 3)?.1.save(folders[1].path()))?;
     let paths = [0, 1].map(|i| checkpoint::path(folders[i].path(), 3));
-    let [of_cpu, of_card] = [Contents::read(&paths[0])?, Contents::read(&paths[1])?];
-    assert_eq!(of_cpu.facts, of_card.facts);
+    let [of_cpu, of_gpu] = [Contents::read(&paths[0])?, Contents::read(&paths[1])?];
+    assert_eq!(of_cpu.facts, of_gpu.facts);
     assert!(
         of_cpu
             .tensors
             .iter()
             .map(|(name, of)| (name, of.dims()))
-            .eq(of_card.tensors.iter().map(|(name, of)| (name, of.dims())))
+            .eq(of_gpu.tensors.iter().map(|(name, of)| (name, of.dims())))
     );
-    let on_card = card.run(|| anyhow::Ok(steps(case, Some(&paths[0]), 3)?.0))?;
+    let on_gpu = gpu.run(|| anyhow::Ok(steps(case, Some(&paths[0]), 3)?.0))?;
     let on_cpu = steps(case, Some(&paths[1]), 3)?.0;
-    let again = card.run(|| anyhow::Ok(steps(case, Some(&paths[1]), 3)?.0))?;
-    for losses in [on_card, on_cpu, again] {
+    let again = gpu.run(|| anyhow::Ok(steps(case, Some(&paths[1]), 3)?.0))?;
+    for losses in [on_gpu, on_cpu, again] {
         let off = difference(&whole[3..], &losses);
         assert!(off < 1e-2, "{off:e}");
     }
@@ -220,10 +220,10 @@ fn a_checkpoint_of_either_device_continues_on_the_other() -> Result<()> {
 fn a_step_needs_few_launches_and_ten_steps_one_read() -> Result<()> {
     const LAUNCHES_PER_NODE: usize = 3;
     for (case, most) in cases().into_iter().zip([300, 300, 400, 400, 400]) {
-        let Some(card) = CardShim::with_threads(1) else { return Ok(()) };
-        let (before, after) = card.run(|| {
+        let Some(gpu) = GpuShim::with_threads(1) else { return Ok(()) };
+        let (before, after) = gpu.run(|| {
             let (_, mut trainer) = steps(&case, None, 2)?;
-            let counts = || [&card.n_launches, &card.n_nodes, &card.n_reads].map(std::cell::Cell::get);
+            let counts = || [&gpu.n_launches, &gpu.n_nodes, &gpu.n_reads].map(std::cell::Cell::get);
             let before = counts();
             for _ in 0..10 {
                 let windows = windows(case.2, case.3 > 0, trainer.step)?;
@@ -243,7 +243,7 @@ fn a_step_needs_few_launches_and_ten_steps_one_read() -> Result<()> {
 
 #[test]
 fn adam_agrees_with_that_of_the_cpu() -> Result<()> {
-    let Some(card) = CardShim::with_threads(1) else { return Ok(()) };
+    let Some(gpu) = GpuShim::with_threads(1) else { return Ok(()) };
     for amsgrad in [false, true] {
         let descend = || -> Result<Vec<f32>> {
             let mut params = Params::new(3);
@@ -268,9 +268,9 @@ fn adam_agrees_with_that_of_the_cpu() -> Result<()> {
             let tensors = params.tensors()?;
             Ok([after, tensors["w.bias"].to_vec1()?, tensors["frozen"].to_vec1()?].concat())
         };
-        let (own, of_card) = (descend()?, card.run(descend)?);
-        assert_eq!(own[own.len() - 3..], of_card[own.len() - 3..]);
-        assert!(own.iter().zip(&of_card).all(|(a, b)| (a - b).abs() < 1e-5), "AMSGrad {amsgrad}");
+        let (own, of_gpu) = (descend()?, gpu.run(descend)?);
+        assert_eq!(own[own.len() - 3..], of_gpu[own.len() - 3..]);
+        assert!(own.iter().zip(&of_gpu).all(|(a, b)| (a - b).abs() < 1e-5), "AMSGrad {amsgrad}");
     }
     Ok(())
 }

@@ -1,12 +1,12 @@
-//! Networks with the kernels of a card, compiled for the CPU, equal those with the kernels for the CPU.
+//! Networks with the kernels of a GPU, compiled for the CPU, equal those with the kernels for the CPU.
 
-use crate::fixtures::card_shim::CardShim;
+use crate::fixtures::gpu_shim::GpuShim;
 use candle_core::{DType, Device, Result, Tensor, Var};
-use orator_nn::card::gradients::{FlatGradients, backward};
-use orator_nn::card::launch::{THREADS, result, run};
 use orator_nn::gan::discriminator::{self, Discriminator};
 use orator_nn::gan::generator::{Config, ConvBlock, Generator, Preset};
 use orator_nn::gan::words::{N_TIMES, WordFrames};
+use orator_nn::gpu::gradients::{FlatGradients, backward};
+use orator_nn::gpu::launch::{THREADS, result, run};
 use orator_nn::ops::conv2d::Conv;
 use orator_nn::ops::gradcheck::pattern;
 use orator_nn::ops::resize;
@@ -19,7 +19,7 @@ type Network = Box<dyn Fn(&Tensor) -> Result<Tensor>>;
 type Build = dyn Fn(&mut Params) -> Result<Network>;
 
 /// Result, gradients of input and parameters, and the values of all tensors after the pass, by name.
-fn passed(build: &Build, x: &Tensor, card: Option<&Rc<CardShim>>) -> anyhow::Result<BTreeMap<String, Vec<f64>>> {
+fn passed(build: &Build, x: &Tensor, gpu: Option<&Rc<GpuShim>>) -> anyhow::Result<BTreeMap<String, Vec<f64>>> {
     let mut params = Params::with_dtype(3, x.dtype());
     let network = build(&mut params)?;
     for (i, (name, var)) in params.all().enumerate().filter(|(_, (_, var))| var.rank() == 1) {
@@ -33,13 +33,13 @@ fn passed(build: &Build, x: &Tensor, card: Option<&Rc<CardShim>>) -> anyhow::Res
     let loss = (&y * pattern(y.dims(), 0.5)?.to_dtype(x.dtype())?)?.sum_all()?;
     let values = |tensor: &Tensor| tensor.contiguous()?.flatten_all()?.to_dtype(DType::F64)?.to_vec1();
     let mut all: BTreeMap<String, Vec<f64>> = BTreeMap::from([("result".to_owned(), values(&y)?)]);
-    let of_card = Arc::new(FlatGradients::of(vars.iter().map(|(_, var)| var.clone()).collect())?);
-    let of_cpu = match card {
-        Some(_) => backward(&loss, &of_card).map(|()| None)?,
+    let of_gpu = Arc::new(FlatGradients::of(vars.iter().map(|(_, var)| var.clone()).collect())?);
+    let of_cpu = match gpu {
+        Some(_) => backward(&loss, &of_gpu).map(|()| None)?,
         None => Some(loss.backward()?),
     };
     for (name, var) in &vars {
-        let gradient = of_cpu.as_ref().map_or(of_card.get(var), |of_cpu| of_cpu.get(var));
+        let gradient = of_cpu.as_ref().map_or(of_gpu.get(var), |of_cpu| of_cpu.get(var));
         all.insert(format!("gradient of {name}"), gradient.map_or(Ok(vec![0.0; var.elem_count()]), values)?);
     }
     for (name, var) in params.all() {
@@ -48,17 +48,17 @@ fn passed(build: &Build, x: &Tensor, card: Option<&Rc<CardShim>>) -> anyhow::Res
     Ok(all)
 }
 
-/// Largest difference between a card and the CPU, relative to the largest value of each tensor.
-fn difference(build: &Build, x: &Tensor, card: &Rc<CardShim>) -> anyhow::Result<f64> {
+/// Largest difference between a GPU and the CPU, relative to the largest value of each tensor.
+fn difference(build: &Build, x: &Tensor, gpu: &Rc<GpuShim>) -> anyhow::Result<f64> {
     let own = passed(build, x, None)?;
-    let n_before = card.n_launches.get();
-    let of_card = card.run(|| passed(build, x, Some(card)))?;
-    assert!(card.n_launches.get() > n_before + 2, "the kernels of a card were not used");
-    assert_eq!(own.keys().collect::<Vec<_>>(), of_card.keys().collect::<Vec<_>>());
+    let n_before = gpu.n_launches.get();
+    let of_gpu = gpu.run(|| passed(build, x, Some(gpu)))?;
+    assert!(gpu.n_launches.get() > n_before + 2, "the kernels of a GPU were not used");
+    assert_eq!(own.keys().collect::<Vec<_>>(), of_gpu.keys().collect::<Vec<_>>());
     let mut largest = 0.0f64;
     for (name, own) in &own {
         let scale = own.iter().fold(1e-3f64, |scale, v| scale.max(v.abs()));
-        let off = own.iter().zip(&of_card[name]).fold(0.0f64, |off, (a, b)| {
+        let off = own.iter().zip(&of_gpu[name]).fold(0.0f64, |off, (a, b)| {
             let off_here = (a - b).abs() / scale;
             if off_here.is_nan() { f64::INFINITY } else { off.max(off_here) }
         });
@@ -90,7 +90,7 @@ const LAYERS: [(&[usize], &[usize], usize); 13] = [
 
 #[test]
 fn layers_equal_those_of_the_cpu() -> anyhow::Result<()> {
-    let Some(card) = CardShim::with_threads(1) else { return Ok(()) };
+    let Some(gpu) = GpuShim::with_threads(1) else { return Ok(()) };
     for ((shape, weight, stride), (dtype, tolerance)) in
         LAYERS.into_iter().flat_map(|layer| TOLERANCES.map(|tolerance| (layer, tolerance)))
     {
@@ -100,14 +100,14 @@ fn layers_equal_those_of_the_cpu() -> anyhow::Result<()> {
                 let block = ConvBlock::new(params, "block", weight, stride, 0.1)?;
                 Ok(Box::new(move |x| block.forward(x, train)))
             };
-            let off = difference(&build, &x, &card)?;
+            let off = difference(&build, &x, &gpu)?;
             assert!(off < tolerance, "{shape:?} {weight:?} {stride} {train} {dtype:?}: {off:e}");
         }
         let build = move |params: &mut Params| -> Result<Network> {
             let conv = Conv::new(params, "conv", weight, stride)?;
             Ok(Box::new(move |x| conv.forward(x)))
         };
-        let off = difference(&build, &x, &card)?;
+        let off = difference(&build, &x, &gpu)?;
         assert!(off < tolerance, "{shape:?} {weight:?} {stride} without norm {dtype:?}: {off:e}");
     }
     for (dtype, tolerance) in TOLERANCES {
@@ -115,11 +115,11 @@ fn layers_equal_those_of_the_cpu() -> anyhow::Result<()> {
             let block = ConvBlock::full_height(params, "block", [3, 2, 3, 4], 0.01)?;
             Ok(Box::new(move |x| block.forward(x, true)))
         };
-        let off = difference(&build, &pattern(&[2, 7, 4, 2], 0.0)?.to_dtype(dtype)?, &card)?;
+        let off = difference(&build, &pattern(&[2, 7, 4, 2], 0.0)?.to_dtype(dtype)?, &gpu)?;
         assert!(off < tolerance, "full height {dtype:?}: {off:e}");
         for (n_in, n_out) in [(3, 5), (7, 6), (54, 64), (64, 9), (1, 6), (8, 1), (213, 32)] {
             let build = move |_: &mut Params| -> Result<Network> { Ok(Box::new(move |x| resize::linear(x, n_out))) };
-            let off = difference(&build, &pattern(&[2, n_in, 3], 0.0)?.to_dtype(dtype)?, &card)?;
+            let off = difference(&build, &pattern(&[2, n_in, 3], 0.0)?.to_dtype(dtype)?, &gpu)?;
             assert!(off < tolerance, "{n_in} to {n_out} frames, {dtype:?}: {off:e}");
         }
     }
@@ -135,7 +135,7 @@ fn words(n_frames: usize, dtype: DType) -> Result<WordFrames> {
 
 #[test]
 fn networks_equal_those_of_the_cpu() -> anyhow::Result<()> {
-    let Some(card) = CardShim::with_threads(1) else { return Ok(()) };
+    let Some(gpu) = GpuShim::with_threads(1) else { return Ok(()) };
     for (preset, vocabulary, n_speakers, n_frames) in
         [(Preset::Light, 0, 0, 64), (Preset::Light, 4, 2, 40), (Preset::Paper, 0, 0, 32)]
     {
@@ -151,7 +151,7 @@ fn networks_equal_those_of_the_cpu() -> anyhow::Result<()> {
                 }))
             };
             let x = pattern(&[2, 8, n_frames * 20 / 3], 1.0)?.to_dtype(dtype)?;
-            let off = difference(&build, &x, &card)?;
+            let off = difference(&build, &x, &gpu)?;
             // Rounding grows from layer to layer; there are 25.
             let tolerance = if dtype == DType::F32 { 10.0 * tolerance } else { tolerance };
             assert!(off < tolerance, "{preset:?} {vocabulary} {n_speakers} {dtype:?}: {off:e}");
@@ -162,7 +162,7 @@ fn networks_equal_those_of_the_cpu() -> anyhow::Result<()> {
             let network = Discriminator::new(params, 6)?;
             Ok(Box::new(move |poses| network.forward(&discriminator::motion(poses)?, true)))
         };
-        let off = difference(&build, &pattern(&[2, 6, n_frames], 1.0)?, &card)?;
+        let off = difference(&build, &pattern(&[2, 6, n_frames], 1.0)?, &gpu)?;
         assert!(off < 1e-10, "{n_frames} frames: {off:e}");
     }
     Ok(())
@@ -170,7 +170,7 @@ fn networks_equal_those_of_the_cpu() -> anyhow::Result<()> {
 
 #[test]
 fn groups_of_a_batch_are_scored_one_after_the_other() -> anyhow::Result<()> {
-    let Some(card) = CardShim::with_threads(1) else { return Ok(()) };
+    let Some(gpu) = GpuShim::with_threads(1) else { return Ok(()) };
     let motion = pattern(&[4, 6, 31], 0.0)?;
     let run = |n_groups: usize| -> anyhow::Result<(Vec<f64>, BTreeMap<String, Tensor>)> {
         let mut params = Params::with_dtype(1, DType::F64);
@@ -180,7 +180,7 @@ fn groups_of_a_batch_are_scored_one_after_the_other() -> anyhow::Result<()> {
         let scores = Tensor::cat(&scores.collect::<Result<Vec<_>>>()?, 0)?;
         Ok((scores.flatten_all()?.to_vec1()?, params.tensors()?))
     };
-    let ((apart, tensors), (together, others)) = card.run(|| anyhow::Ok((run(1)?, run(2)?)))?;
+    let ((apart, tensors), (together, others)) = gpu.run(|| anyhow::Ok((run(1)?, run(2)?)))?;
     assert!(apart.iter().zip(&together).all(|(a, b)| (a - b).abs() < 1e-12));
     for (name, tensor) in tensors {
         let off = (tensor - &others[&name])?.abs()?.max_all()?.to_scalar::<f64>()?;
@@ -191,13 +191,13 @@ fn groups_of_a_batch_are_scored_one_after_the_other() -> anyhow::Result<()> {
 
 #[test]
 fn any_number_of_threads_gives_the_same_result() -> anyhow::Result<()> {
-    let (Some(one), Some(many)) = (CardShim::with_threads(1), CardShim::with_threads(8)) else { return Ok(()) };
+    let (Some(one), Some(many)) = (GpuShim::with_threads(1), GpuShim::with_threads(8)) else { return Ok(()) };
     let build = |params: &mut Params| -> Result<Network> {
         let block = ConvBlock::new(params, "block", &[3, 2, 4], 2, 0.1)?;
         Ok(Box::new(move |x| resize::linear(&block.forward(x, true)?, 9)))
     };
     let x = pattern(&[3, 13, 2], 0.0)?;
-    let [one, many] = [one, many].map(|card| card.run(|| passed(&build, &x, Some(&card))));
+    let [one, many] = [one, many].map(|gpu| gpu.run(|| passed(&build, &x, Some(&gpu))));
     for ((name, a), b) in one?.into_iter().zip(many?.into_values()) {
         assert!(a.iter().zip(&b).all(|(a, b)| (a - b).abs() < 1e-12), "{name}: {a:?} {b:?}");
     }
@@ -206,9 +206,9 @@ fn any_number_of_threads_gives_the_same_result() -> anyhow::Result<()> {
 
 #[test]
 fn tensors_that_a_kernel_cannot_read_are_errors() -> anyhow::Result<()> {
-    let Some(card) = CardShim::with_threads(1) else { return Ok(()) };
+    let Some(gpu) = GpuShim::with_threads(1) else { return Ok(()) };
     let x = pattern(&[2, 3, 4], 0.0)?;
-    let message = card.run(|| run("accumulate", &[Some(&x.t()?), Some(&x)], &[24], &[], 1)).unwrap_err().to_string();
+    let message = gpu.run(|| run("accumulate", &[Some(&x.t()?), Some(&x)], &[24], &[], 1)).unwrap_err().to_string();
     assert!(message.contains("contiguous"), "{message}");
     let message = run("accumulate", &[Some(&x), Some(&result(24, &x)?)], &[24], &[], 1).unwrap_err().to_string();
     assert!(message.contains("feature `cuda`") || cfg!(feature = "cuda"), "{message}");

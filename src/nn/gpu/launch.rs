@@ -1,4 +1,4 @@
-//! Runs the kernels of `kernels.cu` and `training.cu`, and convolutions, on tensors: on a card, or with the executor of a
+//! Runs the kernels of `kernels.cu` and `training.cu`, and convolutions, on tensors: on a GPU, or with the executor of a
 //! test. Tensors are contiguous; a kernel writes to tensors in place.
 
 use candle_core::{CpuStorage, CudaStorage, InplaceOp1, Layout, Result, Shape, Tensor};
@@ -41,7 +41,7 @@ pub struct ConvolutionSizes {
     pub stride: [usize; 2],
 }
 
-/// What runs kernels on tensors that are not on a card: the tests' compilation for the CPU, which also counts.
+/// What runs kernels on tensors that are not on a GPU: the tests' compilation for the CPU, which also counts.
 pub trait KernelExecutor {
     /// Runs `n_blocks` blocks of a kernel on tensors of f64 or f32.
     fn run(&self, kernel: &str, is_f64: bool, arguments: &KernelArguments, n_blocks: usize);
@@ -55,7 +55,7 @@ pub trait KernelExecutor {
 
 thread_local!(static EXECUTOR: RefCell<Option<Rc<dyn KernelExecutor>>> = const { RefCell::new(None) });
 
-/// Calls `f`; until it returns, tensors on the CPU are treated as if on a card, whose kernels `executor` runs. For tests.
+/// Calls `f`; until it returns, tensors on the CPU are treated as if on a GPU, whose kernels `executor` runs. For tests.
 pub fn with_executor<R>(executor: Rc<dyn KernelExecutor>, f: impl FnOnce() -> R) -> R {
     let previous = EXECUTOR.replace(Some(executor));
     let result = f();
@@ -72,7 +72,7 @@ pub fn is_on_device(x: &Tensor) -> bool {
     !x.device().is_cpu() || EXECUTOR.with_borrow(Option::is_some)
 }
 
-/// Values of a tensor, of which the device has to complete all pending work first.
+/// Reads the values of a tensor, after the device has finished all pending work.
 pub fn read(x: &Tensor) -> Result<Vec<f32>> {
     if let Some(executor) = executor() {
         executor.note_read();
@@ -94,7 +94,7 @@ pub fn blocks(n: usize) -> usize {
 /// Runs `n_blocks` blocks of a kernel; see its first lines for the order of tensors (`None`: absent), integers and numbers.
 ///
 /// # Errors
-/// A tensor that is not contiguous, or has more values than 32 bits count; no card.
+/// A tensor that is not contiguous, or has more values than 32 bits count; no GPU.
 pub fn run(
     kernel: &'static str,
     tensors: &[Option<&Tensor>],
@@ -116,18 +116,19 @@ pub fn run(
     };
     match executor() {
         Some(executor) => executor.run(kernel, is_f64(values), &arguments, n_blocks),
-        None => on_card(values, kernel, &arguments, n_blocks)?,
+        None => on_gpu(values, kernel, &arguments, n_blocks)?,
     }
     Ok(())
 }
 
-/// Convolves `input`, `weight` and `result`, of which `pass` determines the one that is written. Sums have a fixed order.
+/// Runs one pass of a convolution; `pass` determines which of `input`, `weight` and `result` it writes. Sums have a fixed
+/// order.
 pub fn convolve(pass: ConvolutionPass, sizes: &ConvolutionSizes, tensors: [&Tensor; 3]) -> Result<()> {
     let [input, weight, result] = tensors.map(address);
     let addresses = [input?, weight?, result?];
     match executor() {
         Some(executor) => executor.convolve(pass, sizes, is_f64(tensors[0]), addresses),
-        None => convolve_on_card(pass, sizes, tensors[0], addresses)?,
+        None => convolve_on_gpu(pass, sizes, tensors[0], addresses)?,
     }
     Ok(())
 }
@@ -137,15 +138,15 @@ fn is_f64(tensor: &Tensor) -> bool {
 }
 
 #[cfg(feature = "cuda")]
-use super::cuda::{convolve_on_card, on_card};
+use super::cuda::{convolve_on_gpu, on_gpu};
 
 #[cfg(not(feature = "cuda"))]
-fn on_card(_: &Tensor, kernel: &str, _: &KernelArguments, _: usize) -> Result<()> {
+fn on_gpu(_: &Tensor, kernel: &str, _: &KernelArguments, _: usize) -> Result<()> {
     candle_core::bail!("cannot run kernel {kernel}: the program was built without the feature `cuda`")
 }
 
 #[cfg(not(feature = "cuda"))]
-fn convolve_on_card(_: ConvolutionPass, _: &ConvolutionSizes, _: &Tensor, _: [u64; 3]) -> Result<()> {
+fn convolve_on_gpu(_: ConvolutionPass, _: &ConvolutionSizes, _: &Tensor, _: [u64; 3]) -> Result<()> {
     candle_core::bail!("cannot run a convolution: the program was built without the feature `cuda`")
 }
 
@@ -163,7 +164,7 @@ impl AddressQuery {
     /// Start of a contiguous tensor in its storage.
     fn start(layout: &Layout) -> Result<usize> {
         if i32::try_from(layout.shape().elem_count()).is_err() {
-            candle_core::bail!("a tensor of shape {:?} is too large for the card: use a smaller batch", layout.dims());
+            candle_core::bail!("a tensor of shape {:?} is too large for the GPU: use a smaller batch", layout.dims());
         }
         match layout.contiguous_offsets() {
             Some((start, _)) => Ok(start),

@@ -1,4 +1,4 @@
-//! Kernels and convolutions on a card: the compiled kernels of this crate, and cuDNN with algorithms whose sums have a fixed
+//! Kernels and convolutions on a GPU: the compiled kernels of this crate, and cuDNN with algorithms whose sums have a fixed
 //! order.
 
 use super::launch::{ConvolutionPass, ConvolutionSizes, KernelArguments, THREADS};
@@ -22,8 +22,8 @@ const KERNELS: &str = include_str!(concat!(env!("OUT_DIR"), "/kernels.ptx"));
 // SAFETY: plain numbers in the layout of C, as the kernels declare them.
 unsafe impl DeviceRepr for KernelArguments {}
 
-/// Runs a kernel on the card of `values`.
-pub(super) fn on_card(values: &Tensor, kernel: &str, arguments: &KernelArguments, n_blocks: usize) -> Result<()> {
+/// Runs a kernel on the GPU of `values`.
+pub(super) fn on_gpu(values: &Tensor, kernel: &str, arguments: &KernelArguments, n_blocks: usize) -> Result<()> {
     ensure_f32(values)?;
     let function = values.device().as_cuda_device()?.get_or_load_custom_func(kernel, "orator", KERNELS)?;
     let (grid_dim, block_dim) = ((n_blocks as u32, 1, 1), (THREADS as u32, 1, 1));
@@ -38,7 +38,7 @@ pub(super) fn on_card(values: &Tensor, kernel: &str, arguments: &KernelArguments
 fn ensure_f32(tensor: &Tensor) -> Result<()> {
     match tensor.dtype() {
         DType::F32 => Ok(()),
-        other => candle_core::bail!("networks on a card need tensors of f32, found {other:?}"),
+        other => candle_core::bail!("networks on a GPU need tensors of f32, found {other:?}"),
     }
 }
 
@@ -108,8 +108,8 @@ fn handle(device: &CudaDevice) -> Result<Arc<Cudnn>> {
     })
 }
 
-/// Runs a pass of a convolution on the card of `values`; see [`super::launch::convolve`].
-pub(super) fn convolve_on_card(
+/// Runs a pass of a convolution on the GPU of `values`; see [`super::launch::convolve`].
+pub(super) fn convolve_on_gpu(
     pass: ConvolutionPass,
     sizes: &ConvolutionSizes,
     values: &Tensor,
