@@ -1,5 +1,6 @@
 //! Description of one model: its sources, preprocessing and decoding. A strict data type (unknown keys are errors).
 
+use super::convert::SourceFormat;
 use super::{Conversion, ModelSource, SourceFile};
 use serde::{Deserialize, Serialize};
 
@@ -214,6 +215,18 @@ impl ModelEntry {
     /// Whether the model, or the files from which it is built, can be downloaded.
     pub fn is_served(&self) -> bool {
         self.url.is_some() || !self.sources.is_empty()
+    }
+
+    /// Number of values of the input.
+    pub fn input_len(&self) -> usize {
+        let shape = self.inputs.first().map(|port| port.shape.as_slice()).unwrap_or_default();
+        shape.iter().map(|side| usize::try_from(*side).unwrap_or(0)).product()
+    }
+
+    /// Whether the file accepts any number of pictures per run: those converted from ncnn and TFLite do.
+    pub fn accepts_batches(&self) -> bool {
+        let format = self.convert.as_ref().map(|conversion| conversion.format);
+        matches!(format, Some(SourceFormat::Ncnn | SourceFormat::Tflite))
     }
 
     /// Description of the model, its origin and its licence, for users.

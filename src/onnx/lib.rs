@@ -2,6 +2,7 @@
 //! checks of hashes, names and shapes, the models folder, and conversion from other formats. The manifest states the
 //! meaning of each output; `pose2d` decodes them.
 
+mod batch;
 pub mod check;
 pub mod convert;
 pub mod entry;
@@ -14,6 +15,7 @@ pub mod source;
 pub mod speech;
 pub mod store;
 
+pub use batch::{Inference, PICTURES_ON_GPU};
 pub use entry::*;
 pub use fetch::FetchSource;
 pub use manifest::{MANIFEST_FILE, Manifest};

@@ -2,9 +2,11 @@
 //! input buffer and measures the time spent inside ONNX Runtime.
 
 use super::convert::BATCH;
-use super::{ModelEntry, ModelRole, Port, Runtime};
-use anyhow::{Context, Result, anyhow};
+use super::{Inference, ModelEntry, ModelRole, Port, Runtime};
+use anyhow::{Context, Result, anyhow, bail};
 use orator_base::input;
+use ort::ep::CUDA;
+use ort::ep::cuda::ConvAlgorithmSearch;
 use ort::session::builder::GraphOptimizationLevel;
 use ort::session::{Session, SessionOutputs};
 use ort::value::{Outlet, TensorElementType, TensorRef, ValueType};
@@ -41,24 +43,31 @@ pub enum ModelError {
     LayoutMismatch { id: String, path: PathBuf, port: String, expected: String, found: String },
 }
 
-/// A model that is ready to run, on one thread.
+/// A model that is ready to run: on one thread, or shared with other workers.
 pub struct Model {
     entry: ModelEntry,
-    session: Session,
-    shape: Vec<i64>,
+    engine: Engine,
     input: Vec<f32>,
     inside: Duration,
     n_runs: u64,
 }
 
+enum Engine {
+    Session(Session),
+    /// The runs, the folder of the model, and the values of all outputs of the last run.
+    Shared(Inference, PathBuf, Vec<f32>),
+}
+
 impl Model {
-    /// Opens the file of `entry` in the folder `dir`. Errors are documented in [`ModelError`].
+    /// Opens the file of `entry` in the folder `dir`, unless the model is shared. Errors are documented in
+    /// [`ModelError`].
     pub fn open(runtime: &Runtime, entry: &ModelEntry, dir: &Path) -> Result<Self, ModelError> {
-        let session = open_session(runtime, entry, dir)?;
-        let shape = entry.inputs.first().map(|port| port.shape.clone()).unwrap_or_default();
-        let size = shape.iter().map(|side| usize::try_from(*side).unwrap_or(0)).product();
-        let input = vec![0.0; size];
-        Ok(Self { entry: entry.clone(), session, shape, input, inside: Duration::ZERO, n_runs: 0 })
+        let engine = match &runtime.inference {
+            Some(shared) if entry.accepts_batches() => Engine::Shared(shared.clone(), dir.to_owned(), Vec::new()),
+            _ => Engine::Session(open_session(runtime, entry, dir, SessionKind::OnePicture)?),
+        };
+        let input = vec![0.0; entry.input_len()];
+        Ok(Self { entry: entry.clone(), engine, input, inside: Duration::ZERO, n_runs: 0 })
     }
 
     pub fn entry(&self) -> &ModelEntry {
@@ -71,16 +80,26 @@ impl Model {
     }
 
     pub fn run(&mut self) -> Result<Outputs<'_>> {
-        let input = TensorRef::from_array_view((self.shape.as_slice(), self.input.as_slice()))?;
-        let start = Instant::now();
-        let outputs = self.session.run(ort::inputs![input]);
+        let (id, start) = (&self.entry.id, Instant::now());
+        let outputs = match &mut self.engine {
+            Engine::Session(session) => {
+                let shape = self.entry.inputs.first().map(|port| port.shape.as_slice()).unwrap_or_default();
+                let input = TensorRef::from_array_view((shape, self.input.as_slice()))?;
+                let outputs = session.run(ort::inputs![input]);
+                let outputs = outputs.map_err(|error| anyhow!("the model {id} failed: {error}"))?;
+                Outputs::Session(id, outputs)
+            }
+            Engine::Shared(inference, dir, values) => {
+                *values = inference(&self.entry, dir, &self.input)?;
+                Outputs::Shared(&self.entry, values)
+            }
+        };
         self.inside += start.elapsed();
         self.n_runs += 1;
-        let outputs = outputs.map_err(|error| anyhow!("the model {} failed: {error}", self.entry.id))?;
-        Ok(Outputs { id: &self.entry.id, outputs })
+        Ok(outputs)
     }
 
-    /// Total time spent in `Session::run`, seconds.
+    /// Total time of the runs, seconds.
     pub fn secs_inside(&self) -> f64 {
         self.inside.as_secs_f64()
     }
@@ -91,15 +110,28 @@ impl Model {
 }
 
 /// Outputs of a run; borrowed from the model until the next run.
-pub struct Outputs<'m> {
-    pub(super) id: &'m str,
-    pub(super) outputs: SessionOutputs<'m>,
+pub enum Outputs<'m> {
+    /// Those of the model with this id.
+    Session(&'m str, SessionOutputs<'m>),
+    /// The values of all outputs of a shared model, in the order of its description.
+    Shared(&'m ModelEntry, &'m [f32]),
 }
 
 impl Outputs<'_> {
     /// Shape and values of a float output.
     pub fn floats(&self, name: &str) -> Result<(&[i64], &[f32])> {
-        self.read(name)
+        let Self::Shared(entry, values) = self else { return self.read(name) };
+        let mut rest = *values;
+        for Port { name: known, shape } in &entry.outputs {
+            let size = shape.iter().map(|side| usize::try_from(*side).unwrap_or(0)).product();
+            let too_few = || format!("the model {} returned too few values", entry.id);
+            let (own, following) = rest.split_at_checked(size).with_context(too_few)?;
+            if known == name {
+                return Ok((shape, own));
+            }
+            rest = following;
+        }
+        bail!("the model {} has no output {name:?}", entry.id)
     }
 
     /// Shape and values of an integer output.
@@ -108,10 +140,11 @@ impl Outputs<'_> {
     }
 
     fn read<T: ort::value::PrimitiveTensorElementType>(&self, name: &str) -> Result<(&[i64], &[T])> {
-        let value = self.outputs.get(name).with_context(|| format!("the model {} has no output {name:?}", self.id))?;
+        let Self::Session(id, outputs) = self else { bail!("shared models have no integer output {name:?}") };
+        let value = outputs.get(name).with_context(|| format!("the model {id} has no output {name:?}"))?;
         let (shape, numbers) = value
             .try_extract_tensor::<T>()
-            .map_err(|error| anyhow!("the output {name:?} of the model {}: {error}", self.id))?;
+            .map_err(|error| anyhow!("the output {name:?} of the model {id}: {error}"))?;
         Ok((shape, numbers))
     }
 }
@@ -125,7 +158,12 @@ pub fn sha256_of(path: &Path) -> Result<String> {
 }
 
 /// Opens the file of `entry` in the folder `dir` after checking its hash, names and shapes.
-pub(super) fn open_session(runtime: &Runtime, entry: &ModelEntry, dir: &Path) -> Result<Session, ModelError> {
+pub(super) fn open_session(
+    runtime: &Runtime,
+    entry: &ModelEntry,
+    dir: &Path,
+    kind: SessionKind,
+) -> Result<Session, ModelError> {
     // The sample rate input of a speech model is an integer; inputs of image models are floats.
     let is_speech = entry.role == ModelRole::Speech;
     let path = dir.join(&entry.file);
@@ -141,7 +179,7 @@ pub(super) fn open_session(runtime: &Runtime, entry: &ModelEntry, dir: &Path) ->
     if !found.eq_ignore_ascii_case(&entry.sha256) {
         return Err(ModelError::HashMismatch { id: id(), path, expected: entry.sha256.clone(), found });
     }
-    let session = session(runtime, &bytes).map_err(|error| ModelError::NotOnnx {
+    let session = session(runtime, &bytes, kind).map_err(|error| ModelError::NotOnnx {
         id: id(),
         path: path.clone(),
         error: error.to_string(),
@@ -154,12 +192,21 @@ pub(super) fn open_session(runtime: &Runtime, entry: &ModelEntry, dir: &Path) ->
     Ok(session)
 }
 
-/// Creates a session for one picture per run with one thread, no spinning, full optimisation and deterministic results.
-fn session(runtime: &Runtime, bytes: &[u8]) -> Result<Session> {
+/// Pictures per run of a session, and its processor.
+#[derive(Clone, Copy)]
+pub(super) enum SessionKind {
+    OnePicture,
+    Batches,
+    /// Batches on the NVIDIA GPU of this number.
+    Gpu(usize),
+}
+
+/// Creates a session with one thread, no spinning, full optimisation and deterministic results.
+pub(super) fn session(runtime: &Runtime, bytes: &[u8], kind: SessionKind) -> Result<Session> {
     fn to_anyhow<T>(error: ort::Error<T>) -> anyhow::Error {
         anyhow!("{error}")
     }
-    Session::builder(runtime.environment())?
+    let builder = Session::builder(runtime.environment())?
         .with_intra_threads(1)
         .map_err(to_anyhow)?
         .with_inter_threads(1)
@@ -171,11 +218,17 @@ fn session(runtime: &Runtime, bytes: &[u8]) -> Result<Session> {
         .with_deterministic_compute(true)
         .map_err(to_anyhow)?
         .with_log_level(ort::logging::LogLevel::Error)
-        .map_err(to_anyhow)?
-        .with_dimension_override(BATCH, 1)
-        .map_err(to_anyhow)?
-        .commit_from_memory(bytes)
-        .map_err(to_anyhow)
+        .map_err(to_anyhow)?;
+    // Products in TF32 have the precision of float16.
+    let cuda = |gpu| {
+        CUDA::default().with_device_id(gpu).with_tf32(false).with_conv_algorithm_search(ConvAlgorithmSearch::Heuristic)
+    };
+    let builder = match kind {
+        SessionKind::OnePicture => builder.with_dimension_override(BATCH, 1),
+        SessionKind::Batches => Ok(builder),
+        SessionKind::Gpu(gpu) => builder.with_execution_providers([cuda(gpu as i32).build().error_on_failure()]),
+    };
+    builder.map_err(to_anyhow)?.commit_from_memory(bytes).map_err(to_anyhow)
 }
 
 /// The first difference between the file and the manifest: port, expected value, found value. `all`: the manifest

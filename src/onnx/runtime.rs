@@ -1,5 +1,6 @@
 //! ONNX Runtime: its shared library is located and loaded on first use, once per process.
 
+use super::Inference;
 use anyhow::{Result, anyhow, bail};
 use ort::environment::Environment;
 use std::ffi::OsStr;
@@ -20,6 +21,8 @@ pub const TELEMETRY_OFF: &str = "ORT_DISABLE_TELEMETRY";
 pub struct Runtime {
     environment: Environment,
     library: PathBuf,
+    /// Runs the models that accept batches; `None`: each opened model runs on its own, on the CPU.
+    pub inference: Option<Inference>,
 }
 
 /// One runtime per process: the first library loaded is used from then on.
@@ -47,9 +50,14 @@ impl Runtime {
                 )
             })?;
         environment.set_log_level(ort::logging::LogLevel::Error);
-        let runtime = Self { environment, library };
+        let runtime = Self { environment, library, inference: None };
         *loaded = Some(runtime.clone());
         Ok(runtime)
+    }
+
+    /// The same runtime, with models that accept batches run by `inference`.
+    pub fn with_inference(self, inference: Inference) -> Self {
+        Self { inference: Some(inference), ..self }
     }
 
     pub fn library(&self) -> &Path {

@@ -1,7 +1,7 @@
 //! Speech detection model (Silero VAD, version 6, 16 kHz): it processes consecutive windows of audio, each with the
 //! end of the previous window and the recurrent state.
 
-use super::model::{Outputs, open_session};
+use super::model::{Outputs, SessionKind, open_session};
 use super::{ModelEntry, ModelError, Port, Runtime};
 use anyhow::{Result, anyhow, ensure};
 use orator_base::text::counted;
@@ -33,7 +33,7 @@ pub struct SpeechModel {
 impl SpeechModel {
     /// Opens the file of `entry` in the folder `dir`. Errors are documented in [`ModelError`].
     pub fn open(runtime: &Runtime, entry: &ModelEntry, dir: &Path) -> Result<Self, ModelError> {
-        let session = open_session(runtime, entry, dir)?;
+        let session = open_session(runtime, entry, dir, SessionKind::OnePicture)?;
         let n_state: i64 = STATE.iter().product();
         Ok(Self {
             id: entry.id.clone(),
@@ -57,7 +57,7 @@ impl SpeechModel {
             INPUTS[2] => TensorRef::from_array_view(((), [RATE].as_slice())).map_err(|e| failed(&e))?,
         ];
         let outputs = self.session.run(inputs).map_err(|error| failed(&error))?;
-        let outputs = Outputs { id: &self.id, outputs };
+        let outputs = Outputs::Session(&self.id, outputs);
         let (probability, state) = (outputs.floats(OUTPUTS[0])?.1, outputs.floats(OUTPUTS[1])?.1);
         ensure!(
             probability.len() == 1 && state.len() == self.state.len(),

@@ -146,7 +146,8 @@ impl Pipeline {
         let mut remaining = self.videos(&selection.speakers)?;
         let settings = &self.config().settings;
         if selection.has(StageName::Pose2d) && remaining.iter().any(Videos::has_video_files) {
-            stages::check_models(settings)?;
+            let note = stages::check_models(settings)?;
+            note.iter().for_each(|line| progress.event(&Event::Advice { line }));
         }
         let transcribes = remaining.iter().any(|videos| settings.transcribes(&videos.speaker));
         ensure!(

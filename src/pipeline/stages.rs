@@ -6,7 +6,7 @@ use super::keypoints::stage::StageBySource;
 use super::lift::LiftStage;
 use super::lift::lifter::context_secs;
 use super::pose2d::Pose2dStage;
-use super::pose2d::models::ChosenModels;
+use super::pose2d::models::{self, ChosenModels};
 use super::segment::SegmentStage;
 use super::speech::speech_rule::SpeechDetector;
 use super::transcribe::TranscribeStage;
@@ -72,16 +72,17 @@ pub fn ready(config: &Config, videos: &Videos, hashes: &HashCache) -> Result<Vec
     Ok(videos.units.iter().filter(fresh).cloned().collect())
 }
 
-/// Opens every model that the configuration selects, so that an invalid setup is reported before any work.
+/// Opens every model that the configuration selects, so that an invalid setup is reported before any work. Returns a note
+/// to print.
 ///
 /// # Errors
-/// ONNX Runtime is missing; a model is missing or does not match the manifest.
-pub fn check_models(settings: &Settings) -> Result<()> {
+/// ONNX Runtime is missing; a model is missing or does not match the manifest; the GPU does not start.
+pub fn check_models(settings: &Settings) -> Result<Option<String>> {
     let runtime = Runtime::load(&settings.models.onnxruntime, &settings.models.dir)?;
     for (_, entry) in ChosenModels::find(settings)?.used()? {
         Model::open(&runtime, entry, &settings.models.dir)?;
     }
-    Ok(())
+    Ok(models::runtime(&settings.models)?.1)
 }
 
 fn models_used(settings: &Settings) -> Result<Vec<ModelUsed>> {

@@ -162,6 +162,10 @@ fn model_checks(settings: &Settings) -> Vec<Check> {
             return checks;
         }
     };
+    checks.push(match models::runtime(&settings.models) {
+        Ok((_, note)) => ok("image models", note.unwrap_or_else(|| settings.models.provider.to_string())),
+        Err(error) => missing("image models", format!("{error:#}"), "set models.provider = \"cpu\""),
+    });
     for (_, _, id) in models::keys(&pose2d).into_iter().filter(|(_, _, id)| !id.is_empty()) {
         let opened = store.manifest().get(id).and_then(|entry| Ok(store.check(&runtime, entry)?));
         checks.push(match opened {

@@ -160,10 +160,11 @@ section! {
 }
 
 section! {
-    /// `[models]`: where the ONNX models and the ONNX Runtime library are.
+    /// `[models]`: where the ONNX models and the ONNX Runtime library are, and the processor of the image models.
     ModelsConfig {
         dir: PathBuf = "models".into(),
         onnxruntime: PathBuf = PathBuf::new(),
+        provider: DeviceChoice = DeviceChoice::Cpu,
     }
 }
 

@@ -43,18 +43,3 @@ impl Normaliser {
         }
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn channel_order_layout_and_scale_are_applied() {
-        let image = Image { width: 2, height: 1, data: vec![10, 20, 30, 40, 50, 60] };
-        let mut tensor = [0.0; 6];
-        Normaliser::new(true, true, 1.0, [1.0, 2.0, 3.0], [2.0, 1.0, 1.0]).fill(&image, &mut tensor);
-        assert_eq!(tensor, [14.5, 29.5, 18.0, 48.0, 7.0, 37.0]);
-        Normaliser::new(false, false, 0.1, [0.0; 3], [1.0; 3]).fill(&image, &mut tensor);
-        assert_eq!(tensor, [1.0, 2.0, 3.0, 4.0, 5.0, 6.0]);
-    }
-}

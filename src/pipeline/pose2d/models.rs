@@ -1,8 +1,10 @@
 //! Model selection: the ids of the configuration, with `auto` resolved by the files in the model folder.
 
+use crate::process;
 use anyhow::{Context, Result, ensure};
-use orator_dataset::config::{FollowRule, Pose2dConfig, Settings};
-use orator_onnx::{AUTO, ModelEntry, ModelRequest, ModelRole, ModelStore};
+use orator_base::types::device::DeviceChoice;
+use orator_dataset::config::{FollowRule, ModelsConfig, Pose2dConfig, Settings};
+use orator_onnx::{AUTO, ModelEntry, ModelRequest, ModelRole, ModelStore, PICTURES_ON_GPU, Runtime};
 
 /// Keys of `[pose2d]` that name a model, with role and configured id.
 pub fn keys(config: &Pose2dConfig) -> [(&'static str, ModelRole, &String); 5] {
@@ -29,6 +31,23 @@ pub fn choose(config: &Pose2dConfig, store: &ModelStore) -> Result<Pose2dConfig>
     let [person, body, hand, palm, face] = keys(config).map(id);
     let face = if face_is_missing(config, store) { String::new() } else { face? };
     Ok(Pose2dConfig { person: person?, body: body?, hand: hand?, palm: palm?, face, ..config.clone() })
+}
+
+/// ONNX Runtime with the configured provider, or that of the run that started this process; and why `"auto"` is the CPU.
+///
+/// # Errors
+/// No library; `provider = "cuda"`, and the GPU does not start.
+pub fn runtime(models: &ModelsConfig) -> Result<(Runtime, Option<String>)> {
+    let runtime = Runtime::load(&models.onnxruntime, &models.dir)?;
+    match (models.provider, process::parent_inference()) {
+        (DeviceChoice::Cpu, _) => Ok((runtime, None)),
+        (_, Some(inference)) => Ok((runtime.with_inference(inference), None)),
+        (DeviceChoice::Cuda(gpu), None) => Ok((runtime.on_gpu(gpu, PICTURES_ON_GPU).context("models.provider")?, None)),
+        (DeviceChoice::Auto, None) => Ok(match runtime.clone().on_gpu(0, PICTURES_ON_GPU) {
+            Ok(on_gpu) => (on_gpu, None),
+            Err(error) => (runtime, Some(format!("the image models run on the CPU: {error:#}"))),
+        }),
+    }
 }
 
 pub struct ChosenModels {

@@ -31,19 +31,3 @@ pub fn colours(image: &Image, [x, y, width, height]: [f64; 4], [columns, rows]: 
     };
     (0..columns * rows).map(cell).collect()
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn cells_are_means_and_edges_are_repeated() {
-        let mut image = Image::filled(8, 8, [0; 3]);
-        image.data.as_chunks_mut::<3>().0.iter_mut().enumerate().for_each(|(at, p)| *p = [10 * (at % 8) as u8; 3]);
-        let found = colours(&image, [0.0, 0.0, 8.0, 8.0], [2, 1]);
-        assert_eq!(found, [[15.0; 3], [55.0; 3]]);
-        assert_eq!(colours(&image, [-100.0, 2.0, 10.0, 2.0], [1, 1]), [[0.0; 3]]);
-        assert_eq!(colours(&image, [f64::NAN; 4], [1, 1]), [[0.0; 3]]);
-        assert_eq!(colours(&Image::filled(0, 0, [0; 3]), [0.0; 4], [2, 2]), [[0.0; 3]; 4]);
-    }
-}

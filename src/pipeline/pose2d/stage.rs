@@ -1,7 +1,7 @@
 //! Stage `pose2d`: processes the spans of a video independently and joins them into `keypoints.npz` and the portrait.
 
 use super::chain::Chain;
-use super::models::{ChosenModels, check_follow};
+use super::models::{self, ChosenModels, check_follow};
 use super::span::video_frames::VideoFrames;
 use super::span::{PoseSpan, pass};
 use super::talker::TalkerSearch;
@@ -9,6 +9,7 @@ use anyhow::{Context, Result};
 use orator_base::stage::artifacts::{Artifact, StageName};
 use orator_base::stage::progress::Progress;
 use orator_base::stage::{Input, Report, Stage, Unit};
+use orator_base::types::device::DeviceChoice;
 use orator_base::types::time::FrameRate;
 use orator_dataset::config;
 use orator_dataset::config::{FollowRule, Settings, to_stored};
@@ -33,6 +34,7 @@ pub struct Pose2dStage {
     references: BTreeMap<String, PathBuf>,
     /// Version of ONNX Runtime, or `missing`.
     onnxruntime: String,
+    on_gpu: bool,
 }
 
 impl Pose2dStage {
@@ -47,13 +49,17 @@ impl Pose2dStage {
         let chosen = ChosenModels::find(settings)?;
         check_follow(&chosen.settings)?;
         let runtime = Runtime::load(&models.onnxruntime, &models.dir);
+        let on_gpu = match models.provider {
+            DeviceChoice::Auto => models::runtime(&models).is_ok_and(|(runtime, _)| runtime.inference.is_some()),
+            provider => provider != DeviceChoice::Cpu,
+        };
         let onnxruntime = runtime.map_or_else(|_| "missing".to_owned(), |runtime| runtime.version());
         let (fps, work) = (settings.extract.rate(), settings.work.dir.clone());
-        Ok(Self { chosen, models, fps, work, references, onnxruntime })
+        Ok(Self { chosen, models, fps, work, references, onnxruntime, on_gpu })
     }
 
     fn runtime(&self) -> Result<Runtime> {
-        Runtime::load(&self.models.onnxruntime, &self.models.dir)
+        Ok(models::runtime(&self.models)?.0)
     }
 }
 
@@ -89,14 +95,19 @@ impl Stage for Pose2dStage {
         if let Some(keys) = pose2d.as_object_mut().filter(|_| !self.follows_talker()) {
             keys.remove("follow");
         }
-        json!({
+        let mut settings = json!({
             "pose2d": pose2d,
             "fps": [self.fps.num, self.fps.den],
             "models": models,
             "onnxruntime": self.onnxruntime,
             "opencv": opencv::version(),
             "ffmpeg": ffmpeg::version(),
-        })
+        });
+        // The CPU is left out, so that the output of versions without this setting stays fresh.
+        if self.on_gpu {
+            settings["provider"] = json!("cuda");
+        }
+        settings
     }
 
     fn inputs(&self, unit: &Unit) -> Result<Vec<Input>> {

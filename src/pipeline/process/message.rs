@@ -1,7 +1,7 @@
 //! Messages between a run and a subprocess. A compromised process may send anything, so message lengths are bounded.
 
 use super::failure::SentFailure;
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, ensure};
 use orator_dataset::config::{KeypointSource, Settings};
 use orator_media::sandbox::Restriction;
 use serde::de::DeserializeOwned;
@@ -109,7 +109,32 @@ pub enum Message {
     },
     /// Answer to `Request::Media`.
     Media(MediaHeader),
+    /// Asks for the values of all outputs of a shared model; those of its input follow, see `send_floats`.
+    Infer {
+        model: String,
+    },
     Failed(SentFailure),
+}
+
+/// Sends numbers as their count and bytes.
+pub fn send_floats(to: &mut impl Write, numbers: &[f32]) -> Result<()> {
+    send(to, &numbers.len())?;
+    let mut bytes = vec![[0; 4]; numbers.len()];
+    bytes.iter_mut().zip(numbers).for_each(|(bytes, number)| *bytes = number.to_le_bytes());
+    to.write_all(bytes.as_flattened())?;
+    Ok(to.flush()?)
+}
+
+/// Receives numbers.
+///
+/// # Errors
+/// Those of `receive`; more than 16 MiB.
+pub fn receive_floats(from: &mut impl Read) -> Result<Vec<f32>> {
+    let n: usize = receive(from)?;
+    ensure!(n as u64 <= MAX_BYTES / 4, "{n} numbers in a message");
+    let mut bytes = vec![[0; 4]; n];
+    from.read_exact(bytes.as_flattened_mut())?;
+    Ok(bytes.into_iter().map(f32::from_le_bytes).collect())
 }
 
 pub fn send(to: &mut impl Write, message: &impl Serialize) -> Result<()> {

@@ -11,4 +11,4 @@ pub mod unit;
 
 pub use limits::Limits;
 pub use stage::{SubprocessStage, ask_media, probe};
-pub use unit::{VERB, answer_media, serve};
+pub use unit::{VERB, answer_media, parent_inference, serve};

@@ -2,21 +2,24 @@
 
 use super::failure::plain;
 use super::limits::Limits;
-use super::message::{MediaHeader, MediaRequest, Message, Request, UnitRequest, receive};
+use super::message::{MediaHeader, MediaRequest, Message, Request, UnitRequest, receive, receive_floats, send_floats};
 use super::subprocess::{Answers, UnitProcess};
-use anyhow::{Result, anyhow, bail, ensure};
+use crate::pose2d::models;
+use anyhow::{Context, Result, anyhow, bail, ensure};
 use orator_base::stage::artifacts::{Artifact, StageName};
 use orator_base::stage::progress::{Event, Progress, Task};
 use orator_base::stage::{Report, Stage, StageWrapper, Unit};
+use orator_base::types::device::DeviceChoice;
 use orator_base::types::time::FrameRate;
 use orator_dataset::config::videos::Videos;
 use orator_dataset::config::{Config, KeypointSource};
 use orator_formats::media_json::MediaInfo;
 use orator_media::sandbox::Restriction;
-use orator_onnx::find_library;
+use orator_onnx::{ModelStore, find_library};
 use std::collections::BTreeMap;
-use std::io::Read;
+use std::io::{Read, Write};
 use std::path::Path;
+use std::process::ChildStdin;
 
 /// Largest number of concurrent progress tasks accepted from a subprocess.
 const MAX_TASKS: usize = 16;
@@ -46,8 +49,22 @@ impl StageWrapper for SubprocessStage<'_> {
 impl SubprocessStage<'_> {
     fn work(&self, unit: &Unit, part: Option<usize>, out: &Path, progress: &dyn Progress) -> Result<Report> {
         let limits = self.limits(unit)?;
-        let request = Request::Unit(Box::new(self.request(unit, part, out, limits.memory)?));
-        answer_from(self.program, &request, &unit.source, &limits, |answers| relay(answers, progress))
+        let mut request = self.request(unit, part, out, limits.memory)?;
+        // The sandboxed process has no access to the GPU: this process runs the models for it.
+        let runtime = Some(&request.settings.models).filter(|models| models.provider != DeviceChoice::Cpu);
+        let runtime = runtime.filter(|_| self.name() == StageName::Pose2d.as_str()).map(models::runtime).transpose()?;
+        let shared = runtime.and_then(|(runtime, _)| runtime.inference);
+        let store = shared.iter().map(|_| ModelStore::open(&request.settings.models.dir)).next().transpose()?;
+        if shared.is_none() {
+            request.settings.models.provider = DeviceChoice::Cpu;
+        }
+        let request = Request::Unit(Box::new(request));
+        let infer = |id: &str, input: &[f32]| {
+            let (shared, store) = shared.as_ref().zip(store.as_ref()).context("no model is shared")?;
+            shared(store.manifest().get(id)?, store.dir(), input)
+        };
+        let read = |answers: &mut Answers<'_>, stdin: &mut Option<ChildStdin>| relay(answers, stdin, progress, infer);
+        answer_from(self.program, &request, &unit.source, &limits, read)
     }
 
     /// Limits of the subprocess: from the header of the video, or from the output of `extract` once that has run.
@@ -107,7 +124,7 @@ impl SubprocessStage<'_> {
 pub fn probe(program: &Path) -> Result<Restriction> {
     let mut process = UnitProcess::start(program)?;
     process.ask(&Request::Restrict);
-    let answer = process.follow(&Limits::of_header(), |answers| receive(answers));
+    let answer = process.follow(&Limits::of_header(), |answers, _| receive(answers));
     match answer.map_err(|death| anyhow!("{}: its subprocess {death}", program.display()))? {
         Message::Restricted(restriction) => Ok(restriction),
         other => bail!("unexpected answer {other:?}"),
@@ -118,7 +135,7 @@ pub fn probe(program: &Path) -> Result<Restriction> {
 pub fn ask_media(program: &Path, request: &MediaRequest, limits: &Limits) -> Result<MediaHeader> {
     let source = &request.source;
     let request = Request::Media { request: request.clone(), memory: limits.memory };
-    answer_from(program, &request, source, limits, |answers| match receive(answers)? {
+    answer_from(program, &request, source, limits, |answers, _| match receive(answers)? {
         Message::Media(header) => Ok(Ok(header)),
         Message::Failed(failure) => Ok(Err(failure.into_error())),
         _ => bail!("unexpected answer to the request"),
@@ -131,7 +148,7 @@ fn answer_from<T>(
     request: &Request,
     source: &Path,
     limits: &Limits,
-    read: impl FnOnce(&mut Answers<'_>) -> Result<Result<T>>,
+    read: impl FnOnce(&mut Answers<'_>, &mut Option<ChildStdin>) -> Result<Result<T>>,
 ) -> Result<T> {
     let mut process = UnitProcess::start(program)?;
     process.ask(request);
@@ -139,8 +156,14 @@ fn answer_from<T>(
     process.follow(limits, read).unwrap_or_else(process_error).map_err(|error| limits.explain(source, error))
 }
 
-/// Forwards progress until the subprocess sends its result. Fails if the stream ends or contains an invalid message.
-fn relay(from: &mut impl Read, progress: &dyn Progress) -> Result<Result<Report>> {
+/// Forwards progress, and runs shared models with `infer`, until the subprocess sends its result. Fails if the stream
+/// ends or contains an invalid message.
+pub fn relay(
+    from: &mut impl Read,
+    to: &mut Option<impl Write>,
+    progress: &dyn Progress,
+    infer: impl Fn(&str, &[f32]) -> Result<Vec<f32>>,
+) -> Result<Result<Report>> {
     let mut tasks: BTreeMap<u32, Box<dyn Task + '_>> = BTreeMap::new();
     loop {
         match receive(from)? {
@@ -153,6 +176,13 @@ fn relay(from: &mut impl Read, progress: &dyn Progress) -> Result<Result<Report>
             Message::End { task } => drop(tasks.remove(&task)),
             Message::Line { line } => progress.say(&plain(&line)),
             Message::Estimate { line } => progress.event(&Event::Estimate { line: &plain(&line) }),
+            Message::Infer { model } => {
+                match infer(&model, &receive_floats(from)?) {
+                    // If the subprocess has ended, reading its next message fails.
+                    Ok(values) => drop(to.as_mut().map(|to| send_floats(to, &values))),
+                    Err(error) => return Ok(Err(error)),
+                }
+            }
             Message::Done { line, facts } => return Ok(Ok(Report { line: plain(&line), facts })),
             Message::Failed(failure) => return Ok(Err(failure.into_error())),
             Message::Restricted(_) | Message::Media(_) => bail!("unexpected answer to the request"),

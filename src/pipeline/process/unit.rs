@@ -3,7 +3,9 @@
 
 use super::failure::SentFailure;
 use super::limits::limit_memory;
-use super::message::{MediaHeader, MediaRequest, Message, Request, UnitRequest, receive, send};
+use super::message::{
+    MediaHeader, MediaRequest, Message, Request, UnitRequest, receive, receive_floats, send, send_floats,
+};
 use crate::stages;
 use anyhow::{Context, Result};
 use orator_base::stage::progress::{Event, Progress, Task};
@@ -14,10 +16,12 @@ use orator_dataset::config::videos::Videos;
 use orator_media::ffmpeg::probe::probe;
 use orator_media::ffmpeg::write::excerpt;
 use orator_media::sandbox::{FileAccess, restrict};
-use std::io::{Read, Stdout, Write};
+use orator_onnx::Inference;
+use std::io::{Stdout, Write};
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicU32, Ordering};
-use std::sync::{Mutex, PoisonError};
+use std::sync::mpsc::{Sender, channel};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use std::time::{Duration, Instant};
 
 /// Command-line argument that turns the program into a subprocess; not documented in the help.
@@ -29,7 +33,7 @@ const MESSAGE_INTERVAL: Duration = Duration::from_millis(50);
 /// Answers the request on standard input. Must be called before the process starts threads.
 pub fn serve() -> Result<()> {
     rustix::process::set_parent_process_death_signal(Some(rustix::process::Signal::KILL))?;
-    let out = Messages(Mutex::new(std::io::stdout()));
+    let out = Arc::new(Messages(Mutex::new(std::io::stdout())));
     match receive(&mut std::io::stdin().lock()).context("this command is used only by `orator run` itself")? {
         Request::Restrict => {
             out.send(&Message::Restricted(restrict(&FileAccess { reads: Some(Vec::new()), writes: Vec::new() })))
@@ -51,19 +55,38 @@ pub fn serve() -> Result<()> {
 }
 
 /// Sends the result of `work`. The process aborts if its parent exits first.
-fn answer(out: &Messages, work: impl FnOnce() -> Result<Message>) -> Result<()> {
-    let parent_watch = std::thread::Builder::new().spawn(end_with_parent);
+fn answer(out: &Arc<Messages>, work: impl FnOnce() -> Result<Message>) -> Result<()> {
+    let (sender, answers) = channel();
+    let (out_of_models, answers) = (Arc::clone(out), Mutex::new(answers));
+    PARENT.get_or_init(|| {
+        Arc::new(move |entry, _, input| {
+            // Locked until the answer, so that answers are in the order of the questions.
+            let answers = answers.lock().unwrap_or_else(PoisonError::into_inner);
+            out_of_models.ask(&entry.id, input)?;
+            Ok(answers.recv()?)
+        })
+    });
+    let parent_watch = std::thread::Builder::new().spawn(move || receive_answers(&sender));
     let work = || parent_watch.context("cannot allocate memory for a thread").and_then(|_| work());
     let failed = |error| Message::Failed(SentFailure::of(&workdir::full_disk(error)));
     out.send(&attempt::catch_panics(work).unwrap_or_else(failed))
 }
 
-/// Aborts the process when the other end of standard input is closed.
-fn end_with_parent() {
-    let mut byte = [0];
-    while matches!(std::io::stdin().lock().read(&mut byte), Ok(1..)) {}
+/// Receives the values of shared models; aborts the process when the other end of standard input is closed.
+fn receive_answers(answers: &Sender<Vec<f32>>) {
+    let mut stdin = std::io::stdin().lock();
+    while let Ok(values) = receive_floats(&mut stdin) {
+        let _ = answers.send(values);
+    }
     std::process::abort();
 }
+
+/// Runs shared models in the process of the run, whose GPU all workers use; `None` in other processes.
+pub fn parent_inference() -> Option<Inference> {
+    PARENT.get().cloned()
+}
+
+static PARENT: OnceLock<Inference> = OnceLock::new();
 
 fn work(request: UnitRequest, out: &Messages) -> Result<Report> {
     let UnitRequest { stage, speaker, video, source, part, settings, config_file, keypoints, out: folder, .. } =
@@ -102,6 +125,13 @@ impl Messages {
         let mut out = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         send(&mut *out, message)?;
         Ok(out.flush()?)
+    }
+
+    /// Asks the run for the outputs of a shared model.
+    fn ask(&self, model: &str, input: &[f32]) -> Result<()> {
+        let mut out = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        send(&mut *out, &Message::Infer { model: model.to_owned() })?;
+        send_floats(&mut *out, input)
     }
 
     /// Sends a message that may be lost: if the run has exited, this process ends anyway.

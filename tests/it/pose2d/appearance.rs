@@ -5,6 +5,7 @@ use orator_base::types::pose2d::coco;
 use orator_media::opencv::draw;
 use orator_pipeline::pose2d::appearance::BodyColours;
 use orator_pipeline::pose2d::decode::ScoredPoint;
+use orator_pipeline::pose2d::patch::colours;
 
 fn person(shirt: [u8; 3], light: f32, x: f64) -> (Image, [ScoredPoint; 17]) {
     let lit = |rgb: [u8; 3]| rgb.map(|part| (f32::from(part) * light) as u8);
@@ -38,4 +39,15 @@ fn without_shoulders_there_is_no_appearance() {
     assert_eq!(BodyColours::measure(&image, &body, 0.3), None);
     body[coco::L_SHOULDER] = [f64::NAN, f64::NAN, 0.9];
     assert_eq!(BodyColours::measure(&image, &body, 0.3), None);
+}
+
+#[test]
+fn cells_are_means_and_edges_are_repeated() {
+    let mut image = Image::filled(8, 8, [0; 3]);
+    image.data.as_chunks_mut::<3>().0.iter_mut().enumerate().for_each(|(at, p)| *p = [10 * (at % 8) as u8; 3]);
+    let found = colours(&image, [0.0, 0.0, 8.0, 8.0], [2, 1]);
+    assert_eq!(found, [[15.0; 3], [55.0; 3]]);
+    assert_eq!(colours(&image, [-100.0, 2.0, 10.0, 2.0], [1, 1]), [[0.0; 3]]);
+    assert_eq!(colours(&image, [f64::NAN; 4], [1, 1]), [[0.0; 3]]);
+    assert_eq!(colours(&Image::filled(0, 0, [0; 3]), [0.0; 4], [2, 2]), [[0.0; 3]; 4]);
 }

@@ -1,10 +1,12 @@
-//! Outputs of models: heatmaps, points, anchors.
+//! Outputs of models: heatmaps, points, anchors, boxes.
 
+use orator_base::types::pose2d::PersonBox;
 use orator_media::opencv::blur::GaussianBlur;
 use orator_onnx::Refine;
-use orator_pipeline::pose2d::decode::heatmap;
+use orator_pipeline::pose2d::decode::boxes::{detections, from_corners, non_max_suppression, overlap};
 use orator_pipeline::pose2d::decode::points::{depths, regression, simcc};
 use orator_pipeline::pose2d::decode::ssd_anchors::{self, anchors};
+use orator_pipeline::pose2d::decode::{heatmap, yolox_grid};
 
 fn gaussian_map(columns: usize, rows: usize, [x, y]: [f64; 2]) -> Vec<f32> {
     let value = |at: usize| {
@@ -92,4 +94,43 @@ fn overlapping_detections_are_averaged() {
     rows[0] = f32::NAN;
     assert_eq!(ssd_anchors::decode(&rows, &logits, &anchors, 32, 0.5, 0.3).unwrap().len(), 2);
     assert!(ssd_anchors::decode(&rows[6..], &logits, &anchors, 32, 0.5, 0.3).is_err());
+}
+
+#[test]
+fn the_better_of_overlapping_boxes_is_retained() {
+    let at = |x: f32, score: f32| from_corners([x, 0.0, x + 10.0, 10.0], score).unwrap();
+    assert!((overlap(&at(0.0, 1.0), &at(5.0, 1.0)) - 1.0 / 3.0).abs() < 1e-6);
+    let accepted = non_max_suppression(vec![at(0.0, 0.5), at(1.0, 0.9), at(8.0, 0.7)], 0.45);
+    assert_eq!(accepted.iter().map(|b| b.score).collect::<Vec<_>>(), [0.9, 0.7]);
+    assert_eq!(from_corners([0.0, 0.0, f32::NAN, 1.0], 1.0), None);
+    assert_eq!(from_corners([5.0, 0.0, 5.0, 1.0], 1.0), None);
+}
+
+#[test]
+fn only_persons_with_a_score_and_an_area_are_returned() {
+    let rows = [
+        [10.0, 20.0, 30.0, 60.0, 0.8],
+        [0.0; 5],
+        [50.0, 20.0, 70.0, 60.0, 0.9],
+        [90.0, 20.0, f32::NAN, 60.0, 0.9],
+        [11.0, 20.0, 30.0, 60.0, 0.2],
+    ]
+    .concat();
+    let found = detections(&rows, Some(&[0, 0, 7, 0, 0]), 0, 0.3, 0.6);
+    assert_eq!(found, [PersonBox { x: 10.0, y: 20.0, width: 20.0, height: 40.0, score: 0.8 }]);
+    assert_eq!(detections(&rows, None, 0, 0.3, 0.6).len(), 2);
+}
+
+#[test]
+fn a_cell_becomes_a_box() {
+    let mut rows = vec![0.0; (16 + 4) * 6];
+    let at = |cell: usize| cell * 6..cell * 6 + 6;
+    rows[at(6)].copy_from_slice(&[0.5, 0.25, 1.0_f32.ln(), 2.0_f32.ln(), 0.9, 0.9]);
+    rows[at(16 + 3)].copy_from_slice(&[0.0, 0.0, 0.0, 0.0, 0.5, 0.1]);
+    let found = yolox_grid::decode(&rows, 6, [32, 32], &[8, 16], 0.3, 0.45).unwrap();
+    assert_eq!(found.len(), 1);
+    let PersonBox { x, y, width, height, score } = found[0];
+    let close = |a: f32, b: f32| (a - b).abs() < 1e-5;
+    assert!(close(x, 16.0) && close(y, 2.0) && close(width, 8.0) && close(height, 16.0) && close(score, 0.81));
+    assert!(yolox_grid::decode(&rows[6..], 6, [32, 32], &[8, 16], 0.3, 0.45).is_err());
 }

@@ -5,5 +5,6 @@ pub(crate) mod decode;
 pub(crate) mod footage_conditions;
 pub(crate) mod pose_chain;
 pub(crate) mod region;
+pub(crate) mod shared_models;
 pub(crate) mod tracker;
 pub(crate) mod visibility;

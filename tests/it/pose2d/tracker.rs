@@ -2,6 +2,7 @@
 
 use orator_base::types::pose2d::PersonBox;
 use orator_pipeline::pose2d::liveness::Movement;
+use orator_pipeline::pose2d::talker::TalkerPath;
 use orator_pipeline::pose2d::tracker::{Candidate, PersonTrack, TrackerStep};
 
 fn at(x: f32, width: f32, score: f32) -> Candidate {
@@ -107,4 +108,22 @@ fn the_reference_picture_decides() {
         tracker_step(300, true),
     );
     assert_eq!((late.person().x, late.identity()), (0.0, 1));
+}
+
+fn person_at(x: f32) -> PersonBox {
+    PersonBox { x, y: 0.0, width: 100.0, height: 200.0, score: 0.9 }
+}
+
+#[test]
+fn a_path_matches_the_nearest_person_within_its_frames() {
+    let mut path = TalkerPath::default();
+    assert_eq!((path.find(0, [person_at(0.0)].into_iter()), path.last()), (None, None));
+    path.push(30, person_at(0.0));
+    path.push(60, person_at(80.0));
+    path.push(65, person_at(160.0));
+    let find = |idx: usize| path.find(idx, [person_at(-300.0), person_at(150.0), person_at(10.0)].into_iter());
+    assert_eq!([14, 15, 30, 44, 65, 80, 81].map(find), [None, Some(2), Some(2), Some(2), Some(1), Some(1), None]);
+    assert_eq!(path.find(30, [person_at(90.0)].into_iter()), None);
+    assert_eq!(path.find(30, std::iter::empty()), None);
+    assert_eq!(path.last(), Some(&person_at(160.0)));
 }

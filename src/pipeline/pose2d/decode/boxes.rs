@@ -45,33 +45,3 @@ pub fn detections(
         max_overlap,
     )
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_better_of_overlapping_boxes_is_retained() {
-        let at = |x: f32, score: f32| from_corners([x, 0.0, x + 10.0, 10.0], score).unwrap();
-        assert!((overlap(&at(0.0, 1.0), &at(5.0, 1.0)) - 1.0 / 3.0).abs() < 1e-6);
-        let accepted = non_max_suppression(vec![at(0.0, 0.5), at(1.0, 0.9), at(8.0, 0.7)], 0.45);
-        assert_eq!(accepted.iter().map(|b| b.score).collect::<Vec<_>>(), [0.9, 0.7]);
-        assert_eq!(from_corners([0.0, 0.0, f32::NAN, 1.0], 1.0), None);
-        assert_eq!(from_corners([5.0, 0.0, 5.0, 1.0], 1.0), None);
-    }
-
-    #[test]
-    fn only_persons_with_a_score_and_an_area_are_returned() {
-        let rows = [
-            [10.0, 20.0, 30.0, 60.0, 0.8],
-            [0.0; 5],
-            [50.0, 20.0, 70.0, 60.0, 0.9],
-            [90.0, 20.0, f32::NAN, 60.0, 0.9],
-            [11.0, 20.0, 30.0, 60.0, 0.2],
-        ]
-        .concat();
-        let found = detections(&rows, Some(&[0, 0, 7, 0, 0]), 0, 0.3, 0.6);
-        assert_eq!(found, [PersonBox { x: 10.0, y: 20.0, width: 20.0, height: 40.0, score: 0.8 }]);
-        assert_eq!(detections(&rows, None, 0, 0.3, 0.6).len(), 2);
-    }
-}

@@ -40,22 +40,3 @@ pub fn decode(
     }
     Ok(boxes::non_max_suppression(found, max_overlap))
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_cell_becomes_a_box() {
-        let mut rows = vec![0.0; (16 + 4) * 6];
-        let at = |cell: usize| cell * 6..cell * 6 + 6;
-        rows[at(6)].copy_from_slice(&[0.5, 0.25, 1.0_f32.ln(), 2.0_f32.ln(), 0.9, 0.9]);
-        rows[at(16 + 3)].copy_from_slice(&[0.0, 0.0, 0.0, 0.0, 0.5, 0.1]);
-        let found = decode(&rows, 6, [32, 32], &[8, 16], 0.3, 0.45).unwrap();
-        assert_eq!(found.len(), 1);
-        let PersonBox { x, y, width, height, score } = found[0];
-        let close = |a: f32, b: f32| (a - b).abs() < 1e-5;
-        assert!(close(x, 16.0) && close(y, 2.0) && close(width, 8.0) && close(height, 16.0) && close(score, 0.81));
-        assert!(decode(&rows[6..], 6, [32, 32], &[8, 16], 0.3, 0.45).is_err());
-    }
-}

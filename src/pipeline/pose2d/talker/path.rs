@@ -34,26 +34,3 @@ impl TalkerPath {
         (overlap >= MIN_OVERLAP && (is_inside || at.abs_diff(idx) <= MAX_EXTRAPOLATION)).then_some(best)
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn at(x: f32) -> PersonBox {
-        PersonBox { x, y: 0.0, width: 100.0, height: 200.0, score: 0.9 }
-    }
-
-    #[test]
-    fn a_path_matches_the_nearest_person_within_its_frames() {
-        let mut path = TalkerPath::default();
-        assert_eq!((path.find(0, [at(0.0)].into_iter()), path.last()), (None, None));
-        path.push(30, at(0.0));
-        path.push(60, at(80.0));
-        path.push(65, at(160.0));
-        let find = |idx: usize| path.find(idx, [at(-300.0), at(150.0), at(10.0)].into_iter());
-        assert_eq!([14, 15, 30, 44, 65, 80, 81].map(find), [None, Some(2), Some(2), Some(2), Some(1), Some(1), None]);
-        assert_eq!(path.find(30, [at(90.0)].into_iter()), None);
-        assert_eq!(path.find(30, std::iter::empty()), None);
-        assert_eq!(path.last(), Some(&at(160.0)));
-    }
-}
