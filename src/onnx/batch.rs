@@ -31,8 +31,8 @@ struct Picture {
 }
 
 impl Runtime {
-    /// The same runtime, with models that accept batches run on the NVIDIA GPU of this number, `n` pictures at a time;
-    /// later calls return the first GPU.
+    /// Runs the models that accept batches on the NVIDIA GPU of this number, `n` pictures at a time; later calls return
+    /// the first GPU.
     ///
     /// # Errors
     /// The library has no CUDA provider, or it does not start.
@@ -46,7 +46,7 @@ impl Runtime {
         Ok(self.with_inference(started.clone().map_err(|error| anyhow!(error))?))
     }
 
-    /// The same runtime, with models that accept batches run in batches on the CPU.
+    /// Runs the models that accept batches in batches on the CPU.
     pub fn in_batches(self) -> Self {
         let inference = shared(self.clone(), SessionKind::Batches, N_ON_CPU);
         self.with_inference(inference)

@@ -46,13 +46,13 @@ pub enum ModelError {
 /// A model that is ready to run: on one thread, or shared with other workers.
 pub struct Model {
     entry: ModelEntry,
-    engine: Engine,
+    runner: ModelRunner,
     input: Vec<f32>,
     inside: Duration,
     n_runs: u64,
 }
 
-enum Engine {
+enum ModelRunner {
     Session(Session),
     /// The runs, the folder of the model, and the values of all outputs of the last run.
     Shared(Inference, PathBuf, Vec<f32>),
@@ -62,12 +62,12 @@ impl Model {
     /// Opens the file of `entry` in the folder `dir`, unless the model is shared. Errors are documented in
     /// [`ModelError`].
     pub fn open(runtime: &Runtime, entry: &ModelEntry, dir: &Path) -> Result<Self, ModelError> {
-        let engine = match &runtime.inference {
-            Some(shared) if entry.accepts_batches() => Engine::Shared(shared.clone(), dir.to_owned(), Vec::new()),
-            _ => Engine::Session(open_session(runtime, entry, dir, SessionKind::OnePicture)?),
+        let runner = match &runtime.inference {
+            Some(shared) if entry.accepts_batches() => ModelRunner::Shared(shared.clone(), dir.to_owned(), Vec::new()),
+            _ => ModelRunner::Session(open_session(runtime, entry, dir, SessionKind::OnePicture)?),
         };
         let input = vec![0.0; entry.input_len()];
-        Ok(Self { entry: entry.clone(), engine, input, inside: Duration::ZERO, n_runs: 0 })
+        Ok(Self { entry: entry.clone(), runner, input, inside: Duration::ZERO, n_runs: 0 })
     }
 
     pub fn entry(&self) -> &ModelEntry {
@@ -81,15 +81,15 @@ impl Model {
 
     pub fn run(&mut self) -> Result<Outputs<'_>> {
         let (id, start) = (&self.entry.id, Instant::now());
-        let outputs = match &mut self.engine {
-            Engine::Session(session) => {
+        let outputs = match &mut self.runner {
+            ModelRunner::Session(session) => {
                 let shape = self.entry.inputs.first().map(|port| port.shape.as_slice()).unwrap_or_default();
                 let input = TensorRef::from_array_view((shape, self.input.as_slice()))?;
                 let outputs = session.run(ort::inputs![input]);
                 let outputs = outputs.map_err(|error| anyhow!("the model {id} failed: {error}"))?;
                 Outputs::Session(id, outputs)
             }
-            Engine::Shared(inference, dir, values) => {
+            ModelRunner::Shared(inference, dir, values) => {
                 *values = inference(&self.entry, dir, &self.input)?;
                 Outputs::Shared(&self.entry, values)
             }

@@ -55,7 +55,7 @@ impl Runtime {
         Ok(runtime)
     }
 
-    /// The same runtime, with models that accept batches run by `inference`.
+    /// Runs the models that accept batches with `inference`.
     pub fn with_inference(self, inference: Inference) -> Self {
         Self { inference: Some(inference), ..self }
     }

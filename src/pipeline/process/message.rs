@@ -110,7 +110,7 @@ pub enum Message {
     /// Answer to `Request::Media`.
     Media(MediaHeader),
     /// Asks for the values of all outputs of a shared model; those of its input follow, see `send_floats`.
-    Infer {
+    Inference {
         model: String,
     },
     Failed(SentFailure),

@@ -63,7 +63,7 @@ impl SubprocessStage<'_> {
             let (shared, store) = shared.as_ref().zip(store.as_ref()).context("no model is shared")?;
             shared(store.manifest().get(id)?, store.dir(), input)
         };
-        let read = |answers: &mut Answers<'_>, stdin: &mut Option<ChildStdin>| relay(answers, stdin, progress, infer);
+        let read = |answers: &mut Answers<'_>, stdin: &mut Option<ChildStdin>| follow(answers, stdin, progress, infer);
         answer_from(self.program, &request, &unit.source, &limits, read)
     }
 
@@ -158,7 +158,7 @@ fn answer_from<T>(
 
 /// Forwards progress, and runs shared models with `infer`, until the subprocess sends its result. Fails if the stream
 /// ends or contains an invalid message.
-pub fn relay(
+pub fn follow(
     from: &mut impl Read,
     to: &mut Option<impl Write>,
     progress: &dyn Progress,
@@ -176,7 +176,7 @@ pub fn relay(
             Message::End { task } => drop(tasks.remove(&task)),
             Message::Line { line } => progress.say(&plain(&line)),
             Message::Estimate { line } => progress.event(&Event::Estimate { line: &plain(&line) }),
-            Message::Infer { model } => {
+            Message::Inference { model } => {
                 match infer(&model, &receive_floats(from)?) {
                     // If the subprocess has ended, reading its next message fails.
                     Ok(values) => drop(to.as_mut().map(|to| send_floats(to, &values))),

@@ -130,7 +130,7 @@ impl Messages {
     /// Asks the run for the outputs of a shared model.
     fn ask(&self, model: &str, input: &[f32]) -> Result<()> {
         let mut out = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        send(&mut *out, &Message::Infer { model: model.to_owned() })?;
+        send(&mut *out, &Message::Inference { model: model.to_owned() })?;
         send_floats(&mut *out, input)
     }
 

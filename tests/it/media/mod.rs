@@ -1,5 +1,6 @@
 //! Audio and frames of a media file, their synchronisation, and shots.
 
+pub(crate) mod affine;
 pub(crate) mod audio_tracks;
 pub(crate) mod draw;
 pub(crate) mod excerpt;
@@ -11,4 +12,3 @@ pub(crate) mod media_frames;
 pub(crate) mod shots;
 pub(crate) mod sound;
 pub(crate) mod sync;
-pub(crate) mod warps;

@@ -12,7 +12,7 @@ use orator_onnx::{ModelStore, Runtime};
 use orator_pipeline::pose2d::models::{choose, runtime};
 use orator_pipeline::pose2d::{Chain, Pose2dStage};
 use orator_pipeline::process::message::{Message, receive_floats, send, send_floats};
-use orator_pipeline::process::stage::relay;
+use orator_pipeline::process::stage::follow;
 use std::path::Path;
 
 /// The three frames of the rendered speaker, complete and without a margin.
@@ -79,10 +79,10 @@ fn a_run_computes_shared_models_for_its_subprocess() {
     };
     for (model, is_known) in [("double", true), ("unknown", false)] {
         let (mut sent, mut answer) = (Vec::new(), Some(Vec::new()));
-        send(&mut sent, &Message::Infer { model: model.to_owned() }).unwrap();
+        send(&mut sent, &Message::Inference { model: model.to_owned() }).unwrap();
         send_floats(&mut sent, &[1.0, -2.5]).unwrap();
         send(&mut sent, &Message::Done { line: "done".to_owned(), facts: Default::default() }).unwrap();
-        let report = relay(&mut sent.as_slice(), &mut answer, &Silent, infer).unwrap();
+        let report = follow(&mut sent.as_slice(), &mut answer, &Silent, infer).unwrap();
         let answer = answer.unwrap();
         if is_known {
             assert_eq!(report.unwrap().line, "done");
