@@ -204,7 +204,7 @@ pub(super) enum SessionKind {
 /// Creates a session with one thread, no spinning, full optimisation and deterministic results.
 pub(super) fn session(runtime: &Runtime, bytes: &[u8], kind: SessionKind) -> Result<Session> {
     fn to_anyhow<T>(error: ort::Error<T>) -> anyhow::Error {
-        anyhow!("{error}")
+        anyhow!("{}", error.to_string().trim_end())
     }
     let builder = Session::builder(runtime.environment())?
         .with_intra_threads(1)
