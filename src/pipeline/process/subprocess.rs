@@ -199,7 +199,7 @@ mod tests {
         let mut command = Command::new("/bin/sh");
         command.args(["-c", lines]);
         let mut process = UnitProcess::start_command(command).unwrap();
-        process.follow(limits, |answers| receive::<Message>(answers)).unwrap_err()
+        process.follow(limits, |answers, _| receive::<Message>(answers)).unwrap_err()
     }
 
     #[test]
