@@ -1,7 +1,6 @@
 //! Finds the plans that mention a video to be forgotten, with the folders of their workers. The caller removes them as
 //! a whole: a plan without the video would have another seal, so nothing that refers to the old plan could continue.
 
-use super::timing;
 use anyhow::{Context, Result};
 use orator_dataset::forget::search::{SearchTerm, search};
 use std::collections::BTreeSet;
@@ -10,7 +9,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Paths in the work folder to remove: plans that contain one of the terms, with the folders of their workers; worker
-/// folders of earlier plans that contain one; and the folder of excerpts that a killed `orator plan` left.
+/// folders of earlier plans that contain one.
 pub fn plans_naming(work: &Path, terms: &[SearchTerm]) -> Result<Vec<PathBuf>> {
     if !work.is_dir() {
         return Ok(Vec::new());
@@ -31,11 +30,6 @@ pub fn plans_naming(work: &Path, terms: &[SearchTerm]) -> Result<Vec<PathBuf>> {
         if found.contains(&plan) || holds_one(path)? {
             found.insert(path.clone());
         }
-    }
-    let excerpts = work.join(timing::FOLDER);
-    let is_excerpt = |entry: &fs::DirEntry| Path::new(&entry.file_name()).extension().is_some_and(|it| it == "mkv");
-    if fs::read_dir(&excerpts).is_ok_and(|mut entries| entries.all(|entry| entry.is_ok_and(|e| is_excerpt(&e)))) {
-        found.insert(excerpts);
     }
     Ok(found.into_iter().collect())
 }

@@ -2,7 +2,7 @@
 //! files (`sealed_input`). Each `worker` claims units by creating files (`claims`) in a `shared_folder` that may show
 //! them late, publishes a `heartbeat`, runs the stages, and takes over the units of dead workers. `progress` summarises
 //! all workers; `forget` finds plans that name a video; `slurm` and `kubernetes` write the jobs that start workers
-//! (`job`); `timing` measures the stages on excerpts, from which `stage_times` predicts the duration of a plan.
+//! (`job`).
 
 pub mod claims;
 pub mod forget;
@@ -14,6 +14,4 @@ pub mod progress;
 pub mod sealed_input;
 pub mod shared_folder;
 pub mod slurm;
-pub mod stage_times;
-pub mod timing;
 pub mod worker;

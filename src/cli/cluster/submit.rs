@@ -11,7 +11,6 @@ use orator_cluster::job::{JobRequest, TaskLimits, shell};
 use orator_cluster::kubernetes::{KubernetesTarget, manifests};
 use orator_cluster::plan::ClusterPlan;
 use orator_cluster::slurm::{self, SlurmSettings};
-use orator_cluster::stage_times::StageTimes;
 use serde_json::json;
 use std::os::unix::fs::PermissionsExt as _;
 use std::path::{Path, PathBuf, absolute};
@@ -31,8 +30,8 @@ enum SubmitTarget {
     Ssh(SshArgs),
 }
 
-/// Default time limit of a worker if the work was not timed, hours.
-const UNKNOWN_HOURS: f64 = 12.0;
+/// Default time limit of a worker, hours.
+const DEFAULT_HOURS: f64 = 12.0;
 
 /// Options of every kind of worker.
 #[derive(clap::Args)]
@@ -65,8 +64,7 @@ struct JobArgs {
     /// Memory per worker, GiB; defaults to 1.5 per core.
     #[arg(long, value_name = "GIB")]
     memory: Option<f64>,
-    /// Time limit of a worker, hours; defaults to twice the estimate of the plan plus half an hour, or to 12 without
-    /// an estimate.
+    /// Time limit of a worker, hours; defaults to 12.
     #[arg(long, value_name = "HOURS")]
     hours: Option<f64>,
 }
@@ -152,9 +150,7 @@ impl WorkerArgs {
         let tasks = job.map_or(1, |job| job.tasks);
         ensure!(tasks > 0 && self.cores > 0, "--tasks and --cores: expected at least 1");
         let n_at_once = job.and_then(|job| job.at_once).unwrap_or(tasks);
-        let lengths: Vec<f64> = plan.videos().iter().filter_map(|video| video.secs).collect();
-        let predicted = StageTimes::read(&work).map(|times| times.limit_hours(&lengths, n_at_once * self.cores));
-        let hours = job.and_then(|job| job.hours).or(predicted).unwrap_or(UNKNOWN_HOURS);
+        let hours = job.and_then(|job| job.hours).unwrap_or(DEFAULT_HOURS);
         ensure!(hours > 0.0, "--hours: expected more than 0");
         let program = match &self.program {
             Some(program) => program.clone(),

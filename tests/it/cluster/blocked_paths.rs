@@ -8,7 +8,7 @@ use std::process::Command;
 #[test]
 fn a_folder_at_the_path_of_a_claim_blocks_one_unit_and_is_named() {
     let project = Project::with_clips("planted", 2, 4.6);
-    assert_eq!(project.answer(&["plan", "--no-timing"]).code, 0);
+    assert_eq!(project.answer(&["plan"]).code, 0);
     let plan: Value = serde_json::from_slice(&fs::read(project.work().join("plan.json")).unwrap()).unwrap();
     let folder = project.work().join(format!("plan-{}", &plan["seal"].as_str().unwrap()[..12]));
     let claim = folder.join("claims/0000/000000.claim.0001");

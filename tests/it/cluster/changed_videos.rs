@@ -16,7 +16,7 @@ fn a_video_changed_since_the_plan_is_not_processed_and_is_reported() {
     let project = Project::with_clips("sealed", 2, 4.6);
     let clips = project.clips();
     let (name, original) = (file_name(&clips[0]), fs::read(&clips[0]).unwrap());
-    let plan = project.answer(&["plan", "--no-timing"]);
+    let plan = project.answer(&["plan"]);
     assert_eq!(plan.code, 0, "{}", plan.errors);
     fs::copy(&clips[1], &clips[0]).unwrap();
     let worked = project.answer(&WORK);
@@ -48,7 +48,7 @@ fn a_video_changed_since_the_plan_is_not_processed_and_is_reported() {
 #[test]
 fn forgetting_a_video_removes_its_plan() {
     let project = Project::with_clips("planned", 2, 1.0);
-    assert_eq!(project.answer(&["plan", "--no-timing"]).code, 0);
+    assert_eq!(project.answer(&["plan"]).code, 0);
     let clips = project.clips();
     let plan: serde_json::Value = serde_json::from_slice(&fs::read(project.work().join("plan.json")).unwrap()).unwrap();
     let workers = project.work().join(format!("plan-{}", &plan["seal"].as_str().unwrap()[..12])).join("workers");

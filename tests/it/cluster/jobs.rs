@@ -14,7 +14,7 @@ fn round_trip<T: DeserializeOwned + Serialize>(manifest: &serde_json::Value) -> 
 #[test]
 fn jobs_are_written_for_slurm_kubernetes_and_ssh() {
     let project = Project::with_clips("jobs", 2, 1.0);
-    assert_eq!(project.answer(&["plan", "--no-timing"]).code, 0);
+    assert_eq!(project.answer(&["plan"]).code, 0);
     let job = ["--plan", "work/plan.json", "--tasks", "2", "--hours", "1.5", "--dry-run"];
     let slurm = project.answer(&[&["submit", "slurm", "--train", "--train-hours", "2"], &job[..]].concat());
     assert_eq!(slurm.code, 0, "{}", slurm.errors);

@@ -78,7 +78,7 @@ fn workers_share_a_long_video_and_give_the_bytes_of_one_worker() {
     compare(written(&shared.work()));
 
     let Some(planned) = project("planned", n_repeats) else { return };
-    let plan = planned.answer(&["plan", "--no-timing", "--max-part", "2"]);
+    let plan = planned.answer(&["plan", "--max-part", "2"]);
     let n_units = plan.json["units"].as_u64().unwrap();
     assert!(plan.code == 0 && (n_units == 4 || is_long), "{n_units}: {}", plan.errors);
     // Clocks differ by up to 15 minutes. Workers are killed with a unit in progress: one when spans are shared, the

@@ -8,5 +8,4 @@ mod long_video;
 mod sealed_input;
 mod shared_folder;
 mod simulation;
-mod timing;
 mod workers;

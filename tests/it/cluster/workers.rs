@@ -47,7 +47,7 @@ fn killed_and_stopped_workers_give_the_bytes_of_one_run() {
     while n_killed + n_stopped < n_kills {
         n_plans += 1;
         let project = project_with_words("crowd", n_clips, 4.6);
-        let plan = project.answer(&["plan", "--no-timing"]);
+        let plan = project.answer(&["plan"]);
         assert_eq!((plan.code, &plan.json["units"]), (0, &serde_json::json!(n_clips)), "{}", plan.errors);
         let mut workers: Vec<Child> = (0..n_workers).map(|_| clocks.start(&project, &mut rng)).collect();
         let mut stopped: Vec<Child> = Vec::new();
@@ -105,7 +105,7 @@ fn killed_and_stopped_workers_give_the_bytes_of_one_run() {
 fn an_invalid_video_fails_alone_and_changed_plans_are_rejected() {
     let project = Project::with_clips("cluster", 2, 4.6);
     std::fs::write(project.video("broken.mp4"), b"no video").unwrap();
-    assert_eq!(project.answer(&["plan", "--no-timing"]).code, 0);
+    assert_eq!(project.answer(&["plan"]).code, 0);
     // Two workers process a shard each.
     let first = project.answer(&["work", "--plan", "work/plan.json", "--shard", "0/2"]);
     let second = project.answer(&["work", "--plan", "work/plan.json", "--shard", "1/2"]);
@@ -121,7 +121,7 @@ fn an_invalid_video_fails_alone_and_changed_plans_are_rejected() {
     std::fs::copy(project.clips().pop().unwrap(), project.video("broken.mp4")).unwrap();
     let retried = project.answer(&["work", "--plan", "work/plan.json", "--retry"]);
     assert_eq!((retried.code, retried.json["done"].as_u64()), (2, Some(0)), "another video: {}", retried.errors);
-    assert_eq!(project.answer(&["plan", "--no-timing"]).code, 0);
+    assert_eq!(project.answer(&["plan"]).code, 0);
     let planned = project.answer(&["work", "--plan", "work/plan.json"]);
     let counts = ["done", "up_to_date"].map(|key| planned.json[key].as_u64());
     assert_eq!((planned.code, counts), (0, [Some(3), Some(2)]), "{}", planned.errors);
@@ -145,7 +145,7 @@ fn an_invalid_video_fails_alone_and_changed_plans_are_rejected() {
 #[test]
 fn a_terminated_worker_finishes_its_unit_before_it_exits() {
     let project = Project::with_clips("asked", 2, 4.6);
-    assert_eq!(project.answer(&["plan", "--no-timing"]).code, 0);
+    assert_eq!(project.answer(&["plan"]).code, 0);
     let worker = worker(&project);
     while epochs(&project.work(), "claim").is_empty() {
         std::thread::sleep(Duration::from_millis(20));
@@ -172,7 +172,7 @@ fn a_terminated_worker_finishes_its_unit_before_it_exits() {
 fn eight_concurrent_workers_process_every_unit_once() {
     let n_clips = 8;
     let project = Project::with_clips("eight", n_clips, 4.6);
-    assert_eq!(project.answer(&["plan", "--no-timing"]).code, 0);
+    assert_eq!(project.answer(&["plan"]).code, 0);
     let workers: Vec<Child> = (0..8).map(|_| worker(&project)).collect();
     for mut worker in workers {
         assert!(worker.wait().unwrap().success());

@@ -226,7 +226,7 @@ fn npm_uses_only_the_registry_of_the_user() {
 #[test]
 fn cluster_clients_are_the_installed_ones_and_find_named_files() {
     let project = Project::with_clips("foreign", 1, 1.0);
-    assert_eq!(project.answer(&["plan", "--no-timing"]).code, 0);
+    assert_eq!(project.answer(&["plan"]).code, 0);
     let dir = project.dir().canonicalize().unwrap();
     plant(&dir);
     let bin = tempfile::tempdir().unwrap();
