@@ -40,11 +40,6 @@ impl Pipeline {
         Self { program: Some(program), ..self }
     }
 
-    /// A pipeline with another configuration and other videos, but the same subprocess program.
-    pub(super) fn with(&self, config: Config, videos: Vec<Videos>) -> Self {
-        Self { config, videos, program: self.program.clone() }
-    }
-
     /// Number of videos to process in parallel: `asked`, else the value of the configuration; 0 means one per
     /// processor core.
     pub fn jobs(&self, asked: Option<usize>) -> usize {

@@ -1,14 +1,12 @@
-//! Timing of stages: the time per unit in a run, and the same pipeline on excerpts of its videos.
+//! Timing of stages: the time per unit in a run.
 
 use super::pipeline::Pipeline;
-use super::process::message::MediaRequest;
 use super::process::{Limits, answer_media, ask_media};
 use super::stages::UnitWork;
 use anyhow::Result;
 use orator_base::stage::artifacts::StageName;
 use orator_base::stage::{Report, Unit};
-use orator_dataset::config::videos::Videos;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
 
@@ -42,33 +40,15 @@ impl StageClock {
 }
 
 impl Pipeline {
-    /// Duration of a video in seconds, if its header states it, or of the excerpt that was copied: see `answer_media`.
-    /// Uses a subprocess if the pipeline has a program for it.
+    /// Duration of a video in seconds, if its header states it. Uses a subprocess if the pipeline has a program for it.
     ///
     /// # Errors
-    /// A video that cannot be read; an excerpt that cannot be copied.
-    pub fn ask_media(&self, request: &MediaRequest) -> Result<Option<f64>> {
+    /// A video that cannot be read.
+    pub fn ask_media(&self, source: &Path) -> Result<Option<f64>> {
         let header = match self.program() {
-            Some(program) => ask_media(program, request, &Limits::of_header()),
-            None => answer_media(request),
+            Some(program) => ask_media(program, source, &Limits::of_header()),
+            None => answer_media(source),
         };
         Ok(header?.secs)
-    }
-
-    /// This pipeline with `files`, pairs of speaker and path, instead of its videos, and another work folder.
-    pub fn on_excerpts(&self, files: &[(String, PathBuf)], work: &Path) -> Self {
-        let mut config = self.config().clone();
-        config.settings.work.dir = work.to_owned();
-        let speakers = self.all_videos().iter().map(|videos| &videos.speaker);
-        let videos = speakers.filter(|speaker| files.iter().any(|(of, _)| of == *speaker)).map(|speaker| {
-            let own = files.iter().filter(|(of, _)| of == speaker);
-            let unit = |(number, (_, path)): (usize, &(String, PathBuf))| Unit {
-                speaker: speaker.clone(),
-                video: format!("excerpt-{number:02}"),
-                source: path.clone(),
-            };
-            Videos { speaker: speaker.clone(), units: own.enumerate().map(unit).collect(), ..Videos::default() }
-        });
-        self.with(config, videos.collect())
     }
 }

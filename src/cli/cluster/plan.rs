@@ -12,7 +12,6 @@ use orator_cluster::plan::{ClusterPlan, PART_SECS};
 use orator_cluster::progress::{PlanProgress, WorkerProgress, progress};
 use orator_dataset::config;
 use orator_pipeline::Pipeline;
-use orator_pipeline::process::message::MediaRequest;
 use serde_json::json;
 use std::path::{Path, PathBuf};
 
@@ -48,10 +47,7 @@ pub(crate) fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     let pipeline = Pipeline::open(args.config.load()?)?.with_processes(this_program());
     let work = &pipeline.config().settings.work.dir;
     let out = std::path::absolute(args.out.unwrap_or_else(|| work.join("plan.json")))?;
-    let secs = |path: &Path| {
-        let request = MediaRequest { source: path.to_owned(), excerpt: None };
-        pipeline.ask_media(&request).ok().flatten()
-    };
+    let secs = |path: &Path| pipeline.ask_media(path).ok().flatten();
     // The shared lock prevents `orator forget` from running at the same time.
     let lock = FolderLock::shared(work).context("cannot write a plan now")?;
     let plan = ClusterPlan::new(&pipeline, &args.config.set, &this_program(), &secs, 60.0 * args.max_part, ui)?;

@@ -1,5 +1,5 @@
 //! The only folder that uses ffmpeg: `probe` (headers), `frames` (images at a chosen rate), `audio` (audio on the
-//! same clock; `sound_stream` as an iterator), `write` (mp4, excerpts), `jpeg`. They are built on `source`, which
+//! same clock; `sound_stream` as an iterator), `write` (mp4), `jpeg`. They are built on `source`, which
 //! opens files, `decode`, which decodes one stream with the times of `clock`, `picture`, which converts to upright RGB
 //! using `orientation` and `filter`, and `downmix` (mono). Time 0 is the first image that decodes (`origin`), or else
 //! the first audio sample.

@@ -43,7 +43,7 @@ pub struct Limits {
 }
 
 impl Limits {
-    /// Limits for reading a header or copying an excerpt, when the size is not known yet.
+    /// Limits for reading a header, when the size is not known yet.
     pub fn of_header() -> Self {
         Self::new(BASE_BYTES, BASE_SECS, "the header of a file".to_owned())
     }

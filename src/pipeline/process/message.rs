@@ -20,31 +20,15 @@ pub enum Request {
     Restrict,
     /// Process a unit.
     Unit(Box<UnitRequest>),
-    /// Read the header of a video, or copy an excerpt of it.
+    /// Read the header of a video.
     Media {
-        request: MediaRequest,
+        source: PathBuf,
         /// Memory limit, bytes.
         memory: u64,
     },
 }
 
-/// Request concerning a video, before any stage.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct MediaRequest {
-    pub source: PathBuf,
-    /// Excerpt to copy; `None`: read the header.
-    pub excerpt: Option<ExcerptRequest>,
-}
-
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct ExcerptRequest {
-    pub start_secs: f64,
-    pub secs: f64,
-    /// Output file; its folder exists.
-    pub to: PathBuf,
-}
-
-/// Fields of a video header that the limits depend on; for an excerpt only its duration.
+/// Fields of a video header that the limits depend on.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct MediaHeader {
     /// Duration in seconds, if stated.

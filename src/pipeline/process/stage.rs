@@ -2,7 +2,7 @@
 
 use super::failure::plain;
 use super::limits::Limits;
-use super::message::{MediaHeader, MediaRequest, Message, Request, UnitRequest, receive, receive_floats, send_floats};
+use super::message::{MediaHeader, Message, Request, UnitRequest, receive, receive_floats, send_floats};
 use super::subprocess::{Answers, UnitProcess};
 use crate::pose2d::models;
 use anyhow::{Context, Result, anyhow, bail, ensure};
@@ -77,8 +77,7 @@ impl SubprocessStage<'_> {
                 fps: media.source_fps.map(FrameRate::per_sec),
             })
         } else if self.keypoints(unit).is_none() {
-            let request = MediaRequest { source: unit.source.clone(), excerpt: None };
-            Some(ask_media(self.program, &request, &Limits::of_header())?)
+            Some(ask_media(self.program, &unit.source, &Limits::of_header())?)
         } else {
             None
         };
@@ -132,9 +131,8 @@ pub fn probe(program: &Path) -> Result<Restriction> {
 }
 
 /// Lets a sandboxed subprocess of `program` run `answer_media`.
-pub fn ask_media(program: &Path, request: &MediaRequest, limits: &Limits) -> Result<MediaHeader> {
-    let source = &request.source;
-    let request = Request::Media { request: request.clone(), memory: limits.memory };
+pub fn ask_media(program: &Path, source: &Path, limits: &Limits) -> Result<MediaHeader> {
+    let request = Request::Media { source: source.to_owned(), memory: limits.memory };
     answer_from(program, &request, source, limits, |answers, _| match receive(answers)? {
         Message::Media(header) => Ok(Ok(header)),
         Message::Failed(failure) => Ok(Err(failure.into_error())),

@@ -3,9 +3,7 @@
 
 use super::failure::SentFailure;
 use super::limits::limit_memory;
-use super::message::{
-    MediaHeader, MediaRequest, Message, Request, UnitRequest, receive, receive_floats, send, send_floats,
-};
+use super::message::{MediaHeader, Message, Request, UnitRequest, receive, receive_floats, send, send_floats};
 use crate::stages;
 use anyhow::{Context, Result};
 use orator_base::stage::progress::{Event, Progress, Task};
@@ -14,11 +12,10 @@ use orator_base::types::time::FrameRate;
 use orator_dataset::config::Config;
 use orator_dataset::config::videos::Videos;
 use orator_media::ffmpeg::probe::probe;
-use orator_media::ffmpeg::write::excerpt;
 use orator_media::sandbox::{FileAccess, restrict};
 use orator_onnx::Inference;
 use std::io::{Stdout, Write};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::mpsc::{Sender, channel};
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
@@ -45,11 +42,10 @@ pub fn serve() -> Result<()> {
             let done = |Report { line, facts }| Message::Done { line, facts };
             answer(&out, || work(*unit, &out).map(done))
         }
-        Request::Media { request: media, memory } => {
+        Request::Media { source, memory } => {
             limit_memory(memory)?;
-            let writes = media.excerpt.iter().filter_map(|excerpt| excerpt.to.parent().map(Into::into)).collect();
-            restrict(&FileAccess { reads: Some(vec![media.source.clone()]), writes });
-            answer(&out, || answer_media(&media).map(Message::Media))
+            restrict(&FileAccess { reads: Some(vec![source.clone()]), writes: Vec::new() });
+            answer(&out, || answer_media(&source).map(Message::Media))
         }
     }
 }
@@ -104,14 +100,9 @@ fn work(request: UnitRequest, out: &Messages) -> Result<Report> {
     }
 }
 
-/// Reads the header of a video, or copies an excerpt and returns its duration.
-pub fn answer_media(request: &MediaRequest) -> Result<MediaHeader> {
-    if let Some(excerpt_request) = &request.excerpt {
-        let secs =
-            excerpt::copy(&request.source, &excerpt_request.to, excerpt_request.start_secs, excerpt_request.secs)?;
-        return Ok(MediaHeader { secs: Some(secs), ..MediaHeader::default() });
-    }
-    let media = probe(&request.source)?;
+/// Reads the header of a video.
+pub fn answer_media(source: &Path) -> Result<MediaHeader> {
+    let media = probe(source)?;
     let image_size = media.video.as_ref().map_or([0; 2], |video| video.coded_size);
     let fps = media.video.and_then(|video| video.fps).map(FrameRate::per_sec);
     Ok(MediaHeader { secs: media.duration_secs, image_size, fps })

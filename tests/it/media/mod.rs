@@ -3,7 +3,6 @@
 pub(crate) mod affine;
 pub(crate) mod audio_tracks;
 pub(crate) mod draw;
-pub(crate) mod excerpt;
 pub(crate) mod extract;
 pub(crate) mod image_formats;
 pub(crate) mod joined;

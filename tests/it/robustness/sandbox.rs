@@ -4,7 +4,6 @@
 use crate::fixtures::media::recogniser::project_with_words;
 use orator::{Pipeline, Selection, Silent, StageName, UnreadableMedia, load_config};
 use orator_media::sandbox::{FileAccess, restrict, restrict_thread};
-use orator_pipeline::process::message::MediaRequest;
 use orator_pipeline::process::{Limits, VERB, ask_media, probe};
 use orator_test_support::project::{Project, files_under};
 use orator_test_support::skip::skip;
@@ -156,8 +155,7 @@ fn attempt_calls() {
 #[test]
 fn a_process_over_its_memory_limit_reports_the_limit() {
     let project = Project::with_clips("memory-limit", 1, 1.0);
-    let wanted = MediaRequest { source: project.clips()[0].clone(), excerpt: None };
-    let ask = |limits: &Limits| ask_media(Path::new(PROGRAM), &wanted, limits);
+    let ask = |limits: &Limits| ask_media(Path::new(PROGRAM), &project.clips()[0], limits);
     let header = ask(&Limits::of_header()).unwrap();
     assert!(header.secs.is_some() && header.image_size[0] > 0, "{header:?}");
     let error = format!("{:#}", ask(&Limits { memory: 1 << 20, ..Limits::of_header() }).unwrap_err());
@@ -170,7 +168,7 @@ fn a_named_pipe_as_a_video_is_rejected_immediately() {
     let source = dir.path().join("pipe.mp4");
     assert!(Command::new("mkfifo").arg(&source).status().unwrap().success());
     let limits = Limits { idle_secs: 60, ..Limits::of_header() };
-    let error = ask_media(Path::new(PROGRAM), &MediaRequest { source, excerpt: None }, &limits).unwrap_err();
+    let error = ask_media(Path::new(PROGRAM), &source, &limits).unwrap_err();
     let error = format!("{error:#}");
     assert!(error.contains("pipe.mp4") && error.ends_with("it is a named pipe, expected a regular file"), "{error}");
 }

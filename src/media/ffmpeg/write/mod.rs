@@ -1,4 +1,3 @@
-//! Writers of media files: `encode` creates an mp4 from images, `excerpt` copies a part of a video without re-encoding.
+//! Writer of media files: `encode` creates an mp4 from images.
 
 pub mod encode;
-pub mod excerpt;
