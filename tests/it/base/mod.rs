@@ -13,4 +13,5 @@ mod resample;
 mod rotation;
 mod text;
 mod time;
+mod unit;
 mod units;

@@ -8,4 +8,5 @@ mod long_video;
 mod sealed_input;
 mod shared_folder;
 mod simulation;
+mod unit;
 mod workers;

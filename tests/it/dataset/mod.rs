@@ -16,4 +16,5 @@ pub(crate) mod splits_by_time;
 pub(crate) mod transcribe;
 pub(crate) mod transcribe_verb;
 pub(crate) mod transcripts;
+mod unit;
 pub(crate) mod words;

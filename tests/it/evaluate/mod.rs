@@ -13,3 +13,4 @@ pub(crate) mod metrics;
 pub(crate) mod motion_store;
 pub(crate) mod pairs;
 pub(crate) mod predictor;
+mod unit;

@@ -11,4 +11,5 @@ mod motion_file;
 mod subtitles;
 mod transcript;
 mod transcript_write;
+mod unit;
 mod wav;

@@ -4,4 +4,5 @@ pub(crate) mod changed_thresholds;
 pub(crate) mod rendered_voices;
 pub(crate) mod segment;
 pub(crate) mod speech;
+mod unit;
 pub(crate) mod voices;

@@ -17,3 +17,4 @@ mod server_killed;
 mod side_by_side;
 mod stats_golden;
 mod store;
+mod unit;

@@ -1,0 +1,4 @@
+//! Tests of single modules of `orator-cluster`.
+
+mod plan;
+mod slurm;

@@ -1,0 +1,5 @@
+//! Tests of single modules of `orator-dataset`.
+
+mod info;
+mod joint_stats;
+mod transcripts;

@@ -1,0 +1,5 @@
+//! Tests of single modules of `orator-gesture`.
+
+mod fixed_rate;
+mod labels;
+mod score;
