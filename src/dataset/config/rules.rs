@@ -10,7 +10,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use toml::{Table, Value};
 
 /// Minimum, maximum and unit of every number, by key.
-pub(super) fn ranges() -> impl Iterator<Item = (String, (f64, f64, &'static str))> {
+pub fn ranges() -> impl Iterator<Item = (String, (f64, f64, &'static str))> {
     let sections = [
         ("work", WorkConfig::RANGES),
         ("models", ModelsConfig::RANGES),

@@ -11,3 +11,4 @@ pub(crate) mod media_frames;
 pub(crate) mod shots;
 pub(crate) mod sound;
 pub(crate) mod sync;
+pub(crate) mod warp;

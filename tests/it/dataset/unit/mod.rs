@@ -2,4 +2,5 @@
 
 mod info;
 mod joint_stats;
+mod load;
 mod transcripts;
