@@ -4,7 +4,6 @@
 //! an interval of continuous motion with its sound; training draws windows from it. Writing: `sample` -> `write::tar`
 //! -> `write::entry` -> `write::assemble`; reading: `read`; splits: `split`, `shared_sound`; checks: `verify`.
 
-pub mod align;
 pub mod bones;
 pub mod card;
 pub mod config;

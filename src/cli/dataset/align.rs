@@ -1,20 +1,20 @@
 //! `orator align`.
 
+use super::aligned_text::{self, AlignedText, Unaligned, listed};
 use crate::cli::Outcome;
 use crate::cli::sandbox::enter_sandbox;
 use crate::cli::ui::Ui;
 use anyhow::{Context, Result, ensure};
-use orator_base::stage::progress::Progress;
+use orator_base::stage::progress::{Progress, Task};
 use orator_base::stage::workdir;
 use orator_base::text::{counted, length};
-use orator_dataset::align::{Alignment, align};
-use orator_formats::transcript::Transcript;
-use orator_media::aligner::Aligner;
+use orator_base::types::sound::SAMPLE_RATE;
+use orator_formats::transcript::Word;
+use orator_media::aligner::{Aligner, SpokenWord};
+use orator_media::ffmpeg::sound_stream::SoundStream;
+use orator_media::ffmpeg::{UnreadableMedia, origin};
 use serde_json::json;
 use std::path::{Path, PathBuf};
-
-/// Maximum number of unaligned words that the summary lists.
-const SHOWN: usize = 8;
 
 /// Find the word times of an English transcript by forced alignment.
 ///
@@ -59,49 +59,62 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     );
     let aligner = Aligner::start(&args.python.unwrap_or_else(default_python))?;
     enter_sandbox([args.out.as_path()], []);
-    let transcript = Transcript::read(&args.transcript)?;
-    if !transcript.words.is_empty() {
-        transcript.notes.iter().for_each(|note| ui.say(&format!("{}: {note}", args.transcript.display())));
-    }
-    let pair = || format!("cannot align {} with {}", args.transcript.display(), args.sound.display());
+    let given = AlignedText::read(&args.transcript, ui)?;
     let task = ui.begin("seconds of audio", 0);
-    let mut secs = 0.0;
-    let aligned = align(aligner, &args.sound, &transcript, |aligned_secs| {
-        let before = secs as u64;
-        secs += aligned_secs;
-        task.advance(secs as u64 - before);
-    });
+    let aligned = align(aligner, &args.sound, &given, &*task);
     drop(task);
-    let aligned = aligned.with_context(pair)?;
-    let mut text = serde_json::to_string_pretty(&aligned.words)?;
+    let pair = || format!("cannot align {} with {}", args.transcript.display(), args.sound.display());
+    let (words, unaligned, sound_secs) = aligned.with_context(pair)?;
+    let mut text = serde_json::to_string_pretty(&words)?;
     text.push('\n');
     workdir::write_file(&args.out, text.as_bytes())?;
-    let Alignment { words, unaligned, sound_secs } = &aligned;
     let n_aligned = words.len() - words.iter().filter(|word| word.confidence == Some(0.0)).count();
     let mut lines =
-        vec![format!("{n_aligned} of {} aligned in {} of audio", counted(words.len(), "word"), length(*sound_secs))];
+        vec![format!("{n_aligned} of {} aligned in {} of audio", counted(words.len(), "word"), length(sound_secs))];
     if !unaligned.is_empty() {
-        let shown = unaligned
-            .iter()
-            .take(SHOWN)
-            .map(|&n| format!("word {} `{}` near {:.1} s", n + 1, words[n].word, words[n].start_secs));
-        let more = if unaligned.len() > SHOWN { ", ..." } else { "" };
-        let shown = shown.collect::<Vec<_>>().join(", ");
-        lines.push(format!("{} not aligned, with confidence 0: {shown}{more}", counted(unaligned.len(), "word")));
+        lines.push(format!(
+            "{} not aligned, with confidence 0: {}",
+            counted(unaligned.len(), "word"),
+            listed(&unaligned)
+        ));
     }
     lines.push(format!("wrote {}", args.out.display()));
     let next = format!("orator words check {}", args.out.display());
-    let marked = unaligned.iter().map(|&n| {
-        json!({ "number": n + 1, "word": words[n].word, "start_secs": words[n].start_secs, "end_secs": words[n].end_secs })
-    });
     let facts = json!({
         "out": args.out,
         "words": words.len(),
         "aligned": n_aligned,
-        "unaligned": marked.collect::<Vec<_>>(),
+        "unaligned": aligned_text::facts(&unaligned),
         "sound_secs": sound_secs,
         "next": next,
     });
     ui.summary(&lines.join("\n"), Some(&next), facts);
     Ok(Outcome::Done)
+}
+
+/// The words with times, those that could not be aligned, and the length of the audio in seconds.
+fn align(aligner: Aligner, sound: &Path, given: &AlignedText, task: &dyn Task) -> Result<(Vec<Word>, Unaligned, f64)> {
+    let zero_secs = origin::start_secs(sound)?;
+    let within = given.within(zero_secs);
+    let spoken = given.words().iter().enumerate();
+    let spoken: Vec<SpokenWord> =
+        spoken.map(|(n, word)| SpokenWord { word: word.clone(), within: within.get(n).copied().flatten() }).collect();
+    let mut n_samples = 0;
+    let found = aligner.align(&spoken, |take| {
+        for piece in SoundStream::open(sound, SAMPLE_RATE) {
+            let piece = piece?;
+            let before = n_samples / SAMPLE_RATE as usize;
+            n_samples += piece.len();
+            task.advance((n_samples / SAMPLE_RATE as usize - before) as u64);
+            take(&piece)?;
+        }
+        match n_samples {
+            0 => Err(UnreadableMedia(format!("{} has no audio", sound.display())).into()),
+            _ => Ok(()),
+        }
+    })?;
+    let secs = n_samples as f64 / f64::from(SAMPLE_RATE);
+    let expected = "the English transcript of audible speech";
+    let (words, unaligned) = given.with_times(&found, [zero_secs, secs], |share| share >= 0.25, expected)?;
+    Ok((words, unaligned, secs))
 }

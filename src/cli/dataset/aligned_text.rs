@@ -1,15 +1,19 @@
-//! A given text whose words get times by alignment with its audio.
+//! A given text whose words get times by alignment with its audio, by either aligner.
 
 use crate::cli::ui::Ui;
 use anyhow::{Result, ensure};
 use orator_base::stage::progress::Progress;
 use orator_base::text::length;
 use orator_formats::transcript::{Transcript, Word, WordSource};
-use orator_speech::RecognisedWord;
+use orator_media::aligner::AlignedWord;
+use serde_json::{Value, json};
 use std::path::Path;
 
-/// Minimum share of words that must be aligned; with fewer, the text probably belongs to another sound.
-const MIN_ALIGNED: f64 = 0.5;
+/// Maximum number of unaligned words that a summary lists.
+const SHOWN: usize = 8;
+
+/// Words that could not be aligned, with their numbers from 1.
+pub(super) type Unaligned = Vec<(usize, Word)>;
 
 /// Words of a text, in order.
 pub(super) struct AlignedText {
@@ -47,22 +51,28 @@ impl AlignedText {
         self.times.iter().map(|(start, end)| Some((on_audio(*start), on_audio(*end)))).collect()
     }
 
-    /// All words, and the indices of those that could not be aligned; tokens without letters or digits are not counted.
-    /// Words without times evenly share the time between their neighbours. `secs` is the length of the sound.
+    /// All words on the clock of the file, and those that could not be aligned; tokens without letters or digits are not
+    /// counted. Words without times evenly share the time between their neighbours. `secs` is the length of the audio
+    /// and `zero_secs` its start in the file.
     ///
     /// # Errors
     ///
-    /// Fewer aligned words than `MIN_ALIGNED`.
-    pub(super) fn with_times(&self, found: &[Option<RecognisedWord>], secs: f64) -> Result<(Vec<Word>, Vec<usize>)> {
-        let found = |n: usize| found.get(n).and_then(Option::as_ref);
+    /// A share of aligned words that `is_enough` rejects: the text probably belongs to other audio than `expected`.
+    pub(super) fn with_times(
+        &self,
+        found: &[Option<AlignedWord>],
+        [zero_secs, secs]: [f64; 2],
+        is_enough: impl Fn(f64) -> bool,
+        expected: &str,
+    ) -> Result<(Vec<Word>, Unaligned)> {
+        let found = |n: usize| found.get(n).copied().flatten();
         let counted = (0..self.words.len()).filter(|n| has_letters(&self.words[*n]));
         let unaligned: Vec<usize> = counted.clone().filter(|n| found(*n).is_none()).collect();
         let n_words = counted.count();
         let n_aligned = n_words - unaligned.len();
         ensure!(
-            n_aligned as f64 > MIN_ALIGNED * n_words as f64,
-            "only {n_aligned} of {n_words} words match the {} of audio: expected the transcript of audible speech, in the \
-             language of --language and of the model",
+            is_enough(n_aligned as f64 / n_words as f64),
+            "only {n_aligned} of {n_words} words match the {} of audio: expected {expected}",
             length(secs)
         );
         let mut words: Vec<Word> = Vec::with_capacity(self.words.len());
@@ -79,13 +89,32 @@ impl AlignedText {
             }
             if let Some((n, found)) = next {
                 let end_secs = found.end_secs.min(secs).max(found.start_secs);
-                let confidence = Some(f64::from(found.probability));
+                let confidence = Some(found.confidence);
                 let (word, source) = (self.words[n].clone(), WordSource::Aligned);
                 words.push(Word { word, start_secs: found.start_secs, end_secs, source, confidence });
             }
         }
+        for word in &mut words {
+            word.start_secs += zero_secs;
+            word.end_secs += zero_secs;
+        }
+        let unaligned = unaligned.into_iter().map(|n| (n + 1, words[n].clone())).collect();
         Ok((words, unaligned))
     }
+}
+
+/// The first unaligned words, for a summary.
+pub(super) fn listed(unaligned: &Unaligned) -> String {
+    let shown = unaligned.iter().take(SHOWN);
+    let shown = shown.map(|(n, word)| format!("word {n} `{}` near {:.1} s", word.word, word.start_secs));
+    let more = if unaligned.len() > SHOWN { ", ..." } else { "" };
+    shown.collect::<Vec<_>>().join(", ") + more
+}
+
+/// All unaligned words, for `--json`.
+pub(super) fn facts(unaligned: &Unaligned) -> Value {
+    let word = |(n, Word { word, start_secs, end_secs, .. }): &(usize, Word)| json!({ "number": n, "word": word, "start_secs": start_secs, "end_secs": end_secs });
+    unaligned.iter().map(word).collect()
 }
 
 fn has_letters(text: &str) -> bool {
@@ -98,19 +127,20 @@ mod tests {
 
     #[test]
     fn unaligned_words_are_interpolated_between_their_neighbours() {
-        let at =
-            |start_secs, end_secs| Some(RecognisedWord { word: String::new(), start_secs, end_secs, probability: 0.5 });
+        let at = |start_secs, end_secs| Some(AlignedWord { start_secs, end_secs, confidence: 0.5 });
         let found = [at(0.0, 0.2), at(0.2, 0.4), None, at(1.0, 1.5), None, None, at(2.5, 3.1), None];
         let words = ["a", "b", "c", "d", "e", "-", "f", "g"].map(str::to_owned).into();
         let text = AlignedText { times: Vec::new(), words };
-        let (words, unaligned) = text.with_times(&found, 3.0).unwrap();
+        let is_enough = |share: f64| share > 0.5;
+        let (words, unaligned) = text.with_times(&found, [0.0, 3.0], is_enough, "speech").unwrap();
         let times: Vec<_> = words.iter().map(|word| (word.start_secs, word.end_secs)).collect();
         assert_eq!(times[..4], [(0.0, 0.2), (0.2, 0.4), (0.4, 1.0), (1.0, 1.5)]);
         assert_eq!(times[4..], [(1.5, 2.0), (2.0, 2.5), (2.5, 3.0), (3.0, 3.0)]);
-        assert_eq!(unaligned, [2, 4, 7]);
-        assert!(unaligned.iter().all(|&n| words[n].source == WordSource::Interpolated));
+        assert_eq!(unaligned.iter().map(|(n, _)| n - 1).collect::<Vec<_>>(), [2, 4, 7]);
+        assert!(unaligned.iter().all(|(n, word)| words[n - 1] == *word && word.source == WordSource::Interpolated));
         assert_eq!((words[3].source, words[3].confidence), (WordSource::Aligned, Some(0.5)));
-        let error = text.with_times(&[None, at(1.0, 1.5)], 3.0).unwrap_err().to_string();
+        let few = text.with_times(&[None, at(1.0, 1.5)], [0.0, 3.0], is_enough, "speech");
+        let error = few.unwrap_err().to_string();
         assert!(error.starts_with("only 1 of 7 words match"), "{error}");
     }
 }

@@ -1,6 +1,6 @@
 //! `orator transcribe`: words with times from speech, or the times of the words of a given text (`aligned_text`).
 
-use super::aligned_text::AlignedText;
+use super::aligned_text::{self, AlignedText, Unaligned, listed};
 use crate::cli::Outcome;
 use crate::cli::config_args::ConfigArgs;
 use crate::cli::outputs::is_same_file;
@@ -15,19 +15,20 @@ use orator_base::types::sound::SAMPLE_RATE;
 use orator_dataset::config::Settings;
 use orator_formats::transcript::{SpokenSegment, TranscriptFormat, Word};
 use orator_formats::wav::WavRanges;
+use orator_media::aligner::AlignedWord;
 use orator_media::ffmpeg::origin;
 use orator_onnx::{AUTO, ModelStore};
 use orator_pipeline::sound;
 use orator_pipeline::speech::speech_rule::SpeechDetector;
 use orator_pipeline::transcribe::{spoken, steps_of};
-use orator_speech::{Recognised, Recogniser, RecogniserOptions};
+use orator_speech::{Recognised, RecognisedWord, Recogniser, RecogniserOptions};
 use serde_json::{Value, json};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-/// Maximum number of unaligned words that the summary lists.
-const SHOWN: usize = 8;
+/// Audio of a given text, for errors.
+const EXPECTED: &str = "the transcript of audible speech, in the language of --language and of the model";
 
 /// Write the words of audio or video files with their times.
 ///
@@ -144,7 +145,7 @@ fn outs(args: &Args) -> Result<Vec<PathBuf>> {
 struct WrittenTranscript {
     n_words: usize,
     /// Words of a given text that do not match the audio, with their numbers from 1.
-    unaligned: Vec<(usize, Word)>,
+    unaligned: Unaligned,
     /// Code of the language, empty if unknown, and its probability.
     language: (String, f32),
     secs: f64,
@@ -169,10 +170,7 @@ fn line(out: &Path, written: &Result<WrittenTranscript>) -> String {
     }
     line += &format!(", {:.1} times real time: {}", written.times_real_time, out.display());
     if !unaligned.is_empty() {
-        let shown = unaligned.iter().take(SHOWN);
-        let shown = shown.map(|(n, word)| format!("word {n} `{}` near {:.1} s", word.word, word.start_secs));
-        let more = if unaligned.len() > SHOWN { ", ..." } else { "" };
-        line += &format!("\n  not aligned: {}{more}", shown.collect::<Vec<_>>().join(", "));
+        line += &format!("\n  not aligned: {}", listed(unaligned));
     }
     line
 }
@@ -182,15 +180,11 @@ fn facts(input: &Path, out: &Path, written: &Result<WrittenTranscript>) -> Value
         Ok(written) => written,
         Err(error) => return json!({ "input": input, "error": format!("{error:#}") }),
     };
-    let unaligned = |(n, word): &(usize, Word)| {
-        let Word { word, start_secs, end_secs, .. } = word;
-        json!({ "number": n, "word": word, "start_secs": start_secs, "end_secs": end_secs })
-    };
     json!({
         "input": input,
         "out": out,
         "words": written.n_words,
-        "unaligned": written.unaligned.iter().map(unaligned).collect::<Vec<_>>(),
+        "unaligned": aligned_text::facts(&written.unaligned),
         "language": written.language.0,
         "language_probability": written.language.1,
         "secs": written.secs,
@@ -258,11 +252,13 @@ impl Transcriber<'_> {
             Some(text) => {
                 let (words, within) = (text.words(), text.within(zero_secs));
                 let found = self.recogniser.align(&mut source, n_samples, words, &within, language, &mut progress)?;
-                let (mut words, unaligned) = text.with_times(&found, secs)?;
-                for word in &mut words {
-                    word.start_secs += zero_secs;
-                    word.end_secs += zero_secs;
-                }
+                let of_word = |RecognisedWord { start_secs, end_secs, probability, .. }| AlignedWord {
+                    start_secs,
+                    end_secs,
+                    confidence: f64::from(probability),
+                };
+                let found: Vec<_> = found.into_iter().map(|word| word.map(of_word)).collect();
+                let (words, unaligned) = text.with_times(&found, [zero_secs, secs], |share| share > 0.5, EXPECTED)?;
                 (sentences(&words), (language.unwrap_or_default().to_owned(), 1.0), unaligned)
             }
         };
@@ -271,7 +267,7 @@ impl Transcriber<'_> {
         workdir::write_file(out, format.write(&segments, &language.0, zero_secs + secs).as_bytes())?;
         Ok(WrittenTranscript {
             n_words: words.len(),
-            unaligned: unaligned.into_iter().map(|n| (n + 1, words[n].clone())).collect(),
+            unaligned,
             language,
             secs,
             speech_secs: speech.iter().map(|range| range.end - range.start).fold(0.0, |sum, secs| sum + secs),
