@@ -1,4 +1,4 @@
-//! Head, trunk and legs of a captured skeleton (BVH) on our rig. Bones of trunk, neck and legs take the captured
+//! Head, trunk and legs of a captured skeleton (BVH, SMPL-X) on our rig. Bones of trunk, neck and legs take the captured
 //! directions and roll with their joints; hips, head and feet take the rotations of their joints relative to the
 //! reference pose. Legs have the captured lengths, and the arms keep their world rotations.
 
@@ -14,7 +14,9 @@ use orator_base::math::vec3::{Vec3, norm, scale, sub, unit};
 use orator_formats::bvh::read::{Bvh, Positions};
 use orator_formats::bvh::write::BvhClip;
 use orator_formats::mocap;
+use orator_formats::mocap::bvh::GivenScale;
 use orator_formats::mocap::facing::LengthUnit;
+use orator_formats::mocap::motion_file::{DEFAULT_FPS, has_skeleton};
 use serde::Serialize;
 use std::ops::Range;
 use std::path::Path;
@@ -79,14 +81,18 @@ struct CapturedBone {
 }
 
 impl CapturedBody {
-    /// Reads the body of a .bvh file; `None` for other files, and if hips, trunk or arms are not found by name, a joint
-    /// does not have three rotation channels, or a value is not finite. Without `units`, the unit is detected.
+    /// Reads the body of a BVH or SMPL-X file; `None` for other files, and if hips, trunk or arms are not found by name,
+    /// a joint does not have three rotation channels, or a value is not finite. Without `units`, the unit is detected.
     ///
     /// # Errors
-    /// The file is unreadable or not BVH.
+    /// The file is unreadable or not of its kind.
     pub fn read(path: &Path, units: Option<LengthUnit>) -> Result<Option<Self>> {
-        let is_bvh = path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("bvh"));
-        Ok(if is_bvh { Self::from_bvh(&Bvh::read(path)?, units) } else { None })
+        if !has_skeleton(path)? {
+            return Ok(None);
+        }
+        // The frame rate does not matter here.
+        let (bvh, units) = mocap::bvh::open(path, GivenScale { units, fps: Some(DEFAULT_FPS) })?;
+        Ok(Self::from_bvh(&bvh, units))
     }
 
     fn from_bvh(bvh: &Bvh, units: Option<LengthUnit>) -> Option<Self> {
