@@ -73,7 +73,8 @@ pub fn open(tars: &[PathBuf]) -> ShardTars {
         }
         let name = file_name(tar);
         let left_out = |(ending, n): (String, usize)| {
-            format!("{name}: skipped {} not in a sample", counted(n, &format!(".{ending} file")))
+            let remedy = if ending == "npz" { "; to import SMPL-H motion, unpack the tar file first" } else { "" };
+            format!("{name}: skipped {} not in a sample{remedy}", counted(n, &format!(".{ending} file")))
         };
         found.notes.extend(unknown.into_iter().map(left_out));
     }

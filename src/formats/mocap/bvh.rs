@@ -91,11 +91,7 @@ pub fn notes(facts: &Map<String, Value>) -> Vec<String> {
     notes
 }
 
-fn read_take(
-    path: &Path,
-    given: GivenScale,
-    align: impl Fn(AxisAlignment) -> AxisAlignment,
-) -> Result<CapturedMotion> {
+fn read_take(path: &Path, given: GivenScale, align: impl Fn(AxisAlignment) -> AxisAlignment) -> Result<CapturedMotion> {
     let (bvh, units) = open(path, given)?;
     from_bvh(&bvh, units, align).with_context(|| format!("{} has no usable upper-body motion", path.display()))
 }

@@ -4,7 +4,7 @@
 
 use super::bvh::{self, GivenScale};
 use super::facing::LengthUnit;
-use super::smplx::motion::is_smplx;
+use super::smplx::motion::{is_smplx, states_rate};
 use crate::npz::{AxisLength, Npz};
 use crate::{authors_txt, joints_description, npy};
 use anyhow::{Context, Result, bail, ensure};
@@ -95,6 +95,7 @@ fn read_in(path: &Path, fps: Option<FrameRate>, units: Option<LengthUnit>) -> Re
     let has_skeleton = has_skeleton(path)?;
     let motion = match ending.as_str() {
         "bvh" | "npz" if has_skeleton => {
+            has_rate = ending == "bvh" || states_rate(&Npz::open(path)?);
             let captured = bvh::read_unrotated(path, GivenScale { units, fps })?;
             notes.extend(bvh::notes(&captured.facts).into_iter().map(|note| format!("{name}: {note}")));
             let rotated_degrees =

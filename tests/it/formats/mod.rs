@@ -8,6 +8,7 @@ mod joint_names;
 mod joints_description;
 mod keypoints_npz;
 mod motion_file;
+mod smplx;
 mod subtitles;
 mod transcript;
 mod transcript_write;

@@ -1,5 +1,5 @@
-//! Head, trunk and legs of a captured skeleton (BVH, SMPL-X) on our rig. Bones of trunk, neck and legs take the captured
-//! directions and roll with their joints; hips, head and feet take the rotations of their joints relative to the
+//! Head, trunk and legs of a captured skeleton (BVH, SMPL-X) on our rig. Bones of trunk, neck and legs take the
+//! captured directions and roll with their joints; hips, head and feet take the rotations of their joints relative to the
 //! reference pose. Legs have the captured lengths, and the arms keep their world rotations.
 
 use super::bone_map::BoneMap;
@@ -81,8 +81,8 @@ struct CapturedBone {
 }
 
 impl CapturedBody {
-    /// Reads the body of a BVH or SMPL-X file; `None` for other files, and if hips, trunk or arms are not found by name,
-    /// a joint does not have three rotation channels, or a value is not finite. Without `units`, the unit is detected.
+    /// Reads the body of a BVH or SMPL-X file; `None` for others, and if hips, trunk or arms are not found by name, a
+    /// joint does not have three rotation channels, or a value is not finite. Without `units`, the unit is detected.
     ///
     /// # Errors
     /// The file is unreadable or not of its kind.

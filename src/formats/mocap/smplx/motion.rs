@@ -56,6 +56,11 @@ pub fn is_smplx(npz: &Npz) -> bool {
     ["poses", AMASS[1].0, SEAMLESS[1].0].iter().any(|key| npz.has(key))
 }
 
+/// Whether the frame rate of such a file is known.
+pub fn states_rate(npz: &Npz) -> bool {
+    npz.has(SEAMLESS[1].0) || RATE_KEYS.iter().any(|key| npz.has(key))
+}
+
 impl SmplxMotion {
     /// Reads a file; `fps` is the frame rate of one that does not state it.
     ///
@@ -85,7 +90,8 @@ impl SmplxMotion {
         let rest = if npz.has(REST_KEY) { points(npz, REST_KEY, N_POINTS)?.try_into().ok() } else { None };
         let fps = match RATE_KEYS.into_iter().find(|key| npz.has(key)) {
             Some(key) => npz.frame_rate(key)?,
-            None => fps.or(is_camera.then_some(SEAMLESS_FPS)).context(
+            None if is_camera => SEAMLESS_FPS,
+            None => fps.context(
                 "no frame rate: expected an array `mocap_frame_rate` or `mocap_framerate`, frames per second; add it, \
                  or give --input-fps to `orator animate` or `orator evaluate`",
             )?,
