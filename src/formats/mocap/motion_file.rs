@@ -85,7 +85,8 @@ fn read_in(path: &Path, fps: Option<FrameRate>, units: Option<LengthUnit>) -> Re
     let meta = input::open(path).and_then(|file| file.metadata());
     let size = meta.with_context(|| format!("cannot read {}", path.display()))?.len();
     ensure!(size > 0, "{} is empty (0 bytes): expected motion", path.display());
-    let (mut notes, mut has_rate, assumed) = (Vec::new(), true, fps.unwrap_or(DEFAULT_FPS));
+    let (mut notes, assumed) = (Vec::new(), fps.unwrap_or(DEFAULT_FPS));
+    let has_rate;
     let ending = path.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
     ensure!(
         units.is_none() || ending == "bvh",
