@@ -34,67 +34,30 @@ const BASES: [usize; 5] = [5, 9, 17, 13, 1];
 const FAN: [f64; 5] = [45.0, 8.0, 0.0, -12.0, -26.0];
 /// Directions of the knuckles from the wrist, degrees towards the thumb; thumb to little finger.
 const PALM: [f64; 5] = [48.0, 15.0, 1.0, -12.0, -25.0];
-/// Position of the pelvis; the origin of a body model is between its chest and its pelvis, near its centre.
+/// Position of the pelvis. As in the body models the origin is above it, so that the soles of a standing person are at 0
+/// for a translation of 1.3 m, the mean of BEAT2.
 const PELVIS: Vec3 = [0.0, -0.35, 0.0];
 
-/// Names as in BVH files, by which the joints of the body are matched.
-const NAMES: [&str; FINGERS[0]] = [
-    "Hips",
-    "LeftUpLeg",
-    "RightUpLeg",
-    "Spine",
-    "LeftLeg",
-    "RightLeg",
-    "Spine1",
-    "LeftFoot",
-    "RightFoot",
-    "Spine2",
-    "LeftToeBase",
-    "RightToeBase",
-    "Neck",
-    "LeftShoulder",
-    "RightShoulder",
-    "Head",
-    "LeftArm",
-    "RightArm",
-    "LeftForeArm",
-    "RightForeArm",
-    "LeftHand",
-    "RightHand",
-    "Jaw",
-    "LeftEye",
-    "RightEye",
-];
+/// Names of the joints before the fingers as in BVH files, by which the joints of the body are matched.
+const NAMES: &str = "Hips LeftUpLeg RightUpLeg Spine LeftLeg RightLeg Spine1 LeftFoot RightFoot Spine2 LeftToeBase \
+    RightToeBase Neck LeftShoulder RightShoulder Head LeftArm RightArm LeftForeArm RightForeArm LeftHand RightHand Jaw \
+    LeftEye RightEye";
 const FINGER_NAMES: [&str; 5] = ["Index", "Middle", "Pinky", "Ring", "Thumb"];
 /// Parents of joints 1 to 24.
 const PARENTS: [usize; FINGERS[0] - 1] =
     [0, 0, 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 9, 9, 12, 13, 14, 16, 17, 18, 19, 15, 15, 15];
 /// Offsets of joints 1 to 24 from their parents, metres. Right joints mirror the left ones.
+#[rustfmt::skip]
 const OFFSETS: [Vec3; FINGERS[0] - 1] = [
-    [0.09, -0.07, 0.0],
-    [-0.09, -0.07, 0.0],
-    [0.0, 0.11, 0.0],
-    [0.0, -0.41, 0.0],
-    [0.0, -0.41, 0.0],
-    [0.0, 0.13, 0.0],
-    [0.0, -0.41, 0.0],
-    [0.0, -0.41, 0.0],
-    [0.0, 0.06, 0.0],
-    [0.0, -0.06, 0.13],
-    [0.0, -0.06, 0.13],
-    [0.0, 0.21, 0.0],
-    [0.06, 0.16, 0.0],
-    [-0.06, 0.16, 0.0],
-    [0.0, 0.09, 0.0],
-    [0.12, 0.0, 0.0],
-    [-0.12, 0.0, 0.0],
-    [0.28, 0.0, 0.0],
-    [-0.28, 0.0, 0.0],
-    [0.25, 0.0, 0.0],
-    [-0.25, 0.0, 0.0],
-    [0.0, 0.0, 0.02],
-    [0.03, 0.06, 0.08],
-    [-0.03, 0.06, 0.08],
+    [0.09, -0.07, 0.0], [-0.09, -0.07, 0.0], [0.0, 0.11, 0.0],
+    [0.0, -0.41, 0.0], [0.0, -0.41, 0.0], [0.0, 0.13, 0.0],
+    [0.0, -0.41, 0.0], [0.0, -0.41, 0.0], [0.0, 0.06, 0.0],
+    [0.0, -0.06, 0.13], [0.0, -0.06, 0.13], [0.0, 0.21, 0.0],
+    [0.06, 0.16, 0.0], [-0.06, 0.16, 0.0], [0.0, 0.09, 0.0],
+    [0.12, 0.0, 0.0], [-0.12, 0.0, 0.0],
+    [0.28, 0.0, 0.0], [-0.28, 0.0, 0.0],
+    [0.25, 0.0, 0.0], [-0.25, 0.0, 0.0],
+    [0.0, 0.0, 0.02], [0.03, 0.06, 0.08], [-0.03, 0.06, 0.08],
 ];
 
 /// Positions of joints and tips at rest, metres, in the axes of the body model.
@@ -129,7 +92,7 @@ pub fn name(joint: usize) -> String {
         Some((side, finger, bone)) => {
             format!("{}Hand{}{}", ["Left", "Right"][side], FINGER_NAMES[finger], bone + 1)
         }
-        None => NAMES[joint].to_owned(),
+        None => NAMES.split(' ').nth(joint).unwrap_or_default().to_owned(),
     }
 }
 
