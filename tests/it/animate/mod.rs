@@ -14,5 +14,4 @@ pub(crate) mod posture;
 pub(crate) mod rates;
 pub(crate) mod renderer;
 pub(crate) mod skeleton;
-pub(crate) mod smplx_verb;
 pub(crate) mod visibility;

@@ -9,6 +9,7 @@ mod joints_description;
 mod keypoints_npz;
 mod motion_file;
 mod smplx;
+mod smplx_verb;
 mod subtitles;
 mod transcript;
 mod transcript_write;
