@@ -73,8 +73,7 @@ pub fn open(tars: &[PathBuf]) -> ShardTars {
         }
         let name = file_name(tar);
         let left_out = |(ending, n): (String, usize)| {
-            let remedy = if ending == "npz" { "; to import SMPL-H motion, unpack the tar file first" } else { "" };
-            format!("{name}: skipped {} not in a sample{remedy}", counted(n, &format!(".{ending} file")))
+            format!("{name}: skipped {} not in a sample", counted(n, &format!(".{ending} file")))
         };
         found.notes.extend(unknown.into_iter().map(left_out));
     }
@@ -110,6 +109,10 @@ fn list(
         let (key, ending) = name.split_once('.').unwrap_or((&name, ""));
         let member = EXTENSIONS.iter().chain(&OPTIONAL_EXTENSIONS).position(|extension| *extension == ending);
         let Some(member) = member else {
+            ensure!(
+                ending != "npz",
+                "it contains .npz files: unpack it to import SMPL-H motion, as of Seamless Interaction"
+            );
             *unknown.entry(ending.to_owned()).or_default() += 1;
             continue;
         };

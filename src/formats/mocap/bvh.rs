@@ -34,11 +34,7 @@ pub struct GivenScale {
 }
 
 /// Opens a BVH file, or an `.npz` of SMPL-X as such a file in metres; returns its unit of length too, if known.
-///
-/// # Errors
-///
-/// The file is of neither kind.
-pub fn open(path: &Path, given: GivenScale) -> Result<(Bvh, Option<LengthUnit>)> {
+fn open(path: &Path, given: GivenScale) -> Result<(Bvh, Option<LengthUnit>)> {
     if path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("npz")) {
         return Ok((SmplxMotion::read(path, given.fps)?.bvh(), Some(LengthUnit::METRE)));
     }
@@ -49,7 +45,7 @@ pub fn open(path: &Path, given: GivenScale) -> Result<(Bvh, Option<LengthUnit>)>
 ///
 /// # Errors
 ///
-/// Those of [`open`]; its skeleton lacks a shoulder, or the person neither stands nor sits upright.
+/// The file is not of its kind, its skeleton lacks a shoulder, or the person neither stands nor sits upright.
 pub fn read(path: &Path, given: GivenScale) -> Result<CapturedMotion> {
     read_take(path, given, |alignment| alignment)
 }

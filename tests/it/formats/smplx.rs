@@ -156,6 +156,8 @@ fn every_layout_gives_the_same_joints() {
         assert!(read.has_rate && read.motion.fps == THIRTY);
         let seen: Vec<bool> = read.motion.mask.column(L_WRIST).to_vec();
         assert_eq!(seen, [true, true, false, true, true]);
+        let body = CapturedBody::read(&path, None).unwrap().unwrap();
+        assert_eq!(body.parts(), [CapturedPart::Head, CapturedPart::Spine]);
         assert!(
             read.motion.joints[[0, L_HAND + 4, 1]].is_finite() && read.notes[0].contains("rotated"),
             "{:?}",
@@ -394,6 +396,4 @@ fn every_finger_point_has_its_joint_and_the_hands_are_mirrored() {
     let mut points: Vec<usize> = pairs.iter().map(|((point, _), _)| *point).collect();
     points.sort_unstable();
     assert_eq!(points, (1..21).collect::<Vec<_>>());
-    let names: std::collections::BTreeSet<String> = (0..N_SMPLX).map(body::name).collect();
-    assert!(names.len() == N_SMPLX && N_JOINTS == 49);
 }

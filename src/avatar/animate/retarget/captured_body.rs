@@ -14,9 +14,9 @@ use orator_base::math::vec3::{Vec3, norm, scale, sub, unit};
 use orator_formats::bvh::read::{Bvh, Positions};
 use orator_formats::bvh::write::BvhClip;
 use orator_formats::mocap;
-use orator_formats::mocap::bvh::GivenScale;
 use orator_formats::mocap::facing::LengthUnit;
 use orator_formats::mocap::motion_file::{DEFAULT_FPS, has_skeleton};
+use orator_formats::mocap::smplx::motion::SmplxMotion;
 use serde::Serialize;
 use std::ops::Range;
 use std::path::Path;
@@ -90,9 +90,13 @@ impl CapturedBody {
         if !has_skeleton(path)? {
             return Ok(None);
         }
+        if path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("bvh")) {
+            return Ok(Self::from_bvh(&Bvh::read(path)?, units));
+        }
         // The frame rate does not matter here.
-        let (bvh, units) = mocap::bvh::open(path, GivenScale { units, fps: Some(DEFAULT_FPS) })?;
-        Ok(Self::from_bvh(&bvh, units))
+        let mut motion = SmplxMotion::read(path, Some(DEFAULT_FPS))?;
+        motion.hold_missing();
+        Ok(Self::from_bvh(&motion.bvh(), Some(LengthUnit::METRE)))
     }
 
     fn from_bvh(bvh: &Bvh, units: Option<LengthUnit>) -> Option<Self> {

@@ -100,6 +100,18 @@ impl SmplxMotion {
         Ok(Self { fps, rest: rest.unwrap_or_else(body::rest), translation, rotations })
     }
 
+    /// Gives frames without a person the rotations of the frame before, or of the first frame with a person.
+    pub fn hold_missing(&mut self) {
+        let is_present = |frame: &[Rotation; N_SMPLX]| frame.iter().all(|rotation| rotation.w.is_finite());
+        let Some(mut held) = self.rotations.iter().copied().find(is_present) else { return };
+        for frame in &mut self.rotations {
+            if is_present(frame) {
+                held = *frame;
+            }
+            *frame = held;
+        }
+    }
+
     /// The motion as a BVH file in metres. Without a known floor the legs have names that no reader matches.
     pub fn bvh(&self) -> Bvh {
         let mut skeleton = body::skeleton(&self.rest);
