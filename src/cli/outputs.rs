@@ -3,6 +3,7 @@
 use anyhow::{Result, bail, ensure};
 use orator_avatar::animate::export::file::ExportFormat;
 use orator_formats::joints_description as description;
+use orator_formats::mocap::motion_file;
 use std::path::{Path, PathBuf};
 
 /// Files to write, with their formats.
@@ -33,8 +34,11 @@ pub fn outputs(out: &[PathBuf], is_read: impl Fn(&Path) -> bool, input: &str, hi
 
 /// File name of a variant: `motion.bvh` becomes `motion-2.bvh`.
 pub fn variant_path(path: &Path, variant: usize) -> PathBuf {
-    let mut name = path.file_stem().unwrap_or_default().to_os_string();
+    let mut name = motion_file::stem(path).to_os_string();
     name.push(format!("-{variant}"));
+    if motion_file::is_smplx_name(path) {
+        name.push(".smplx");
+    }
     if let Some(extension) = path.extension() {
         name.push(".");
         name.push(extension);
@@ -56,9 +60,10 @@ pub fn names(outputs: &OutputFiles) -> Vec<String> {
 /// files that the verb reads.
 pub fn next_output(outputs: &OutputFiles, is_read: impl Fn(&Path) -> bool) -> Option<PathBuf> {
     let first = &outputs.first()?.0;
+    let stem = motion_file::stem(first).to_string_lossy();
     let kinds = [(ExportFormat::Mp4, "mp4"), (ExportFormat::Bvh, "bvh")].into_iter();
     let missing = kinds.filter(|&(format, _)| outputs.iter().all(|&(_, written)| written != format));
-    missing.map(|(_, ending)| first.with_extension(ending)).find(|path| !is_read(path))
+    missing.map(|(_, ending)| first.with_file_name(format!("{stem}.{ending}"))).find(|path| !is_read(path))
 }
 
 #[cfg(test)]
@@ -72,5 +77,7 @@ mod tests {
         assert_eq!(next(&["a.npy"]), Some("a.mp4".into()));
         assert_eq!(next(&["a.mp4"]), Some("a.bvh".into()));
         assert_eq!(next(&["a.bvh", "a.mp4"]), None);
+        assert_eq!(variant_path(Path::new("d/a.smplx.npz"), 2), Path::new("d/a-2.smplx.npz"));
+        assert_eq!(variant_path(Path::new("d/a.b.npz"), 2), Path::new("d/a.b-2.npz"));
     }
 }

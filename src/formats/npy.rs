@@ -140,10 +140,10 @@ impl Element {
     }
 }
 
-fn header(element: Element, shape: &[usize]) -> Vec<u8> {
+fn header(descr: &str, shape: &[usize]) -> Vec<u8> {
     let shape: String = shape.iter().map(|n| format!("{n}, ")).collect();
     let shape = shape.trim_end_matches(' ');
-    let dict = format!("{{'descr': '{}', 'fortran_order': False, 'shape': ({shape}), }}", element.descr());
+    let dict = format!("{{'descr': '{descr}', 'fortran_order': False, 'shape': ({shape}), }}");
     // The header is padded with spaces and a line feed, so that the data starts at a multiple of 64 bytes.
     let length = (MAGIC.len() + 2 + dict.len() + 1).next_multiple_of(64) - MAGIC.len() - 2;
     let mut bytes = MAGIC.to_vec();
@@ -156,7 +156,7 @@ fn header(element: Element, shape: &[usize]) -> Vec<u8> {
 
 /// File contents of a float32 array of `shape`; `values` in C order.
 pub fn write_f32<'a>(shape: &[usize], values: impl Iterator<Item = &'a f32>) -> Vec<u8> {
-    let mut bytes = header(Element::F32, shape);
+    let mut bytes = header(Element::F32.descr(), shape);
     bytes.reserve(4 * shape.iter().product::<usize>());
     values.for_each(|value| bytes.extend_from_slice(&value.to_le_bytes()));
     bytes
@@ -164,8 +164,15 @@ pub fn write_f32<'a>(shape: &[usize], values: impl Iterator<Item = &'a f32>) -> 
 
 /// File contents of a bool array of `shape`; `values` in C order.
 pub fn write_bool<'a>(shape: &[usize], values: impl Iterator<Item = &'a bool>) -> Vec<u8> {
-    let mut bytes = header(Element::Bool, shape);
+    let mut bytes = header(Element::Bool.descr(), shape);
     bytes.extend(values.map(|&value| u8::from(value)));
+    bytes
+}
+
+/// File contents of a scalar string.
+pub(crate) fn write_text(text: &str) -> Vec<u8> {
+    let mut bytes = header(&format!("<U{}", text.chars().count()), &[]);
+    bytes.extend(text.chars().flat_map(|character| u32::from(character).to_le_bytes()));
     bytes
 }
 
@@ -255,7 +262,7 @@ pub(crate) mod tests {
         let layout = Layout::parse(&bytes[..HEADER_BYTES], bytes.len() as u64, Element::F32, &[49, 3]).unwrap();
         assert_eq!((layout.data_at, layout.n_rows, layout.row_bytes), (128, 7, 588));
         assert_eq!(floats(&bytes[layout.data_at..]), array.iter().copied().collect::<Vec<_>>());
-        assert_eq!(header(Element::F32, &[usize::MAX, 59, 3]).len(), HEADER_BYTES);
+        assert_eq!(header(Element::F32.descr(), &[usize::MAX, 59, 3]).len(), HEADER_BYTES);
         let flags = [true, false, true, true];
         let bytes = write_bool(&[2, 2], flags.iter());
         assert_eq!(ndarray::Array2::<bool>::read_npy(&bytes[..]).unwrap().into_raw_vec_and_offset().0, flags);

@@ -170,7 +170,7 @@ impl Npz {
 /// Writes the arrays that `add` adds to a new file. The bytes are deterministic.
 pub fn write(path: &Path, add: impl FnOnce(&mut NpzWriter<NpzOutput>) -> Result<(), WriteNpzError>) -> Result<()> {
     let attempt = || -> Result<()> {
-        let mut npz = NpzWriter::new(NpzOutput::new(BufWriter::new(File::create(path)?)));
+        let mut npz = NpzWriter::new(NpzOutput::create(path)?);
         add(&mut npz)?;
         npz.finish()?.finish()
     };
@@ -185,13 +185,19 @@ pub struct NpzOutput<W = BufWriter<File>> {
     error: Option<io::Error>,
 }
 
+impl NpzOutput {
+    pub(crate) fn create(path: &Path) -> Result<Self> {
+        Ok(Self::new(BufWriter::new(File::create(path)?)))
+    }
+}
+
 impl<W: Write + Seek> NpzOutput<W> {
     fn new(to: W) -> Self {
         Self { to, at: 0, error: None }
     }
 
     /// Flushes the file. Errors: the first error of any write.
-    fn finish(mut self) -> Result<()> {
+    pub(crate) fn finish(mut self) -> Result<()> {
         let flushed = self.to.flush();
         Ok(self.error.map_or(flushed, Err)?)
     }

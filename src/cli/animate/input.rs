@@ -62,7 +62,7 @@ pub fn inputs(path: &Path, sample: Option<&str>, split: Option<Split>) -> Result
         return of_dataset(path, sample, split);
     }
     let file = |path: PathBuf, named: &Path| {
-        let name = named.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+        let name = motion_file::stem(named).to_string_lossy().into_owned();
         MotionInput { name, location: InputLocation::File(path) }
     };
     if !path.is_dir() {
@@ -72,19 +72,20 @@ pub fn inputs(path: &Path, sample: Option<&str>, split: Option<Split>) -> Result
         let absolute = path.canonicalize().with_context(|| format!("cannot open {}", path.display()))?;
         return Ok(vec![file(Artifact::Joints.within(path), &absolute)]);
     }
-    let (mut found, mut bvh) = (Vec::new(), Vec::new());
+    let (mut found, mut rotations) = (Vec::new(), Vec::new());
     for entry in std::fs::read_dir(path).with_context(|| format!("cannot open {}", path.display()))? {
         let entry = entry.with_context(|| format!("cannot read {}", path.display()))?.path();
         if Artifact::Joints.within(&entry).is_file() {
             found.push(file(Artifact::Joints.within(&entry), &entry));
         } else if entry.is_file() && motion_file::has_ending(&entry) {
             let is_bvh = entry.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("bvh"));
-            if is_bvh { &mut bvh } else { &mut found }.push(file(entry.clone(), &entry));
+            let has_rotations = is_bvh || motion_file::is_smplx_name(&entry);
+            if has_rotations { &mut rotations } else { &mut found }.push(file(entry.clone(), &entry));
         }
     }
-    // BVH files next to joints were created from them.
+    // BVH and SMPL-X files next to joints were created from them.
     if found.is_empty() {
-        found = bvh;
+        found = rotations;
     }
     found.sort_by(|a, b| a.name.cmp(&b.name));
     for pair in found.windows(2) {

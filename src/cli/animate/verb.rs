@@ -42,18 +42,18 @@ use std::time::Instant;
 /// and an .mp4 shows the avatar beside the video and marks the limbs that are not visible.
 ///
 /// Or IN is a motion: .npy (joints [frames, 49, 3], metres; the frame rate is in .npy.json), .txt (layout of Rebol et
-/// al. 2021), joints.npz or the folder of a lifted video (work/lift/SPEAKER/VIDEO), or a dataset
-/// (work/dataset/SPEAKER) with --sample. With --format, IN may also be a folder of motions, the folder of lifted
-/// videos of a speaker or an entire dataset; --out is then a folder.
+/// al. 2021), .bvh, .npz of SMPL-X or SMPL-H (BEAT2, EMAGE, AMASS, Seamless Interaction), joints.npz or the folder of a
+/// lifted video (work/lift/SPEAKER/VIDEO), or a dataset (work/dataset/SPEAKER) with --sample. With --format, IN may
+/// also be a folder of motions, the folder of lifted videos of a speaker or an entire dataset; --out is then a folder.
 ///
 /// The extension of each output selects its format: .bvh (cm, y up, facing +z, T-pose at rest), .fbx (binary 7.4) and
-/// .glb (skinned avatar with the motion), .vrm (avatar only, VRM 1.0), .vrma (motion for VRM avatars), .json, .npz,
-/// .npy and .txt (joints of the figure), .mp4 (video).
+/// .glb (skinned avatar with the motion), .vrm (avatar only, VRM 1.0), .vrma (motion for VRM avatars), .smplx.npz
+/// (SMPL-X rotations as in BEAT2), .json, .npz, .npy and .txt (joints of the figure), .mp4 (video).
 ///
 /// Head and trunk follow the detected face, shoulders and hips where 2D keypoints are available: those of the dataset
-/// or run, or of --keypoints. A .bvh keeps its captured head, trunk and legs, with the lengths of the legs and the
-/// positions of the hips. Otherwise they stay at rest. Bone lengths and palm shapes are medians over the motion;
-/// a palm that does not point along its hand is replaced by that of the other hand, or else by a standard one.
+/// or run, or of --keypoints. A .bvh or SMPL-X file keeps its captured head, trunk and legs, with the lengths of the
+/// legs and the positions of the hips. Otherwise they stay at rest. Bone lengths and palm shapes are medians over the
+/// motion; a palm that does not point along its hand is replaced by that of the other hand, or else by a standard one.
 ///
 /// Smoothing removes noise that is estimated for each bone; motion without noise changes by a few millimetres at
 /// most. The limits of elbow, forearm, wrist and finger joints were measured in motion capture; the report counts
@@ -67,7 +67,7 @@ pub struct Args {
     #[arg(long, value_name = "FILE|DIR", required = true, num_args = 1..)]
     out: Vec<PathBuf>,
     /// Write every motion of IN into the folder --out in these formats, separated by commas:
-    /// bvh,fbx,glb,json,mp4,npy,npz,txt,vrm,vrma
+    /// bvh,fbx,glb,json,mp4,npy,npz,smplx.npz,txt,vrm,vrma
     #[arg(long, value_name = "EXTENSION", value_delimiter = ',')]
     format: Vec<String>,
     /// Key of the sample, if IN is a dataset.

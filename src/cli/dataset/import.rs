@@ -22,9 +22,10 @@ use std::path::{Path, PathBuf};
 /// Create a dataset from motion capture and its audio.
 ///
 /// Each SOURCE is a file, or a folder that is searched for: text clips of Rebol et al. (2021) with 147 numbers per
-/// line, TED Expressive (.npz with `human_joints`), BVH, and WebDataset shards or dataset folders of this program, to
-/// merge or re-import them. Audio (.wav, .flac, ...) and transcript (.tsv, .json, .TextGrid, .srt, .vtt, .txt) have
-/// the file name of the motion and are in its folder or in neighbouring folders (bvh/, wav/, tsv/).
+/// line, TED Expressive (.npz with `human_joints`), SMPL-X and SMPL-H (.npz of BEAT2, EMAGE, AMASS or unpacked Seamless
+/// Interaction), BVH, and WebDataset shards or dataset folders of this program, to merge or re-import them. Audio
+/// (.wav, .flac, ...) and transcript (.tsv, .json, .TextGrid, .srt, .vtt, .txt) have the file name of the motion and
+/// are in its folder or in neighbouring folders (bvh/, wav/, tsv/).
 ///
 /// Each take is accepted, rejected with a reason, or failed. Exit code 2: a take failed.
 #[derive(clap::Args)]
@@ -84,6 +85,7 @@ enum ImportKind {
     Authors,
     Ted,
     Bvh,
+    Smplx,
     Shards,
 }
 
@@ -132,6 +134,7 @@ fn plan(args: &Args) -> Result<ImportPlan> {
             ImportKind::Authors => Some(Found::Authors),
             ImportKind::Ted => Some(Found::Ted),
             ImportKind::Bvh => Some(Found::Bvh),
+            ImportKind::Smplx => Some(Found::Smplx),
             ImportKind::Shards => Some(Found::Shards),
         },
         about: About { licence, consent, source, ..About::new(name, fps) },

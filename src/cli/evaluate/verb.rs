@@ -32,8 +32,8 @@ use std::sync::Arc;
 
 /// Measure predicted motion against the ground truth and baselines.
 ///
-/// The prediction is a file or folder of motion (.npy, .npz, .txt of Rebol et al. 2021, .bvh), or the output of
-/// checkpoints on a split of a dataset.
+/// The prediction is a file or folder of motion (.npy, .npz, also of SMPL-X, .txt of Rebol et al. 2021, .bvh), or the
+/// output of checkpoints on a split of a dataset.
 ///
 /// Each metric is printed with its 95 % confidence interval, next to the values of the baselines: static poses,
 /// nearest neighbour, mismatched motion, and the ground truth itself. A summary states whether the prediction is

@@ -27,8 +27,8 @@ use std::sync::Arc;
 ///
 /// The audio is a wav, flac or mp3 file or a video, of any length. The extension of each output selects its format:
 /// .npy (joints [frames, 49, 3], metres), .txt (layout of Rebol et al. 2021), .bvh (bone rotations; cm, y up, facing
-/// +z), .fbx and .glb (skinned avatar with the motion), .vrm (avatar only), .vrma (motion for VRM avatars), .json
-/// (joints and rotations), .mp4 (video of the avatar with the audio).
+/// +z), .smplx.npz (SMPL-X rotations as in BEAT2), .fbx and .glb (skinned avatar with the motion), .vrm (avatar only),
+/// .vrma (motion for VRM avatars), .json (joints and rotations), .mp4 (video of the avatar with the audio).
 ///
 /// To process many files, give --out-folder and --format with --audio-folder (all audio files in a folder and its
 /// subfolders) or --batch (a CSV table with the column `audio` and optionally `out`, `checkpoint` and `transcript`;

@@ -8,6 +8,8 @@ use anyhow::{Context, Result, ensure};
 use orator_base::input;
 use orator_formats::joints_description::path_of;
 use orator_formats::mocap::captured::MotionKind;
+use orator_formats::mocap::motion_file::stem;
+use orator_formats::mocap::smplx::motion::is_smplx;
 use orator_formats::npz::Npz;
 use orator_formats::search::NamedFiles;
 use orator_formats::{search, transcript};
@@ -67,7 +69,7 @@ pub fn find(sources: &[PathBuf], only: Option<MotionKind>) -> Result<ImportSourc
             Ok(Some(kind)) if only.is_some_and(|only| only != kind) => {}
             Ok(Some(MotionKind::Shards)) => found.tars.push(path),
             Ok(Some(kind)) => found.takes.push(with_companions(kind, path, &mut named)),
-            Err(_) if only.is_some_and(|only| only != MotionKind::Ted) => {}
+            Err(_) if only.is_some_and(|only| ![MotionKind::Ted, MotionKind::Smplx].contains(&only)) => {}
             Err(why) => found.unknown.push((path, why)),
         }
     }
@@ -82,8 +84,8 @@ pub fn find(sources: &[PathBuf], only: Option<MotionKind>) -> Result<ImportSourc
         found.takes.is_empty() && found.datasets.is_empty() && found.tars.is_empty() && found.unknown.is_empty();
     ensure!(
         !is_empty,
-        "nothing to import in {sources:?}{}: expected text clips with 147 values per line, .npz with `human_joints`, \
-         .bvh or .tar shards",
+        "nothing to import in {sources:?}{}: expected text clips with 147 values per line, .npz with `human_joints` \
+         or SMPL-X rotations, .bvh or .tar shards",
         only.map(|kind| format!(" of the kind {}", kind.name())).unwrap_or_default()
     );
     Ok(found)
@@ -112,8 +114,14 @@ fn kind(path: &Path) -> std::result::Result<Option<MotionKind>, String> {
         "npz" => {
             let npz = Npz::open(path).map_err(|error| format!("{error:#}"))?;
             let names = npz.names().join(", ");
-            let unknown = format!("it contains {names}: expected `human_joints` [T, 43, 3] (TED Expressive)");
-            if npz.has("human_joints") { Ok(Some(MotionKind::Ted)) } else { Err(unknown) }
+            let unknown = format!(
+                "it contains {names}: expected `human_joints` [T, 43, 3] (TED Expressive), or `poses`, `pose_body` or \
+                 `smplh:body_pose` (SMPL-X, SMPL-H)"
+            );
+            match npz.has("human_joints") {
+                true => Ok(Some(MotionKind::Ted)),
+                false => is_smplx(&npz).then_some(Some(MotionKind::Smplx)).ok_or(unknown),
+            }
         }
         "txt" => Ok(has_147_numbers(path).then_some(MotionKind::Authors)),
         _ => Ok(None),
@@ -129,7 +137,7 @@ fn has_147_numbers(path: &Path) -> bool {
 }
 
 fn with_companions(kind: MotionKind, motion: PathBuf, named: &mut NamedFiles) -> TakeFiles {
-    let stem = motion.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    let stem = stem(&motion).to_string_lossy().into_owned();
     let mut stems = vec![stem.as_str()];
     // The sound of gt_interval_3821.txt is 3821.wav.
     stems.extend(["gt_interval_", "prediction_interval_"].iter().filter_map(|prefix| stem.strip_prefix(prefix)));

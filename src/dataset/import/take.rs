@@ -19,6 +19,7 @@ use orator_base::types::sound::{SAMPLE_RATE, Sound, sample_at};
 use orator_base::types::time::FrameRate;
 use orator_formats::mocap::captured::{self, CapturedMotion, MotionKind};
 use orator_formats::mocap::facing::LengthUnit;
+use orator_formats::mocap::motion_file;
 use orator_formats::transcript::{Transcript, Word};
 use orator_media::ffmpeg::audio;
 use serde_json::{Value, json};
@@ -94,7 +95,7 @@ impl ImportedTake {
     /// Unreadable motion or sound; the message names the file. A transcript that cannot be read is a note.
     pub fn read(found: &TakeFiles, limits: &TakeLimits, speaker: &str) -> Result<Self> {
         let content = hash_file(&found.motion)?;
-        let stem = found.motion.file_stem().unwrap_or_default().to_string_lossy();
+        let stem = motion_file::stem(&found.motion).to_string_lossy();
         let name = format!("{}-{}", slug(&stem), content.get(..8).unwrap_or(&content));
         let captured = captured::read_in(found.kind, &found.motion, limits.units)?;
         let motion = resample::at_rate(&captured.motion, limits.fps);

@@ -194,6 +194,10 @@ fn notes(takes: &[TakeFiles]) -> Vec<String> {
                 "Joints of BVH takes: metres, and each take turned about the vertical as a whole so that over it the \
                  speaker faces the camera (`turned_degrees` in a sample's json)."
             }
+            MotionKind::Smplx => {
+                "Joints of SMPL-X or SMPL-H rotations, on the proportions of this program unless the file has its own \
+                 (`orator_rest_joints`), turned as those of BVH takes."
+            }
             MotionKind::Shards => "Samples of other datasets of this form, as they were.",
         })
         .map(str::to_owned)

@@ -1,7 +1,7 @@
 //! BVH writer: a skeleton with local rotations over time. The root has six channels, every other joint three, in the
 //! order Z X Y; bone ends become `End Site`. The caller chooses the skeleton, axes and units.
 
-use super::read::Channel;
+use super::read::{Bvh, Channel};
 use super::skeleton::{BvhSkeleton, JointChannels};
 use orator_base::math::rotation::Rotation;
 use orator_base::math::vec3::{Vec3, add, scale};
@@ -57,6 +57,26 @@ impl BvhClip {
         };
         let travel = if self.travel.is_empty() { Vec::new() } else { (0..n_frames).map(translation).collect() };
         Self { local: local.collect(), fps, skeleton: self.skeleton.clone(), root: self.root, travel }
+    }
+
+    /// The motion as the contents of a file, without rounding, with the joints in their order.
+    pub fn to_file(&self) -> Bvh {
+        let joint = |joint: &Joint| {
+            let parent_name = || joint.parent.map_or("", |parent| self.skeleton.joints[parent].name.as_str());
+            let name = if joint.end { format!("{}_end", parent_name()) } else { joint.name.clone() };
+            let channels = channels(joint.end, joint.parent.is_none());
+            JointChannels { name, parent: joint.parent, offset: joint.offset, channels }
+        };
+        let joints: Vec<JointChannels> = self.skeleton.joints.iter().map(joint).collect();
+        let n_channels = joints.iter().map(|joint| joint.channels.len()).sum();
+        let mut values = Vec::with_capacity(self.n_frames() * n_channels);
+        for (frame_idx, local) in self.local.iter().enumerate() {
+            values.extend(self.root_at(frame_idx));
+            let moving = joints.iter().zip(local).filter(|(joint, _)| !joint.channels.is_empty());
+            values.extend(moving.flat_map(|(_, rotation)| rotation.euler_zxy_degrees()));
+        }
+        let (frame_secs, n_frames) = (self.fps.secs(1), self.n_frames());
+        Bvh { joints, frame_secs, n_frames, notes: Vec::new(), values, n_channels }
     }
 
     /// Text of a BVH file. Lengths are rounded to 1e-6 of their unit, angles to 1e-5 degrees.

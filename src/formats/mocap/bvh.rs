@@ -1,9 +1,10 @@
-//! A take from a BVH file: those of the 49 joints that its skeleton has, found by name or else by structure, at the
-//! file's own frame rate. The neck of a skeleton without one is the middle of the shoulders.
+//! A take from a BVH file, or from an `.npz` of SMPL-X: those of the 49 joints that its skeleton has, found by name or
+//! else by structure, at the file's own frame rate. The neck of a skeleton without one is the middle of the shoulders.
 
 use super::captured::CapturedMotion;
 use super::facing::{AxisAlignment, LengthUnit, TorsoLandmarks};
 use super::fingers;
+use super::smplx::motion::SmplxMotion;
 use crate::bvh::frame_time;
 use crate::bvh::read::{Bvh, Positions};
 use crate::bvh::skeleton::JointChannels;
@@ -14,6 +15,7 @@ use ndarray::Array3;
 use orator_base::math::vec3::{self, Vec3};
 use orator_base::types::pose3d::Motion;
 use orator_base::types::skeleton::{self, L_HAND, L_WRIST, N_JOINTS, R_HAND, R_WRIST, Side};
+use orator_base::types::time::FrameRate;
 use serde_json::{Map, Value, json};
 use std::path::Path;
 
@@ -22,19 +24,36 @@ const BODY: [usize; 7] = [0, 2, 3, 4, 5, 6, 7];
 /// Bones without which there is no upper body.
 const REQUIRED: [&str; 2] = ["LeftArm", "RightArm"];
 
-/// Reads a take, rotated to face the camera. Without `units`, the unit of length is detected from the arms.
+/// Unit of length and frame rate of a file, as far as the caller knows them.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct GivenScale {
+    /// Unit of a BVH file; detected from the arms without it.
+    pub units: Option<LengthUnit>,
+    /// Frame rate of an `.npz` that does not state it.
+    pub fps: Option<FrameRate>,
+}
+
+/// Opens a BVH file, or an `.npz` of SMPL-X as such a file in metres; returns its unit of length too, if known.
+fn open(path: &Path, given: GivenScale) -> Result<(Bvh, Option<LengthUnit>)> {
+    if path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("npz")) {
+        return Ok((SmplxMotion::read(path, given.fps)?.bvh(), Some(LengthUnit::METRE)));
+    }
+    Ok((Bvh::read(path)?, given.units))
+}
+
+/// Reads a take, rotated to face the camera.
 ///
 /// # Errors
 ///
-/// The file is not BVH, its skeleton lacks a shoulder, or the person neither stands nor sits upright.
-pub fn read(path: &Path, units: Option<LengthUnit>) -> Result<CapturedMotion> {
-    read_take(path, units, |alignment| alignment)
+/// The file is not of its kind, its skeleton lacks a shoulder, or the person neither stands nor sits upright.
+pub fn read(path: &Path, given: GivenScale) -> Result<CapturedMotion> {
+    read_take(path, given, |alignment| alignment)
 }
 
 /// Reads a take without rotation if it is y up and faces +z, as `orator animate` writes it, so that it stays aligned
 /// with the motion it came from. A file with other axes is rotated as by [`read`], which its facts record.
-pub fn read_unrotated(path: &Path, units: Option<LengthUnit>) -> Result<CapturedMotion> {
-    read_take(path, units, |alignment| alignment.unrotated().unwrap_or(alignment))
+pub fn read_unrotated(path: &Path, given: GivenScale) -> Result<CapturedMotion> {
+    read_take(path, given, |alignment| alignment.unrotated().unwrap_or(alignment))
 }
 
 /// Alignment by which [`read_unrotated`] converts a take; `frames` are the positions of its joints.
@@ -68,12 +87,8 @@ pub fn notes(facts: &Map<String, Value>) -> Vec<String> {
     notes
 }
 
-fn read_take(
-    path: &Path,
-    units: Option<LengthUnit>,
-    align: impl Fn(AxisAlignment) -> AxisAlignment,
-) -> Result<CapturedMotion> {
-    let bvh = Bvh::read(path)?;
+fn read_take(path: &Path, given: GivenScale, align: impl Fn(AxisAlignment) -> AxisAlignment) -> Result<CapturedMotion> {
+    let (bvh, units) = open(path, given)?;
     from_bvh(&bvh, units, align).with_context(|| format!("{} has no usable upper-body motion", path.display()))
 }
 

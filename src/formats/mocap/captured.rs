@@ -1,9 +1,10 @@
 //! Captured motion in the joint order and axes of `types::skeleton`, but at the frame rate and with the bone lengths
 //! of its source; and the reader for each kind of file.
 
+use super::bvh::{self, GivenScale};
 use super::facing::LengthUnit;
 use super::motion_file::DEFAULT_FPS;
-use super::{bvh, ted};
+use super::ted;
 use crate::{authors_txt, joints_description};
 use anyhow::{Context, Result, bail};
 use orator_base::motion::units;
@@ -29,6 +30,8 @@ pub enum MotionKind {
     /// TED Expressive: `.npz` with `human_joints`.
     Ted,
     Bvh,
+    /// SMPL-X or SMPL-H: `.npz` with rotations.
+    Smplx,
     /// WebDataset tar shards written by this program, or a dataset folder.
     Shards,
 }
@@ -40,6 +43,7 @@ impl MotionKind {
             Self::Authors => "authors",
             Self::Ted => "ted",
             Self::Bvh => "bvh",
+            Self::Smplx => "smplx",
             Self::Shards => "shards",
         }
     }
@@ -64,7 +68,7 @@ pub fn read_in(kind: MotionKind, path: &Path, units: Option<LengthUnit>) -> Resu
             CapturedMotion { motion, text: None, facts: Map::new() }
         }
         MotionKind::Ted => ted::read(path)?,
-        MotionKind::Bvh => bvh::read(path, units)?,
+        MotionKind::Bvh | MotionKind::Smplx => bvh::read(path, GivenScale { units, fps: None })?,
         MotionKind::Shards => bail!("{} contains dataset samples, expected captured motion", path.display()),
     };
     captured.motion.fps.checked().with_context(|| path.display().to_string())?;

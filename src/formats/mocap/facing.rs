@@ -33,6 +33,10 @@ pub struct LengthUnit {
     metres: f64,
 }
 
+impl LengthUnit {
+    pub const METRE: Self = UNITS[0];
+}
+
 /// Parses `m`, `cm`, `mm` or `inch`.
 impl FromStr for LengthUnit {
     type Err = String;

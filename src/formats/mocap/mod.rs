@@ -5,4 +5,5 @@ pub mod captured;
 pub mod facing;
 pub mod fingers;
 pub mod motion_file;
+pub mod smplx;
 pub mod ted;

@@ -6,6 +6,7 @@ use orator_avatar::animate::export::file::ExportFormat;
 use orator_base::input;
 use orator_base::text::counted;
 use orator_dataset::config::patterns::{SOUND_EXTENSIONS, TRANSCRIPT_EXTENSIONS, VIDEO_EXTENSIONS, has_extension};
+use orator_formats::mocap::motion_file::stem;
 use orator_formats::search;
 use std::collections::BTreeMap;
 use std::path::{Component, Path, PathBuf};
@@ -110,7 +111,7 @@ fn parse(text: &str, folder: &Path) -> Result<Vec<BatchSound>> {
 /// Name of a motion as given in a table: a relative path below the output folder, without the extension of a format.
 fn motion_name(out: &str) -> Result<String> {
     let path = Path::new(out);
-    let path = if ExportFormat::from_path(path).is_ok() { path.with_extension("") } else { path.to_owned() };
+    let path = if ExportFormat::from_path(path).is_ok() { path.with_file_name(stem(path)) } else { path.to_owned() };
     let parts: Option<Vec<String>> = path
         .components()
         .filter(|part| *part != Component::CurDir)

@@ -3,5 +3,4 @@
 pub mod captured;
 pub mod fingers;
 pub mod neck;
-pub mod smplx;
 pub mod upper_body;

@@ -8,6 +8,8 @@ mod joint_names;
 mod joints_description;
 mod keypoints_npz;
 mod motion_file;
+mod smplx;
+mod smplx_verb;
 mod subtitles;
 mod transcript;
 mod transcript_write;

@@ -1,6 +1,7 @@
 //! Readers of arrays: `.npy` and `.npz`.
 
 use crate::fixtures::fuzzing::harness::{corpus, fuzz_bytes, fuzz_file};
+use orator_avatar::animate::retarget::captured_body::CapturedBody;
 use orator_base::types::time::FrameRate;
 use orator_dataset::sample::N_KEYPOINTS;
 use orator_formats::mocap::motion_file;
@@ -55,5 +56,7 @@ fn mocap_npz() {
     let files = corpus("arrays", "capture");
     fuzz_file("mocap_npz", &files, "a.npz", |path| {
         let _ = (orator_formats::mocap::ted::read(path), upper_body::read(path), fingers::read(path));
+        let fps = Some(FrameRate::new(15, 1));
+        let _ = (motion_file::read_at(path, fps, None), CapturedBody::read(path, None));
     });
 }

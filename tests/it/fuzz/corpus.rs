@@ -86,6 +86,16 @@ fn arrays() {
     let mut npz = NpzWriter::new_compressed(fs::File::create(at("arrays", "capture-smplx.npz")).unwrap());
     npz.add_array("poses", &Array2::from_shape_fn((3, 165), |(t, k)| joint((t, k, 0)))).unwrap();
     npz.finish().unwrap();
+    let mut npz = NpzWriter::new_compressed(fs::File::create(at("arrays", "capture-seamless.npz")).unwrap());
+    for (key, n) in [("global_orient", 1), ("body_pose", 21), ("left_hand_pose", 15), ("right_hand_pose", 15)] {
+        let vectors = Array3::from_shape_fn((3, n, 3), |index| joint(index) / 4.0);
+        npz.add_array(format!("smplh:{key}"), &vectors).unwrap();
+    }
+    npz.add_array("smplh:is_valid", &arr1(&[true, true, false])).unwrap();
+    npz.finish().unwrap();
+    let (from, to) = (at("arrays", "motion.npy"), at("arrays", "capture-own.smplx.npz"));
+    let mut command = Command::new(env!("CARGO_BIN_EXE_orator"));
+    assert!(command.arg("animate").arg(from).arg("--out").arg(to).output().unwrap().status.success());
     let mut npz = NpzWriter::new_compressed(fs::File::create(at("arrays", "capture-cmu.npz")).unwrap());
     npz.add_array("fps", &Array1::from_elem(1, 60.0)).unwrap();
     npz.add_array("walk", &Array3::from_shape_fn((4, 38, 3), |index| 900.0 * joint(index))).unwrap();

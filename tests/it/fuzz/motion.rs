@@ -60,7 +60,12 @@ fn hand_labels() {
 #[test]
 fn take() {
     let limits = TakeLimits { fps: FPS, min_frames: 1, max_difference_secs: 60.0, no_sound: true, units: None };
-    let kinds = [(MotionKind::Authors, "a.txt"), (MotionKind::Bvh, "a.bvh"), (MotionKind::Ted, "capture-ted.npz")];
+    let kinds = [
+        (MotionKind::Authors, "a.txt"),
+        (MotionKind::Bvh, "a.bvh"),
+        (MotionKind::Ted, "capture-ted.npz"),
+        (MotionKind::Smplx, "capture-seamless.npz"),
+    ];
     let dir = folder();
     let files = kinds.map(|(_, name)| {
         let family = if name.ends_with("npz") { "arrays" } else { "motion" };

@@ -1,7 +1,7 @@
 //! Motion file of any format, selected by the file extension and written atomically.
 
 use super::film_avatar::FilmCamera;
-use super::{fbx, film, glb_scene, json, vrm};
+use super::{fbx, film, glb_scene, json, smplx, vrm};
 use crate::animate::avatar::{Appearance, Avatar};
 use crate::animate::performance::Performance;
 use crate::animate::rig::file_skeleton::{FileSkeleton, RestAxes};
@@ -12,6 +12,7 @@ use orator_base::types::pose3d::Motion;
 use orator_base::types::posture::Posture;
 use orator_base::types::sound::Sound;
 use orator_base::types::time::FrameRate;
+use orator_formats::mocap::motion_file::is_smplx_name;
 use orator_formats::{authors_txt, joints_description, joints_npz, npy};
 use std::fs::File;
 use std::io::{self, BufWriter, Write as _};
@@ -51,6 +52,8 @@ pub enum ExportFormat {
     AuthorsTxt,
     /// Bone rotations of the complete rig.
     Bvh,
+    /// Rotations of SMPL-X, `.smplx.npz`.
+    Smplx,
     /// Skinned avatar with its motion.
     Glb,
     /// Skinned avatar with its motion, binary FBX 7.4.
@@ -66,7 +69,7 @@ pub enum ExportFormat {
 }
 
 impl ExportFormat {
-    /// The format of a file by its extension, in upper or lower case.
+    /// The format of a file by the end of its name, in upper or lower case.
     ///
     /// # Errors
     /// No or an unknown extension.
@@ -74,6 +77,7 @@ impl ExportFormat {
         let extension = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
         match extension.as_str() {
             "npy" => Ok(Self::Npy),
+            "npz" if is_smplx_name(path) => Ok(Self::Smplx),
             "npz" => Ok(Self::Npz),
             "txt" => Ok(Self::AuthorsTxt),
             "bvh" => Ok(Self::Bvh),
@@ -85,7 +89,7 @@ impl ExportFormat {
             "mp4" => Ok(Self::Mp4),
             _ => anyhow::bail!(
                 "{}: unknown motion format: expected .npy (joints), .txt (the authors' layout), .npz (joints with rate \
-                 and mask), .json, .bvh, .fbx, .glb, .vrm, .vrma or .mp4",
+                 and mask), .smplx.npz (SMPL-X), .json, .bvh, .fbx, .glb, .vrm, .vrma or .mp4",
                 path.display()
             ),
         }
@@ -116,6 +120,7 @@ impl ExportFormat {
                 let clip = skeleton.clip(&performance.clip);
                 write_text(path, |text| clip.write_bvh(text))
             }
+            Self::Smplx => workdir::replace(path, |attempt| smplx::motion(performance).write(attempt)),
             Self::Glb | Self::Fbx | Self::Vrm => {
                 let (rig, clip) = (&performance.rig, &performance.clip);
                 let avatar = Avatar::new(rig, &Appearance::plain());
@@ -173,6 +178,8 @@ mod tests {
         assert_eq!(ExportFormat::from_path(Path::new("a/b.BVH")).unwrap(), ExportFormat::Bvh);
         assert_eq!(ExportFormat::from_path(Path::new("a.Glb")).unwrap(), ExportFormat::Glb);
         assert_eq!(ExportFormat::from_path(Path::new("a.b/c.npy")).unwrap(), ExportFormat::Npy);
+        assert_eq!(ExportFormat::from_path(Path::new("a.SMPLX.npz")).unwrap(), ExportFormat::Smplx);
+        assert_eq!(ExportFormat::from_path(Path::new("smplx.npz")).unwrap(), ExportFormat::Npz);
         for wrong in ["a.mov", "mp4", "a", ""] {
             assert!(ExportFormat::from_path(Path::new(wrong)).unwrap_err().to_string().contains(".vrma or .mp4"));
         }

@@ -1,4 +1,4 @@
-//! Files for other programs: FBX, GLB, VRM, JSON, MP4, and the choice of format by file extension.
+//! Files for other programs: FBX, GLB, VRM, SMPL-X, JSON, MP4, and the choice of format by file extension.
 
 pub mod fbx;
 pub mod file;
@@ -8,4 +8,5 @@ pub mod film_source;
 pub mod glb;
 pub mod glb_scene;
 pub mod json;
+pub mod smplx;
 pub mod vrm;

@@ -1,5 +1,5 @@
-//! Head, trunk and legs of a captured skeleton (BVH) on our rig. Bones of trunk, neck and legs take the captured
-//! directions and roll with their joints; hips, head and feet take the rotations of their joints relative to the
+//! Head, trunk and legs of a captured skeleton (BVH, SMPL-X) on our rig. Bones of trunk, neck and legs take the
+//! captured directions and roll with their joints; hips, head and feet take the rotations of their joints relative to the
 //! reference pose. Legs have the captured lengths, and the arms keep their world rotations.
 
 use super::bone_map::BoneMap;
@@ -15,6 +15,8 @@ use orator_formats::bvh::read::{Bvh, Positions};
 use orator_formats::bvh::write::BvhClip;
 use orator_formats::mocap;
 use orator_formats::mocap::facing::LengthUnit;
+use orator_formats::mocap::motion_file::{DEFAULT_FPS, has_skeleton};
+use orator_formats::mocap::smplx::motion::SmplxMotion;
 use serde::Serialize;
 use std::ops::Range;
 use std::path::Path;
@@ -79,14 +81,22 @@ struct CapturedBone {
 }
 
 impl CapturedBody {
-    /// Reads the body of a .bvh file; `None` for other files, and if hips, trunk or arms are not found by name, a joint
-    /// does not have three rotation channels, or a value is not finite. Without `units`, the unit is detected.
+    /// Reads the body of a BVH or SMPL-X file; `None` for others, and if hips, trunk or arms are not found by name, a
+    /// joint does not have three rotation channels, or a value is not finite. Without `units`, the unit is detected.
     ///
     /// # Errors
-    /// The file is unreadable or not BVH.
+    /// The file is unreadable or not of its kind.
     pub fn read(path: &Path, units: Option<LengthUnit>) -> Result<Option<Self>> {
-        let is_bvh = path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("bvh"));
-        Ok(if is_bvh { Self::from_bvh(&Bvh::read(path)?, units) } else { None })
+        if !has_skeleton(path)? {
+            return Ok(None);
+        }
+        if path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("bvh")) {
+            return Ok(Self::from_bvh(&Bvh::read(path)?, units));
+        }
+        // The frame rate does not matter here.
+        let mut motion = SmplxMotion::read(path, Some(DEFAULT_FPS))?;
+        motion.hold_missing();
+        Ok(Self::from_bvh(&motion.bvh(), Some(LengthUnit::METRE)))
     }
 
     fn from_bvh(bvh: &Bvh, units: Option<LengthUnit>) -> Option<Self> {

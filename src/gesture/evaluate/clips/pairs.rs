@@ -151,7 +151,7 @@ fn key(path: &Path) -> String {
 }
 
 fn stem(path: &Path) -> String {
-    path.file_stem().unwrap_or_default().to_string_lossy().into_owned()
+    motion_file::stem(path).to_string_lossy().into_owned()
 }
 
 fn file_name_of(path: &Path) -> String {

@@ -1,7 +1,6 @@
 //! Readers of captured motion as takes for rendered persons, one for each kind of file. All are y up and at rest face
 //! +z, except for TED Expressive, whose camera axes are converted.
 
-use super::smplx_body;
 use super::take::{CapturedFrame, CapturedTake, oriented};
 use crate::mocap::upper_body::{CMU_38, T_POSE_FRAMES, named_joints};
 use anyhow::{Context, Result};
@@ -11,6 +10,8 @@ use orator_base::types::skeleton::{L_HAND, R_HAND, Side};
 use orator_base::types::time::FrameRate;
 use orator_formats::bvh::read::{Bvh, Positions};
 use orator_formats::bvh::skeleton::BvhSkeleton;
+use orator_formats::mocap::smplx::body;
+use orator_formats::mocap::smplx::motion::SmplxMotion;
 use orator_formats::mocap::ted;
 use orator_formats::npz::Npz;
 use std::path::Path;
@@ -83,29 +84,28 @@ pub fn bvh(name: &str, bvh: &Bvh) -> Result<Vec<CapturedTake>> {
     Ok(CapturedTake::continuous(name, fps, &frames))
 }
 
-/// Reads SMPL-X rotations: `poses` [T, 165], axis-angle, and `mocap_frame_rate` (BEAT2), with fingers.
+/// Reads rotations of SMPL-X or SMPL-H (BEAT2), with fingers. A person's own proportions differ from those of the
+/// skeleton, so that only directions are used.
 ///
 /// # Errors
 /// A file of another kind.
 pub fn smplx(name: &str, path: &Path) -> Result<Vec<CapturedTake>> {
-    let mut npz = Npz::open(path)?;
-    let fps = npz.frame_rate("mocap_frame_rate")?;
-    let poses = npz.numbers("poses", &[None, Some(3 * smplx_body::N_SMPLX)])?;
-    let skeleton = smplx_body::skeleton();
-    let frame = |t: usize| {
-        let local = smplx_body::local(&std::array::from_fn(|joint| std::array::from_fn(|k| poses[[t, 3 * joint + k]])));
+    let motion = SmplxMotion::read(path, None)?;
+    let skeleton = body::skeleton(&motion.rest);
+    let frame = |rotations| {
+        let local = body::local(rotations);
         let at = skeleton.positions([0.0; 3], &local);
-        let [right_hip, left_hip] = smplx_body::HIPS.map(|joint| at[joint]);
+        let [right_hip, left_hip] = body::HIPS.map(|joint| at[joint]);
         let (below, hips) = (middle(right_hip, left_hip), sub(left_hip, right_hip));
-        let head = skeleton.world(&local)[smplx_body::HEAD];
-        let mut frame = CapturedFrame::new(smplx_body::ARMS.map(|joint| at[joint]), below, Some(hips), head);
+        let head = skeleton.world(&local)[body::HEAD];
+        let mut frame = CapturedFrame::new(body::ARMS.map(|joint| at[joint]), below, Some(hips), head);
         for (side, root) in [L_HAND, R_HAND].into_iter().enumerate() {
-            smplx_body::hand_points(side).for_each(|(point, joint)| frame.joints[root + point] = at[joint]);
+            body::hand_points(side).for_each(|(point, joint)| frame.joints[root + point] = at[joint]);
         }
         frame
     };
-    let frames: Vec<CapturedFrame> = (0..poses.shape()[0]).map(frame).collect();
-    Ok(CapturedTake::continuous(name, fps, &frames))
+    let frames: Vec<CapturedFrame> = motion.rotations.iter().map(frame).collect();
+    Ok(CapturedTake::continuous(name, motion.fps, &frames))
 }
 
 /// Reads a clip of TED Expressive: `human_joints` [T, 43, 3] and `fps`. It has no hips and no finger tips; joints 38 to

@@ -1,5 +1,5 @@
-//! Reads captured or labelled fingers from files and folders: `.bvh` by joint names; `.npz` with SMPL-X `poses` [T,
-//! 165] on an assumed rest hand, or with `human_joints` [T, 43, 3] of TED speakers, without tips; `.txt` labels
+//! Reads captured or labelled fingers from files and folders: `.bvh` by joint names; `.npz` with rotations of SMPL-X
+//! on an assumed rest hand, or with `human_joints` [T, 43, 3] of TED speakers, without tips; `.txt` labels
 //! (`labels`) with 48 numbers per line (ICVL, bone midpoints) or 42 (NYU, no knuckles, aligned errors only);
 //! `people.json` of rendered persons. Reference lengths: middle proximal phalanx 48 mm; TED wrist to middle knuckle
 //! 93.2 mm; NYU the middle finger's last two bones 51.3 mm.
@@ -7,12 +7,16 @@
 use super::labels;
 use super::take::{FingerTake, Fingers, Size};
 use crate::evaluate::people::clips::ListedClip;
-use crate::mocap::smplx;
 use crate::rendered_truth::RenderedTruth;
 use anyhow::{Context, Result, bail, ensure};
+use orator_base::math::rotation::Rotation;
+use orator_base::math::vec3::{Vec3, sub};
 use orator_base::types::pose2d::N_HAND;
 use orator_base::types::skeleton::{L_HAND, R_HAND, Side};
 use orator_formats::bvh::read::{Bvh, Positions};
+use orator_formats::mocap::motion_file::DEFAULT_FPS;
+use orator_formats::mocap::smplx::body::{self, FINGERS, WRISTS};
+use orator_formats::mocap::smplx::motion::{SmplxMotion, is_smplx};
 use orator_formats::mocap::{fingers, ted};
 use orator_formats::npz::Npz;
 use orator_formats::search;
@@ -62,7 +66,7 @@ fn read_set(path: &Path) -> Result<FingerSet> {
 pub fn read(path: &Path) -> Result<Vec<FingerTake>> {
     match path.extension().and_then(|e| e.to_str()) {
         Some("bvh") => of_bvh(path),
-        Some("npz") if smplx::is_smplx(path)? => of_smplx(path),
+        Some("npz") if is_smplx(&Npz::open(path)?) => of_smplx(path),
         Some("npz") => of_ted(path),
         Some("txt") => Ok(vec![labels::read(path)?]),
         Some("json") => of_rendered(path),
@@ -98,16 +102,26 @@ fn of_bvh(path: &Path) -> Result<Vec<FingerTake>> {
     Ok(found.into_iter().map(take).collect())
 }
 
+/// Reads both hands in the axes of the T-pose: left fingers along +x, palms down, thumbs towards +z. The file does not
+/// contain the rest hand, which is ASSUMED to be that of `body`; no mean hand pose is added to the rotations.
 fn of_smplx(path: &Path) -> Result<Vec<FingerTake>> {
-    let take = |(side, frames): (Side, Vec<smplx::HandFrame>)| {
-        FingerTake::all_counted(
-            &stem(path),
-            side,
-            frames.into_iter().map(|hand| hand.map(Some)).collect(),
-            Size::Phalanx,
-        )
+    // The frame rate does not matter here.
+    let motion = SmplxMotion::read(path, Some(DEFAULT_FPS))?;
+    let skeleton = body::skeleton(&motion.rest);
+    let take = |(at_side, side): (usize, Side)| {
+        let hand = |rotations| {
+            let mut local = body::local(rotations);
+            local[..FINGERS[0]].fill(Rotation::IDENTITY);
+            let at = skeleton.positions([0.0; 3], &local);
+            let mut hand: [Option<Vec3>; N_HAND] = [Some([0.0; 3]); N_HAND];
+            body::hand_points(at_side).for_each(|(point, joint)| {
+                hand[point] = Some(sub(at[joint], at[WRISTS[at_side]]));
+            });
+            hand
+        };
+        FingerTake::all_counted(&stem(path), side, motion.rotations.iter().map(hand).collect(), Size::Phalanx)
     };
-    Ok(smplx::hands(path)?.into_iter().map(take).collect())
+    Ok([(0, Side::Left), (1, Side::Right)].map(take).into())
 }
 
 /// Reads both hands of a TED speaker. In this skeleton, which was regressed, the palm is three times as long as the
