@@ -212,7 +212,7 @@ fn a_model_condition_may_carry_its_state_and_read_word_vectors() {
         let file = StudyFile::read(&dir.join("study.toml"))?;
         let models = ConditionModels::open(&file.condition, "host")?;
         let source = SpeakerSource::of_dataset("host", &dir.join("data"), Split::Test)?;
-        let cut = cut(&source, 30, 2, |_| 0)?;
+        let cut = cut(&source, 30, (2, 1), |_| 0)?;
         let shown = motions(&source, &cut.clips, &file.condition, &models, &|| ())?;
         anyhow::Ok(shown["model"].iter().map(|shown| shown.motion.joints.clone()).collect::<Vec<_>>())
     };
