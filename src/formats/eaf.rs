@@ -84,12 +84,13 @@ fn spans(tier: &AnnotationTier) -> Vec<(u64, u64, &str)> {
     let mut sorted: Vec<&Annotation> = tier.annotations.iter().collect();
     sorted.sort_by(|a, b| a.start_secs.total_cmp(&b.start_secs));
     let mut until = 0;
-    let span = |annotation: &Annotation| {
+    let mut spans = Vec::with_capacity(sorted.len());
+    for annotation in sorted {
         let start = ms(annotation.start_secs).max(until);
         until = ms(annotation.end_secs).max(start + 1);
-        (start, until, annotation.value.as_str())
-    };
-    sorted.into_iter().map(span).collect()
+        spans.push((start, until, annotation.value.as_str()));
+    }
+    spans
 }
 
 /// Text for XML 1.0 elements and attributes.

@@ -160,7 +160,8 @@ impl VideoAnnotations {
 
     /// The tiers in the order in which ELAN shows them; all of them, so that files of one project have the same.
     fn in_order(mut self) -> Vec<AnnotationTier> {
-        let hands = HANDS.into_iter().flat_map(|(_, hand)| PhaseKind::ALL.map(|kind| format!("{} {hand}", kind.name())));
+        let hands = HANDS.into_iter();
+        let hands = hands.flat_map(|(_, hand)| PhaseKind::ALL.map(|kind| format!("{} {hand}", kind.name())));
         let names = ["speech", "words"].map(str::to_owned).into_iter().chain(hands).chain(["rejected".to_owned()]);
         names.map(|name| AnnotationTier { annotations: self.tiers.remove(&name).unwrap_or_default(), name }).collect()
     }

@@ -11,7 +11,7 @@ use std::f64::consts::PI;
 use std::ops::Range;
 
 /// Range of the standard deviation of the Gaussian, seconds, and the noise of the velocity at which it aims, m/s.
-const SIGMA_SECS: [f64; 2] = [0.035, 0.085];
+const SIGMA_SECS: [f64; 2] = [0.035, 0.075];
 const NOISE_SPEED: f64 = 0.05;
 /// Speed between movement and pause, and minimum peak speed of a movement: at least m/s, and multiples of the noise.
 const LOW_SPEED: [f64; 2] = [0.1, 2.2];
@@ -19,7 +19,7 @@ const PEAK_SPEED: [f64; 2] = [0.25, 4.0];
 /// Quantile of the speed that is taken for noise, since every hand pauses at times.
 const QUIET_SHARE: f64 = 0.1;
 /// Speed between two peaks, relative to the lower one, below which they are two movements.
-const VALLEY: f64 = 0.5;
+const VALLEY: f64 = 0.6;
 /// Minimum extent of a movement along an axis, metres.
 const MIN_EXTENT: f64 = 0.04;
 /// Shortest movement, and shortest pause between two, seconds.

@@ -1,5 +1,5 @@
-//! Position of a wrist relative to the trunk. The trunk's axes are the line of the shoulders, smoothed over time because
-//! its noise would be multiplied by the length of the arm, and the vertical direction.
+//! Position of a wrist relative to the trunk. The axes of the trunk are the line of the shoulders, smoothed over time
+//! because its noise would be multiplied by the length of the arm, and the vertical direction.
 
 use ndarray::Array3;
 use orator_base::math::gaussian::gaussian;
@@ -37,7 +37,8 @@ impl WristTrack {
         let [right, left] = ARMS;
         let [shoulder, elbow, wrist] = if side == Side::Right { right } else { left };
         let n_frames = motion.n_frames();
-        let joint = |t: usize, joint: usize| -> Vec3 { std::array::from_fn(|k| f64::from(motion.joints[[t, joint, k]])) };
+        let joint =
+            |t: usize, joint: usize| -> Vec3 { std::array::from_fn(|k| f64::from(motion.joints[[t, joint, k]])) };
         let mut across = Array3::<f32>::zeros((n_frames, 1, 3));
         for t in 0..n_frames {
             let line = sub(joint(t, left[0]), joint(t, right[0]));
