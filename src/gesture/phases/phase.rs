@@ -12,6 +12,8 @@ const REST_RADIUS: f64 = 0.12;
 const REST_DEPTH: f64 = 0.03;
 /// Height above the lowest positions at which a pause counts 1/e as much in the search for the place of rest, metres.
 const REST_HEIGHT: f64 = 0.2;
+/// Minimum depth of a place of rest below the shoulders, metres.
+const MIN_REST_DEPTH: f64 = 0.15;
 /// Longest time between the start of a stroke and a word to which it is bound, seconds.
 const WORD_SECS: f64 = 0.2;
 
@@ -173,7 +175,8 @@ fn pause_kind(at: Vec3, rest: Option<Vec3>, metres: f64) -> (PhaseKind, f64) {
     }
 }
 
-/// The pause near which the hand pauses longest, with a preference for low ones; `None`: there are no pauses.
+/// The pause near which the hand pauses longest, with a preference for low ones; `None`: there are no
+/// pauses below the shoulders.
 fn place_of_rest<'r>(runs: impl Iterator<Item = &'r RunPhases<'r>> + Clone, metres: f64) -> Option<Vec3> {
     let heights = runs.clone().flat_map(|run| run.run.smooth.iter().map(|p| p[1]));
     let lowest = Ordered::new(heights).quantile(0.95)?;
@@ -186,5 +189,6 @@ fn place_of_rest<'r>(runs: impl Iterator<Item = &'r RunPhases<'r>> + Clone, metr
         let height = (lowest - at[1]).max(0.0) / (REST_HEIGHT * metres);
         pauses.iter().map(near).sum::<f64>() * (-height).exp()
     };
-    pauses.iter().map(|(_, _, at)| (weight(*at), *at)).max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, at)| at)
+    let low = pauses.iter().filter(|(_, _, at)| at[1] > MIN_REST_DEPTH * metres);
+    low.map(|(_, _, at)| (weight(*at), *at)).max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, at)| at)
 }
