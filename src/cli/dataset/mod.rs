@@ -2,7 +2,7 @@
 
 pub mod align;
 mod aligned_text;
-mod annotate;
+pub mod annotate;
 pub mod forget;
 pub mod import;
 pub mod transcribe;

@@ -34,28 +34,28 @@ const FIT_STEPS: [f64; 2] = [0.04, 0.013];
 /// Thresholds of a hand, adapted to the length of its arm and the noise of its joints; `metres` scales lengths.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct WristThresholds {
-    pub metres: f64,
+    pub(super) metres: f64,
     sigma_secs: f64,
-    pub low_speed: f64,
-    pub peak_speed: f64,
+    pub(super) low_speed: f64,
+    pub(super) peak_speed: f64,
 }
 
 /// Run of frames without a missing one.
 pub(super) struct WristRun {
-    pub first_frame: usize,
+    pub(super) first_frame: usize,
     per_sec: f64,
     /// Positions as given and smoothed, metres.
     positions: Vec<Vec3>,
-    pub smooth: Vec<Vec3>,
+    pub(super) smooth: Vec<Vec3>,
     /// Speeds, m/s.
-    pub speeds: Vec<f64>,
+    pub(super) speeds: Vec<f64>,
 }
 
 /// Movement of a run, seconds from its first frame.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct WristMovement {
-    pub start_secs: f64,
-    pub end_secs: f64,
+    pub(super) start_secs: f64,
+    pub(super) end_secs: f64,
 }
 
 /// Thresholds for tracks of one hand, and the runs of each track.
@@ -106,19 +106,19 @@ impl WristRun {
         self.speeds = (0..n).map(speed).collect();
     }
 
-    pub fn secs(&self) -> f64 {
+    pub(super) fn secs(&self) -> f64 {
         self.positions.len() as f64 / self.per_sec
     }
 
     /// Frames within two times, at least one.
-    pub fn frames(&self, start_secs: f64, end_secs: f64) -> Range<usize> {
+    pub(super) fn frames(&self, start_secs: f64, end_secs: f64) -> Range<usize> {
         let last = self.positions.len() - 1;
         let start = ((start_secs * self.per_sec).ceil().max(0.0) as usize).min(last);
         start..((end_secs * self.per_sec).floor().max(0.0) as usize).clamp(start, last) + 1
     }
 
     /// Movements in order; two that are less than `MIN_PAUSE_SECS` apart follow each other without a pause.
-    pub fn movements(&self, thresholds: &WristThresholds) -> Vec<WristMovement> {
+    pub(super) fn movements(&self, thresholds: &WristThresholds) -> Vec<WristMovement> {
         let mut found = self.fast_parts(thresholds);
         let spans: Vec<[f64; 2]> = found.iter().map(|part| [part.start_secs, part.end_secs]).collect();
         for (n, part) in found.iter_mut().enumerate() {
