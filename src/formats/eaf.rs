@@ -21,14 +21,8 @@ pub struct AnnotationTier {
 }
 
 /// Types of file by extension, for players; others are `unknown`.
-const MIME_TYPES: [(&str, &str); 6] = [
-    ("mp4", "video/mp4"),
-    ("m4v", "video/mp4"),
-    ("mov", "video/quicktime"),
-    ("mpg", "video/mpeg"),
-    ("mpeg", "video/mpeg"),
-    ("wav", "audio/x-wav"),
-];
+const MIME_TYPES: [(&str, &str); 4] =
+    [("mp4", "video/mp4"), ("mov", "video/quicktime"), ("mpg", "video/mpeg"), ("wav", "audio/x-wav")];
 const HEADER: &str = "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n\
     <ANNOTATION_DOCUMENT AUTHOR=\"orator\" DATE=\"2000-01-01T00:00:00+00:00\" FORMAT=\"3.0\" VERSION=\"3.0\" \
     xmlns:xsi=\"http://www.w3.org/2001/XMLSchema-instance\" \

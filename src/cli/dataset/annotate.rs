@@ -4,12 +4,12 @@ use crate::cli::Outcome;
 use crate::cli::sandbox::enter_sandbox;
 use crate::cli::signals;
 use crate::cli::ui::Ui;
-use anyhow::{Context, Result, ensure};
+use anyhow::{Result, ensure};
 use orator_base::text::{counted, number, percent};
 use orator_dataset::Dataset;
 use orator_gesture::phases::annotations::{PHASES, annotate};
 use orator_gesture::phases::{HANDS, PhaseKind, PhaseTotals};
-use serde_json::{Map, Value, json};
+use serde_json::json;
 use std::path::{Path, PathBuf};
 
 /// Write gesture phases, words and rejected seconds for ELAN and as a table.
@@ -47,18 +47,16 @@ pub fn run(args: &Args, ui: &Ui) -> Result<Outcome> {
     };
     let totals = annotate(&Dataset::open(dir)?, out, media, ui)?;
     let mut lines: Vec<String> = totals.hands.iter().zip(HANDS).map(|(hand, (_, name))| line(name, hand)).collect();
-    if totals.n_beside_words > 0 {
-        let share = percent(totals.n_bound as f64, totals.n_beside_words as f64);
+    if totals.n_with_words > 0 {
+        let share = percent(totals.n_bound as f64, totals.n_with_words as f64);
         lines.push(format!("{share} of the strokes in samples with words are bound to a word"));
     }
     let table = out.join(PHASES);
     lines.push(format!("{}: {}", counted(totals.n_videos, "ELAN file"), out.display()));
     lines.push(format!("all phases: {}", table.display()));
-    let hands: Map<String, Value> =
-        totals.hands.iter().zip(HANDS).map(|(hand, (_, name))| (name.to_owned(), facts(hand))).collect();
     let facts = json!({
-        "videos": totals.n_videos, "table": table, "hands": hands, "strokes_with_words": totals.n_beside_words,
-        "strokes_bound_to_words": totals.n_bound,
+        "videos": totals.n_videos, "table": table, "strokes": totals.hands.each_ref().map(PhaseTotals::n_strokes),
+        "strokes_with_words": totals.n_with_words, "strokes_bound_to_words": totals.n_bound,
     });
     ui.summary(&lines.join("\n"), None, facts);
     Ok(Outcome::Done)
@@ -66,33 +64,16 @@ pub fn run(args: &Args, ui: &Ui) -> Result<Outcome> {
 
 /// Line of the summary for a hand.
 fn line(name: &str, hand: &PhaseTotals) -> String {
-    let medians = hand.median_stroke().map_or(String::new(), |(amplitude, secs)| {
-        format!(", median {} cm in {} s", number((100.0 * amplitude).round()), number((100.0 * secs).round() / 100.0))
-    });
     let shares = PhaseKind::ALL.map(|kind| format!("{} {}", percent(hand.share(kind), 1.0), kind.name()));
     let rate = number((10.0 * hand.strokes_per_minute()).round() / 10.0);
-    format!("{name:5} {} ({rate} a minute){medians}; {}", counted(hand.n_strokes(), "stroke"), shares.join(", "))
-}
-
-fn facts(hand: &PhaseTotals) -> Value {
-    let (amplitude, secs) = hand.median_stroke().unzip();
-    json!({
-        "strokes": hand.n_strokes(), "strokes_per_minute": hand.strokes_per_minute(), "amplitude_median": amplitude,
-        "duration_median": secs, "secs": hand.secs,
-        "shares": PhaseKind::ALL.map(|kind| (kind.name(), hand.share(kind))).into_iter()
-            .map(|(name, share)| (name.to_owned(), json!(share))).collect::<Map<String, Value>>(),
-    })
+    format!("{name:5} {} ({rate} a minute); {}", counted(hand.n_strokes(), "stroke"), shares.join(", "))
 }
 
 /// Path of the existing folder `to`, relative to the folder `from`.
 fn relative(to: &Path, from: &Path) -> Result<PathBuf> {
     ensure!(to.is_dir(), "{} is not a folder: expected the folder with the videos (--videos)", to.display());
-    let reading = |path: &Path| format!("cannot find {}", path.display());
-    let to = to.canonicalize().with_context(|| reading(to))?;
-    let from = match from.canonicalize() {
-        Ok(from) => from,
-        Err(_) => std::path::absolute(from).with_context(|| reading(from))?,
-    };
+    let absolute = |path: &Path| path.canonicalize().or_else(|_| std::path::absolute(path));
+    let (to, from) = (absolute(to)?, absolute(from)?);
     let n_common = to.components().zip(from.components()).take_while(|(a, b)| a == b).count();
     let up = from.components().skip(n_common).map(|_| Path::new(".."));
     Ok(up.chain(to.components().skip(n_common).map(|part| Path::new(part.as_os_str()))).collect())

@@ -21,19 +21,7 @@ use std::path::Path;
 pub const PHASES: &str = "phases.csv";
 /// Columns of the table: times in seconds from the first picture of the video, lengths in metres, height above the
 /// midpoint of the shoulders; the word is that to which a stroke is bound ([`GesturePhase::bound_word`]).
-const COLUMNS: [&str; 11] = [
-    "video",
-    "hand",
-    "phase",
-    "start_s",
-    "end_s",
-    "confidence",
-    "amplitude_m",
-    "peak_speed_m_s",
-    "duration_s",
-    "height_m",
-    "word",
-];
+const COLUMNS: &str = "video,hand,phase,start_s,end_s,confidence,amplitude_m,peak_speed_m_s,duration_s,height_m,word";
 /// Shortest pause that divides the annotations of speech, seconds.
 const MIN_SPEECH_PAUSE_SECS: f64 = 0.3;
 
@@ -44,7 +32,7 @@ pub struct AnnotationTotals {
     /// Phases of the left and the right hand.
     pub hands: [PhaseTotals; 2],
     /// Strokes in samples with words, and those of them that are bound to a word.
-    pub n_beside_words: usize,
+    pub n_with_words: usize,
     pub n_bound: usize,
 }
 
@@ -52,7 +40,7 @@ pub struct AnnotationTotals {
 #[derive(Default)]
 struct VideoAnnotations {
     tiers: BTreeMap<String, Vec<Annotation>>,
-    rows: Vec<[String; 11]>,
+    rows: Vec<Vec<String>>,
 }
 
 impl VideoAnnotations {
@@ -83,7 +71,7 @@ pub fn annotate(
     let task = progress.begin("annotations", ledgers.len() as u64);
     let mut totals = AnnotationTotals { n_videos: ledgers.len(), ..AnnotationTotals::default() };
     let mut table = csv::Writer::from_writer(Vec::new());
-    table.write_record(COLUMNS)?;
+    table.write_record(COLUMNS.split(','))?;
     for video in &ledgers {
         let path = media(&video.file)?;
         let mut samples = samples.remove(&video.name).unwrap_or_default();
@@ -147,7 +135,7 @@ impl VideoAnnotations {
                 for phase in phases {
                     let words = words[n].as_deref().filter(|_| phase.kind == PhaseKind::Stroke);
                     let word = words.and_then(|words| phase.bound_word(words)).map(|word| word.word.as_str());
-                    totals.n_beside_words += usize::from(words.is_some());
+                    totals.n_with_words += usize::from(words.is_some());
                     totals.n_bound += usize::from(word.is_some());
                     let span = (zero_secs + phase.start_secs, zero_secs + phase.end_secs);
                     self.add(&format!("{} {hand}", phase.kind.name()), span, format!("{:.2}", phase.confidence));
@@ -168,19 +156,9 @@ impl VideoAnnotations {
 }
 
 /// Row of `COLUMNS`.
-fn row(video: &str, hand: &str, phase: &GesturePhase, (start, end): (f64, f64), word: &str) -> [String; 11] {
-    let number = |value: f64| format!("{value:.3}");
-    [
-        video.to_owned(),
-        hand.to_owned(),
-        phase.kind.name().to_owned(),
-        number(start),
-        number(end),
-        number(phase.confidence),
-        number(phase.amplitude),
-        number(phase.peak_speed),
-        number(phase.secs()),
-        number(phase.height),
-        word.to_owned(),
-    ]
+fn row(video: &str, hand: &str, phase: &GesturePhase, (start, end): (f64, f64), word: &str) -> Vec<String> {
+    let numbers = [start, end, phase.confidence, phase.amplitude, phase.peak_speed, phase.secs(), phase.height];
+    let numbers = numbers.map(|value| format!("{value:.3}"));
+    let names = [video, hand, phase.kind.name()].map(str::to_owned);
+    names.into_iter().chain(numbers).chain([word.to_owned()]).collect()
 }

@@ -64,9 +64,11 @@ pub(super) fn runs(tracks: &[WristTrack]) -> (WristThresholds, Vec<Vec<WristRun>
     let per_sec = tracks.first().map_or(1.0, |track| track.fps.per_sec());
     let mut runs: Vec<Vec<WristRun>> = tracks.iter().map(WristRun::of).collect();
     // The third difference of white noise has 20 times its variance, that of a movement is small.
-    let thirds = runs.iter().flatten().flat_map(|run| run.positions.windows(4)).flat_map(|p| {
-        [0, 1, 2].map(|k| (p[3][k] - 3.0 * p[2][k] + 3.0 * p[1][k] - p[0][k]).abs())
-    });
+    let thirds = runs
+        .iter()
+        .flatten()
+        .flat_map(|run| run.positions.windows(4))
+        .flat_map(|p| [0, 1, 2].map(|k| (p[3][k] - 3.0 * p[2][k] + 3.0 * p[1][k] - p[0][k]).abs()));
     let noise = order::median(thirds).unwrap_or(0.0) / (0.6745 * 20_f64.sqrt());
     let [min, max] = SIGMA_SECS;
     let variance = noise * noise / (4.0 * PI.sqrt() * per_sec);

@@ -83,9 +83,10 @@ pub fn find_phases(tracks: &[WristTrack]) -> Vec<Vec<GesturePhase>> {
     let found = runs.iter().map(|runs| runs.iter().map(|run| RunPhases::new(run, &thresholds)).collect());
     let found: Vec<Vec<RunPhases>> = found.collect();
     let rest = place_of_rest(found.iter().flatten(), thresholds.metres);
-    let phases = tracks.iter().zip(&found).map(|(track, runs)| {
-        runs.iter().flat_map(|run| run.phases(track, &thresholds, rest)).collect()
-    });
+    let phases = tracks
+        .iter()
+        .zip(&found)
+        .map(|(track, runs)| runs.iter().flat_map(|run| run.phases(track, &thresholds, rest)).collect());
     phases.collect()
 }
 
@@ -121,9 +122,8 @@ impl<'r> RunPhases<'r> {
             }
             if let Some(WristMovement { start_secs, end_secs }) = self.movements.get(n) {
                 let next = self.pauses.get(n + 1).copied().flatten();
-                let is_return = next.is_some_and(|(_, _, at)| {
-                    pause_kind(at, rest, thresholds.metres).0 == PhaseKind::Rest
-                });
+                let is_return =
+                    next.is_some_and(|(_, _, at)| pause_kind(at, rest, thresholds.metres).0 == PhaseKind::Rest);
                 let kind = if is_return { PhaseKind::Retraction } else { PhaseKind::Stroke };
                 phases.push(self.phase(track, (kind, *start_secs, *end_secs), |_, peak| {
                     1.0 - 0.5 * (thresholds.peak_speed / peak.max(thresholds.peak_speed)).powi(2)

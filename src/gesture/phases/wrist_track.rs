@@ -64,9 +64,8 @@ impl WristTrack {
             }
             start += run.len();
         }
-        let arm = |t: usize| {
-            norm(sub(joint(t, elbow), joint(t, shoulder))) + norm(sub(joint(t, wrist), joint(t, elbow)))
-        };
+        let arm =
+            |t: usize| norm(sub(joint(t, elbow), joint(t, shoulder))) + norm(sub(joint(t, wrist), joint(t, elbow)));
         let arm_metres = order::median((0..n_frames).map(arm)).filter(|metres| *metres > 0.0);
         Self { fps: motion.fps, positions, is_visible, arm_metres }
     }

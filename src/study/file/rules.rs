@@ -58,7 +58,7 @@ impl StudyRules<'_> {
         self.within("extra_session_ratio", file.extra_session_ratio, 0.0, 5.0, "extra sessions per participant");
         self.within("seed", file.seed as f64, 0.0, i64::MAX as f64, "");
         self.within("clips.seconds", file.clips.seconds, 1.0, 120.0, "seconds");
-        self.within("clips.stroke_rate_classes", file.clips.stroke_rate_classes as f64, 1.0, 10.0, "classes");
+        self.within("clips.stroke_rate_groups", file.clips.stroke_rate_groups as f64, 1.0, 10.0, "classes");
         let rules = &file.exclusion;
         self.within("exclusion.stalled_secs", rules.stalled_secs.unwrap_or(0.0), 0.0, 600.0, "seconds");
         self.within("exclusion.unfocused_secs", rules.unfocused_secs.unwrap_or(0.0), 0.0, 600.0, "seconds");
@@ -132,8 +132,9 @@ impl StudyRules<'_> {
                 let message = format!("the condition {} needs motion: expected dataset = \"FOLDER\"", condition.name);
                 self.report(key("dataset"), message + ", or remove the condition");
             }
-            if speaker.dataset.is_none() && file.clips.stroke_rate_classes > 1 {
-                let message = "clips.stroke_rate_classes needs motion: expected dataset = \"FOLDER\", or remove that key";
+            if speaker.dataset.is_none() && file.clips.stroke_rate_groups > 1 {
+                let message =
+                    "clips.stroke_rate_groups needs motion: expected dataset = \"FOLDER\", or remove that key";
                 self.report(key("dataset"), message);
             }
             if speaker.clips == Some(0) {

@@ -106,7 +106,7 @@ pub struct ClipSettings {
     /// Number of classes of stroke rate from which equally many clips are cut, for speakers with a dataset; 1: the
     /// stroke rate is ignored.
     #[serde(skip_serializing_if = "is_one")]
-    pub stroke_rate_classes: usize,
+    pub stroke_rate_groups: usize,
 }
 
 fn is_one(number: &usize) -> bool {
@@ -116,7 +116,7 @@ fn is_one(number: &usize) -> bool {
 impl Default for ClipSettings {
     fn default() -> Self {
         let (reuse, mismatched) = (ClipReuse::Never, MismatchedClip::Fixed);
-        Self { seconds: 12.0, reuse, mismatched, stroke_rate_classes: 1 }
+        Self { seconds: 12.0, reuse, mismatched, stroke_rate_groups: 1 }
     }
 }
 
