@@ -34,14 +34,15 @@ const FOOTER: &str = "    <LINGUISTIC_TYPE GRAPHIC_REFERENCES=\"false\" LINGUIST
 /// folders. Times are rounded to milliseconds; annotations are sorted by start.
 pub fn write(media: &str, tiers: &[AnnotationTier]) -> String {
     let spans: Vec<Vec<(u64, u64, &str)>> = tiers.iter().map(spans).collect();
-    let mut times: Vec<u64> = spans.iter().flatten().flat_map(|span| [span.0, span.1]).collect();
-    times.sort_unstable();
-    times.dedup();
-    let slot = |ms: u64| times.partition_point(|time| *time < ms) + 1;
+    // Annotations share no time slot: ELAN moves all annotations of a slot together.
+    let mut slots: Vec<(u64, usize)> = spans.iter().flatten().flat_map(|span| [span.0, span.1]).zip(0..).collect();
+    slots.sort_unstable();
+    let mut slot_ids = vec![0; slots.len()];
+    slots.iter().zip(1..).for_each(|((_, slot), id)| slot_ids[*slot] = id);
     let extension = media.rsplit_once('.').map_or("", |(_, extension)| extension).to_ascii_lowercase();
     let mime = MIME_TYPES.iter().find(|(known, _)| *known == extension).map_or("unknown", |(_, mime)| mime);
     let media = escape(&if media.starts_with("../") { media.to_owned() } else { format!("./{media}") });
-    let n_annotations: usize = spans.iter().map(Vec::len).sum();
+    let n_annotations = slots.len() / 2;
     let mut text = HEADER.to_owned();
     let _ = write!(
         text,
@@ -49,21 +50,20 @@ pub fn write(media: &str, tiers: &[AnnotationTier]) -> String {
          MIME_TYPE=\"{mime}\" RELATIVE_MEDIA_URL=\"{media}\"/>\n        <PROPERTY \
          NAME=\"lastUsedAnnotationId\">{n_annotations}</PROPERTY>\n    </HEADER>\n    <TIME_ORDER>\n"
     );
-    for (ms, n) in times.iter().zip(1..) {
+    for ((ms, _), n) in slots.iter().zip(1..) {
         let _ = writeln!(text, "        <TIME_SLOT TIME_SLOT_ID=\"ts{n}\" TIME_VALUE=\"{ms}\"/>");
     }
     text.push_str("    </TIME_ORDER>\n");
     let mut n = 0;
     for (tier, spans) in tiers.iter().zip(&spans) {
         let _ = writeln!(text, "    <TIER LINGUISTIC_TYPE_REF=\"default-lt\" TIER_ID=\"{}\">", escape(&tier.name));
-        for (start, end, value) in spans {
+        for (.., value) in spans {
+            let [start, end] = [slot_ids[2 * n], slot_ids[2 * n + 1]];
             n += 1;
             let _ = writeln!(
                 text,
-                "        <ANNOTATION><ALIGNABLE_ANNOTATION ANNOTATION_ID=\"a{n}\" TIME_SLOT_REF1=\"ts{}\" \
-                 TIME_SLOT_REF2=\"ts{}\"><ANNOTATION_VALUE>{}</ANNOTATION_VALUE></ALIGNABLE_ANNOTATION></ANNOTATION>",
-                slot(*start),
-                slot(*end),
+                "        <ANNOTATION><ALIGNABLE_ANNOTATION ANNOTATION_ID=\"a{n}\" TIME_SLOT_REF1=\"ts{start}\" \
+                 TIME_SLOT_REF2=\"ts{end}\"><ANNOTATION_VALUE>{}</ANNOTATION_VALUE></ALIGNABLE_ANNOTATION></ANNOTATION>",
                 escape(value)
             );
         }
