@@ -29,8 +29,8 @@ from pympi.Elan import Eaf
 eaf = Eaf(sys.argv[1])
 times = list(eaf.timeslots.values())
 tiers = [[name, sorted(eaf.get_annotation_data_for_tier(name))] for name in eaf.get_tier_names()]
-print(json.dumps({'media': eaf.media_descriptors, 'is_ordered': times == sorted(times), 'tiers': tiers,
-                  'full_time': eaf.get_full_time_interval()}))
+print(json.dumps({'media': eaf.media_descriptors, 'is_ordered': times == sorted(times), 'n_slots': len(times),
+                  'n_annotations': len(eaf.annotations), 'tiers': tiers}))
 ";
 
 type ReadTiers = Vec<(String, Vec<(u64, u64, String)>)>;
@@ -40,7 +40,10 @@ fn read(readers: &Path, path: &Path) -> (Value, ReadTiers) {
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     let found: Value = serde_json::from_slice(&output.stdout).unwrap();
     assert_eq!(found["is_ordered"], true);
-    let tiers = serde_json::from_value(found["tiers"].clone()).unwrap();
+    let tiers: ReadTiers = serde_json::from_value(found["tiers"].clone()).unwrap();
+    // Ids are unique, and annotations share no time slots.
+    let n: usize = tiers.iter().map(|(_, annotations)| annotations.len()).sum();
+    assert_eq!((&found["n_annotations"], &found["n_slots"]), (&n.into(), &(2 * n).into()));
     (found, tiers)
 }
 
