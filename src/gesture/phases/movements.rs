@@ -25,17 +25,14 @@ const MIN_EXTENT: f64 = 0.04;
 /// Shortest movement, and shortest pause between two, seconds.
 pub(super) const MIN_MOVEMENT_SECS: f64 = 0.12;
 pub(super) const MIN_PAUSE_SECS: f64 = 0.2;
-/// Half duration of a minimum-jerk movement, relative to the time from its peak speed to half of it.
-const HALF_SPEED: f64 = 1.848;
 /// Seconds before and after a movement that are fitted, and the steps of the search for its start and end.
 const FIT_MARGIN_SECS: f64 = 0.2;
-const FIT_STEPS: [f64; 2] = [0.04, 0.013];
+const FIT_STEPS: [f64; 3] = [0.04, 0.04, 0.013];
 
 /// Thresholds of a hand, adapted to the length of its arm and the noise of its joints; `metres` scales lengths.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct WristThresholds {
     pub(super) metres: f64,
-    sigma_secs: f64,
     pub(super) low_speed: f64,
     pub(super) peak_speed: f64,
 }
@@ -79,7 +76,7 @@ pub(super) fn runs(tracks: &[WristTrack]) -> (WristThresholds, Vec<Vec<WristRun>
     let noise_speed = (variance / sigma_secs.powi(3)).sqrt().max(quiet);
     let threshold = |[least, multiple]: [f64; 2]| (least * metres).max(multiple * noise_speed);
     let (low_speed, peak_speed) = (threshold(LOW_SPEED), threshold(PEAK_SPEED));
-    (WristThresholds { metres, sigma_secs, low_speed, peak_speed }, runs)
+    (WristThresholds { metres, low_speed, peak_speed }, runs)
 }
 
 impl WristRun {
@@ -145,7 +142,7 @@ impl WristRun {
         found
     }
 
-    /// Parts of the run around peaks of the speed, with times estimated from half of the peak.
+    /// Parts of the run around peaks of the speed, divided where the speed is lowest.
     fn fast_parts(&self, thresholds: &WristThresholds) -> Vec<WristMovement> {
         let (mut found, mut start) = (Vec::new(), 0);
         for part in self.speeds.chunk_by(|a, b| (*a > thresholds.low_speed) == (*b > thresholds.low_speed)) {
@@ -155,44 +152,24 @@ impl WristRun {
                 let at = |t: usize| self.speeds.get(t).copied().unwrap_or(0.0);
                 at(*t) >= thresholds.peak_speed && at(*t) > at(t + 1) && at(*t) >= at(t.wrapping_sub(1))
             };
-            // First and last peak of each movement, and the valleys between movements.
-            let mut groups: Vec<[usize; 2]> = Vec::new();
-            let mut valleys = vec![frames.start];
-            for peak in frames.clone().filter(is_peak) {
-                let Some([first, last]) = groups.last_mut() else {
-                    groups.push([peak; 2]);
-                    continue;
-                };
-                let fastest = self.speeds[*first..=*last].iter().copied().fold(0.0, f64::max);
-                let slowest = (*last..peak).min_by(|a, b| self.speeds[*a].total_cmp(&self.speeds[*b])).unwrap_or(peak);
+            // The last peak, and the speed of the fastest since the last valley.
+            let mut peaks = frames.clone().filter(is_peak);
+            let Some(mut last) = peaks.next() else { continue };
+            let (mut fastest, mut edges) = (self.speeds[last], vec![frames.start]);
+            for peak in peaks {
+                let slowest = (last..peak).min_by(|a, b| self.speeds[*a].total_cmp(&self.speeds[*b])).unwrap_or(peak);
                 if self.speeds[slowest] < VALLEY * fastest.min(self.speeds[peak]) {
-                    groups.push([peak; 2]);
-                    valleys.push(slowest);
-                } else {
-                    *last = peak;
+                    edges.push(slowest);
+                    fastest = 0.0;
                 }
+                (last, fastest) = (peak, f64::max(fastest, self.speeds[peak]));
             }
-            valleys.push(frames.end.saturating_sub(1));
-            for (n, [first, last]) in groups.into_iter().enumerate() {
-                let start_secs = self.edge(first, valleys[n], thresholds.sigma_secs);
-                let end_secs = self.edge(last, valleys[n + 1], thresholds.sigma_secs);
-                found.push(WristMovement { start_secs, end_secs });
-            }
+            edges.push(frames.end - 1);
+            let secs = |frame: usize| frame as f64 / self.per_sec;
+            let parts = edges.windows(2).map(|pair| [secs(pair[0]), secs(pair[1])]);
+            found.extend(parts.map(|[start_secs, end_secs]| WristMovement { start_secs, end_secs }));
         }
         found
-    }
-
-    /// Time at which a movement with a peak at frame `peak` starts or ends, from the time at which half of its speed is
-    /// reached, less what the Gaussian adds; the time of frame `limit` if the speed is higher up to there.
-    fn edge(&self, peak: usize, limit: usize, sigma_secs: f64) -> f64 {
-        let half = self.speeds[peak] / 2.0;
-        let frames: Vec<usize> = if limit < peak { (limit..=peak).rev().collect() } else { (peak..=limit).collect() };
-        let crossing = frames.windows(2).find(|pair| self.speeds[pair[1]] <= half);
-        let Some(&[above, below]) = crossing else { return limit as f64 / self.per_sec };
-        let part = (self.speeds[above] - half) / (self.speeds[above] - self.speeds[below]);
-        let secs = (above.abs_diff(peak) as f64 + part) / self.per_sec;
-        let secs = (secs.powi(2) - (1.1775 * sigma_secs).powi(2)).max((0.25 * secs).powi(2)).sqrt() * HALF_SPEED;
-        peak as f64 / self.per_sec + if limit < peak { -secs } else { secs }
     }
 
     /// Start and end of the minimum-jerk movement along a straight line that fits the positions in a window best.
