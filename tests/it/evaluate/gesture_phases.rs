@@ -64,7 +64,8 @@ fn strokes_are_found_within_100_ms_at_all_rates_and_noises() {
             // The hardest case, 15 mm of noise at 15 fps, misses the goal of 0.9.
             let least = if (fps, noise) == (15, 0.015) { [0.85, 0.9, 0.77, 0.88] } else { [0.92, 0.95, 0.9, 0.95] };
             assert!((0..4).all(|kind| f1[kind] >= least[kind]), "{name}: {f1:?}");
-            assert!(confidence[1].is_nan() || confidence[0] > confidence[1], "{name}: {confidence:?}");
+            // With less noise too few are wrong for a comparison.
+            assert!(noise < 0.015 || confidence[0] > confidence[1] + 0.03, "{name}: {confidence:?}");
         }
     }
     // Movements whose peak speed is early or late, and noise that is correlated over time.
