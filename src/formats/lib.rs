@@ -3,6 +3,7 @@
 pub mod authors_txt;
 pub mod bvh;
 pub mod checkpoint;
+pub mod eaf;
 pub mod joints_description;
 pub mod joints_npz;
 pub mod keypoints;

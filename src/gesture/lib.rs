@@ -1,8 +1,9 @@
 //! From speech to gestures: training (`train`), generation (`generate`) of single sounds and of batches (`batch`),
-//! metrics (`metrics`), and the evaluation of trained models (`evaluate`).
+//! metrics (`metrics`), the evaluation of trained models (`evaluate`), and gesture phases (`phases`).
 
 pub mod batch;
 pub mod evaluate;
 pub mod generate;
 pub mod metrics;
+pub mod phases;
 pub mod train;

@@ -47,6 +47,19 @@ impl SpeechLevel {
         part.iter().filter(|level| **level > SPEECH_DB).count() as f64 / part.len().max(1) as f64
     }
 
+    /// Returns the time ranges with speech in seconds, which are divided by pauses of at least `min_pause_secs`.
+    pub fn speech_ranges(&self, min_pause_secs: f64) -> Vec<Range<f64>> {
+        let mut ranges: Vec<Range<f64>> = Vec::new();
+        for (n, _) in self.windows.iter().enumerate().filter(|(_, level)| **level > SPEECH_DB) {
+            let window = n as f64 * WINDOW_SECS..(n + 1) as f64 * WINDOW_SECS;
+            match ranges.last_mut().filter(|range| window.start - range.end < min_pause_secs) {
+                Some(range) => range.end = window.end,
+                None => ranges.push(window),
+            }
+        }
+        ranges
+    }
+
     fn part(&self, secs: Range<f64>) -> &[f32] {
         let at = |secs: f64| ((secs / WINDOW_SECS).round().max(0.0) as usize).min(self.windows.len());
         &self.windows[at(secs.start)..at(secs.end)]
@@ -66,6 +79,7 @@ mod tests {
             assert!(level.around(0.625) < -40.0 && level.around(1.625) < -40.0);
             assert!(level.around(0.2).abs() < 0.1 && level.around(0.52).abs() < 0.1);
             assert!((level.speech_share(0.0..4.0) - 0.75).abs() < 0.02);
+            assert_eq!(level.speech_ranges(0.2).len(), 5);
             assert_eq!((level.around(-1.0), level.around(9.0)), (FLOOR_DB, FLOOR_DB));
         }
         assert_eq!(SpeechLevel::of(&Sound { rate: 16_000, samples: Vec::new() }).speech_share(0.0..1.0), 0.0);

@@ -2,6 +2,7 @@
 
 pub mod align;
 mod aligned_text;
+pub mod annotate;
 pub mod forget;
 pub mod import;
 pub mod transcribe;

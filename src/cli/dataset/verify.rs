@@ -1,5 +1,6 @@
-//! `orator dataset`: contents and integrity of a dataset.
+//! `orator dataset`: contents and integrity of a dataset, and its annotations.
 
+use super::annotate;
 use super::import::{train_gan, verify_deep};
 use crate::cli::Outcome;
 use crate::cli::sandbox::enter_sandbox;
@@ -14,7 +15,7 @@ use orator_dataset::{Dataset, Split};
 use serde_json::json;
 use std::path::PathBuf;
 
-/// Verify or describe a finished dataset.
+/// Verify, describe or annotate a finished dataset.
 #[derive(clap::Args)]
 pub struct Args {
     #[command(subcommand)]
@@ -39,14 +40,17 @@ enum DatasetVerb {
         /// Dataset folder, such as work/dataset/SPEAKER.
         dir: PathBuf,
     },
+    Annotate(annotate::Args),
 }
 
 pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
-    let (DatasetVerb::Verify { dir, .. } | DatasetVerb::Info { dir }) = &args.verb;
-    enter_sandbox([], [dir.as_path()]);
+    if let DatasetVerb::Verify { dir, .. } | DatasetVerb::Info { dir } = &args.verb {
+        enter_sandbox([], [dir.as_path()]);
+    }
     match args.verb {
         DatasetVerb::Verify { dir, deep } => check(&dir, deep, ui),
         DatasetVerb::Info { dir } => info(&dir, ui),
+        DatasetVerb::Annotate(args) => annotate::run(&args, ui),
     }
 }
 

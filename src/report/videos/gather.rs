@@ -2,6 +2,7 @@
 //! with its ledger after the last completed stage, or the reason why there is none.
 
 use super::distributions::MeasureCounts;
+use super::gestures;
 use super::movement::MovementCounts;
 use super::sliders::{AcceptedByThreshold, JudgedVideo, open_frames};
 use super::thresholds::THRESHOLDS;
@@ -21,6 +22,7 @@ use orator_dataset::words::{self, VideoWords};
 use orator_formats::media_json::MediaInfo;
 use orator_formats::npz::Npz;
 use orator_formats::{joints_npz, sound_offset_json};
+use orator_gesture::phases::PhaseTotals;
 use orator_pipeline::segment::Measures;
 use std::path::{Path, PathBuf};
 
@@ -33,6 +35,8 @@ pub struct ReportData {
     pub accepted: Vec<Option<AcceptedByThreshold>>,
     pub measures: MeasureCounts,
     pub movement: MovementCounts,
+    /// Gesture phases of the left and the right hand.
+    pub hands: [PhaseTotals; 2],
     pub worst: Worst,
     /// Animated previews of the first videos with accepted motion.
     pub previews: Vec<MotionPreview>,
@@ -50,6 +54,7 @@ pub fn gather(settings: &Settings, videos: &[Videos], n_pictures: usize, progres
         accepted: Vec::new(),
         measures: MeasureCounts::new(),
         movement: MovementCounts::new(),
+        hands: Default::default(),
         worst: Worst::new(n_pictures),
         previews: Vec::new(),
         missing: missing.collect(),
@@ -102,6 +107,7 @@ impl ReportData {
             match motion(work, &unit) {
                 Ok((motion, intervals)) => {
                     self.movement.add(&motion, &intervals.intervals);
+                    gestures::add(&mut self.hands, &motion, &intervals.intervals);
                     if self.previews.len() < MAX_PREVIEWS {
                         let preview = MotionPreview::new(&video.file, video.anchor(), &motion, &intervals.intervals);
                         self.previews.extend(preview);

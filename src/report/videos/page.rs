@@ -4,7 +4,7 @@ use super::distributions::distributions;
 use super::gather::{ReportData, VideoSummary, gather};
 use super::summary::{self, ReportTotals};
 use super::worst::{self, Moment, MomentThumbnail, Worst};
-use super::{movement, sliders, timelines};
+use super::{gestures, movement, sliders, timelines};
 use crate::html::{Node, Page, Section, jpeg, node};
 use crate::preview;
 use orator_base::stage::progress::Progress;
@@ -68,7 +68,7 @@ fn draw(settings: &Settings, gathered: &mut ReportData, progress: &dyn Progress)
 fn page(request: &ReportRequest, gathered: &ReportData, pictures: &Pictures, sums: &ReportTotals) -> Page {
     let rules = &request.settings.segment;
     let per_sec = request.settings.extract.rate().per_sec();
-    let ReportData { videos, accepted, measures, movement, worst, previews, missing, n_speech_model } = gathered;
+    let ReportData { videos, accepted, measures, movement, hands, worst, previews, missing, n_speech_model } = gathered;
     let splits = summary::video_splits(request.settings, request.videos);
     let mut data = sliders::data(accepted, videos, rules);
     data["previews"] = preview::data(previews);
@@ -97,6 +97,7 @@ fn page(request: &ReportRequest, gathered: &ReportData, pictures: &Pictures, sum
             section("frames", "Worst frames", gallery(worst, pictures, videos)),
             section("distributions", "Distributions", distributions(measures, request.settings, per_sec)),
             section("motion", "Motion", movement::motion(movement)),
+            section("gestures", "Gestures", gestures::gestures(hands)),
         ],
         style: include_str!("page.css"),
         script: include_str!("page.js"),

@@ -58,6 +58,7 @@ impl StudyRules<'_> {
         self.within("extra_session_ratio", file.extra_session_ratio, 0.0, 5.0, "extra sessions per participant");
         self.within("seed", file.seed as f64, 0.0, i64::MAX as f64, "");
         self.within("clips.seconds", file.clips.seconds, 1.0, 120.0, "seconds");
+        self.within("clips.stroke_rate_groups", file.clips.stroke_rate_groups as f64, 1.0, 10.0, "classes");
         let rules = &file.exclusion;
         self.within("exclusion.stalled_secs", rules.stalled_secs.unwrap_or(0.0), 0.0, 600.0, "seconds");
         self.within("exclusion.unfocused_secs", rules.unfocused_secs.unwrap_or(0.0), 0.0, 600.0, "seconds");
@@ -130,6 +131,11 @@ impl StudyRules<'_> {
             if let (None, Some(condition)) = (&speaker.dataset, file.condition.iter().find(needs)) {
                 let message = format!("the condition {} needs motion: expected dataset = \"FOLDER\"", condition.name);
                 self.report(key("dataset"), message + ", or remove the condition");
+            }
+            if speaker.dataset.is_none() && file.clips.stroke_rate_groups > 1 {
+                let message =
+                    "clips.stroke_rate_groups needs motion: expected dataset = \"FOLDER\", or remove that key";
+                self.report(key("dataset"), message);
             }
             if speaker.clips == Some(0) {
                 self.report(key("clips"), "expected 1 or more; without the key, the number that the design needs");

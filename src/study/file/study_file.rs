@@ -103,11 +103,20 @@ pub struct ClipSettings {
     pub reuse: ClipReuse,
     #[serde(skip_serializing_if = "MismatchedClip::is_fixed")]
     pub mismatched: MismatchedClip,
+    /// Number of classes of stroke rate from which equally many clips are cut, for speakers with a dataset; 1: the
+    /// stroke rate is ignored.
+    #[serde(skip_serializing_if = "is_one")]
+    pub stroke_rate_groups: usize,
+}
+
+fn is_one(number: &usize) -> bool {
+    *number == 1
 }
 
 impl Default for ClipSettings {
     fn default() -> Self {
-        Self { seconds: 12.0, reuse: ClipReuse::Never, mismatched: MismatchedClip::Fixed }
+        let (reuse, mismatched) = (ClipReuse::Never, MismatchedClip::Fixed);
+        Self { seconds: 12.0, reuse, mismatched, stroke_rate_groups: 1 }
     }
 }
 

@@ -327,8 +327,14 @@ mod tests {
 
     #[test]
     fn mismatched_clips_differ_and_come_from_other_segments_if_possible() {
-        let clip =
-            |segment: usize| StudyClip { name: String::new(), segment, frames: 0..9, cut_db: 0.0, hidden_share: 0.0 };
+        let clip = |segment: usize| StudyClip {
+            name: String::new(),
+            segment,
+            frames: 0..9,
+            cut_db: 0.0,
+            hidden_share: 0.0,
+            strokes_per_minute: None,
+        };
         let of =
             |segments: &[usize]| mismatched_clips(&segments.iter().map(|segment| clip(*segment)).collect::<Vec<_>>());
         assert_eq!(of(&[0, 0, 1, 1]), [2, 3, 0, 1]);

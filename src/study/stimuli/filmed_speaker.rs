@@ -74,7 +74,8 @@ impl CutSpeaker {
             (None, None) => bail!("the speaker {name} has neither a dataset nor sounds"),
         };
         let fps = source.fps;
-        let cut = cut(&source, fps.frames_in(file.clips.seconds), n_clips, rank)?;
+        let counts = (n_clips, file.clips.stroke_rate_groups);
+        let cut = cut(&source, fps.frames_in(file.clips.seconds), counts, rank)?;
         let film_fps = film::film_fps(file.films.layout, fps);
         let mut sounds = Vec::new();
         for of_segment in cut.clips.chunk_by(|a, b| a.segment == b.segment) {

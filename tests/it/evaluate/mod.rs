@@ -8,6 +8,7 @@ pub(crate) mod evaluate_files;
 pub(crate) mod evaluate_speaker;
 pub(crate) mod frechet;
 pub(crate) mod frechet_response;
+pub(crate) mod gesture_phases;
 pub(crate) mod golden_metrics;
 pub(crate) mod metrics;
 pub(crate) mod motion_store;

@@ -4,6 +4,7 @@ pub(crate) mod aligned_text;
 pub(crate) mod aligned_words;
 pub(crate) mod blender;
 pub(crate) mod dataset_readers;
+pub(crate) mod elan;
 pub(crate) mod fbx;
 pub(crate) mod joint_structure;
 pub(crate) mod read_speech;

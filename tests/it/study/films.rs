@@ -14,7 +14,7 @@ use orator_study::build::{common_bytes, padded};
 use orator_study::file::StudyFile;
 use orator_study::plan::{FilmContent, FilmSound};
 use orator_study::stimuli::condition_motion::{ConditionModels, motions};
-use orator_study::stimuli::cut::cut;
+use orator_study::stimuli::cut::{StudyClip, cut};
 use orator_study::stimuli::filmed_speaker::{CutSpeaker, normalise_loudness};
 use orator_study::stimuli::speaker_source::SpeakerSource;
 use orator_test_support::rule::dataset::{RULE, RULE_OF_WORDS, SpokenClip, write};
@@ -212,7 +212,7 @@ fn a_model_condition_may_carry_its_state_and_read_word_vectors() {
         let file = StudyFile::read(&dir.join("study.toml"))?;
         let models = ConditionModels::open(&file.condition, "host")?;
         let source = SpeakerSource::of_dataset("host", &dir.join("data"), Split::Test)?;
-        let cut = cut(&source, 30, 2, |_| 0)?;
+        let cut = cut(&source, 30, (2, 1), |_| 0)?;
         let shown = motions(&source, &cut.clips, &file.condition, &models, &|| ())?;
         anyhow::Ok(shown["model"].iter().map(|shown| shown.motion.joints.clone()).collect::<Vec<_>>())
     };
@@ -228,4 +228,25 @@ fn a_model_condition_may_carry_its_state_and_read_word_vectors() {
         let text = format!("{:#}", joints("gan.safetensors", key).unwrap_err());
         assert!(text.contains(&format!("condition model of the speaker host: {error}")), "{text}");
     }
+}
+
+#[test]
+fn clips_are_stratified_by_stroke_rate() {
+    let folder = tempfile::tempdir().unwrap();
+    let clip = |split, number| SpokenClip { rule: RULE_OF_WORDS, seed: 5, split, number, n_frames: 300, habits: 0 };
+    let clips = [clip(Split::Train, 0), clip(Split::Test, 0), clip(Split::Test, 1), clip(Split::Test, 2)];
+    write(folder.path(), &clips, &Silent).unwrap();
+    let source = SpeakerSource::of_dataset("host", folder.path(), Split::Test).unwrap();
+    let of = |n_groups: usize| cut(&source, 60, (100, n_groups), |_| 0).unwrap();
+    let (plain, grouped) = (of(1), of(2));
+    assert!(plain.clips.iter().all(|clip| clip.strokes_per_minute.is_none()));
+    let names = |clips: &[StudyClip]| clips.iter().map(|clip| clip.name.clone()).collect::<Vec<_>>();
+    assert_eq!(names(&grouped.clips), names(&plain.clips));
+    let rate = |name: &String| {
+        grouped.clips.iter().find(|clip| clip.name == *name).and_then(|clip| clip.strokes_per_minute).unwrap()
+    };
+    let rates: BTreeSet<u64> = grouped.best_first.iter().map(|name| rate(name).round() as u64).collect();
+    assert!(rates.len() > 1, "{rates:?}");
+    // Clips of low and of high rate alternate among the best.
+    assert!(grouped.best_first.chunks_exact(2).take(2).all(|pair| rate(&pair[0]) <= rate(&pair[1])));
 }
