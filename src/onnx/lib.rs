@@ -17,7 +17,7 @@ pub mod store;
 pub use entry::*;
 pub use fetch::FetchSource;
 pub use manifest::{MANIFEST_FILE, Manifest};
-pub use model::{Model, ModelError, Outputs, sha256_of};
+pub use model::{Model, ModelError, Outputs, session, sha256_of};
 pub use runtime::{LIBRARY, Runtime, TELEMETRY_OFF, find_library};
 pub use source::{Conversion, ModelSource, PinnedFile, SourceFile, SourceKind};
 pub use store::{AUTO, Fetched, ModelRequest, ModelState, ModelStore};

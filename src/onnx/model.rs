@@ -155,7 +155,7 @@ pub(super) fn open_session(runtime: &Runtime, entry: &ModelEntry, dir: &Path) ->
 }
 
 /// Creates a session for one picture per run with one thread, no spinning, full optimisation and deterministic results.
-fn session(runtime: &Runtime, bytes: &[u8]) -> Result<Session> {
+pub fn session(runtime: &Runtime, bytes: &[u8]) -> Result<Session> {
     fn to_anyhow<T>(error: ort::Error<T>) -> anyhow::Error {
         anyhow!("{error}")
     }
