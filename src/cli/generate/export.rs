@@ -10,7 +10,7 @@ use orator_gesture::generate::model::{GenerationChoice, checkpoint_file, model_l
 use serde_json::json;
 use std::path::Path;
 
-pub fn run(given: &Path, choice: &GenerationChoice, out: &Path, ui: &Ui) -> Result<Outcome> {
+pub fn run(given: &Path, choice: &GenerationChoice, out: &Path, carry_state: bool, ui: &Ui) -> Result<Outcome> {
     enter_sandbox([out], [given]);
     let checkpoint = checkpoint_file(given)?;
     if checkpoint != *given {
@@ -22,15 +22,9 @@ pub fn run(given: &Path, choice: &GenerationChoice, out: &Path, ui: &Ui) -> Resu
         out.display()
     );
     let _lock = model_lock(&checkpoint)?;
-    let exported = export::export(&checkpoint, choice, out)?;
-    let names: Vec<String> = exported.files.iter().map(|file| file.display().to_string()).collect();
-    let text = format!("{} at {} as ONNX\nwrote {}", exported.name, exported.fps, names.join(", "));
-    let facts = json!({
-        "checkpoint": checkpoint,
-        "speaker": exported.name,
-        "fps": exported.fps,
-        "outputs": names,
-    });
-    ui.summary(&text, Some("orator guide onnx"), facts);
+    let files = export::export(&checkpoint, choice, out, carry_state)?;
+    let names: Vec<String> = files.iter().map(|file| file.display().to_string()).collect();
+    let facts = json!({ "checkpoint": checkpoint, "outputs": names });
+    ui.summary(&format!("wrote {}", names.join(", ")), Some("orator guide onnx"), facts);
     Ok(Outcome::Done)
 }

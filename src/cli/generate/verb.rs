@@ -98,7 +98,8 @@ const EXCLUDED_BY_EXPORT: [&str; 5] = ["audio", "audio_folder", "batch", "transc
 pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     let device = args.device;
     if let (Some(out), Some(checkpoint)) = (&args.export, &args.checkpoint) {
-        return export::run(checkpoint, &GenerationChoice { speaker: args.speaker, seed: args.seed }, out, ui);
+        let choice = GenerationChoice { speaker: args.speaker, seed: args.seed };
+        return export::run(checkpoint, &choice, out, args.carry_state, ui);
     }
     let Some(audio) = &args.audio else { return batch::run(&batch(args)?, device, ui) };
     let variants = variants(&args);

@@ -1,115 +1,180 @@
 //! The files of an exported generator, with their metadata.
 
 use super::graph::NetworkGraph;
-use super::{gan, mels};
+use super::{cepstra, gan, joints, mels, sequence};
 use crate::generate::model::{GENERATOR, GenerationChoice, SpeakerMetadata, load_with_contents};
-use crate::generate::seq2seq::metadata::is_sequence_kind;
-use anyhow::{Result, ensure};
+use crate::generate::seq2seq::SequenceGenerator;
+use crate::generate::seq2seq::architecture::Architecture;
+use crate::generate::seq2seq::poses::PoseFormat;
+use crate::generate::trained::TrainedSpeaker;
+use anyhow::{Result, bail, ensure};
 use candle_core::Device;
-use orator_base::audio::mel::N_MELS;
+use orator_base::audio::mfcc::N_CEPSTRA;
 use orator_base::stage::fingerprint::hash_file;
 use orator_base::stage::workdir::write_file;
 use orator_base::types::skeleton::{self, N_JOINTS};
-use orator_base::types::sound::SAMPLE_RATE;
-use orator_base::types::time::FrameRate;
-use orator_formats::checkpoint;
-use orator_nn::gan::generator::FRAMES_MULTIPLE;
-use orator_nn::gan::words::N_TIMES;
-use orator_onnx::convert::{Dim, ElementType, GraphPort};
+use orator_nn::seq2seq::predict::StateAtSeams;
+use orator_onnx::convert::ElementType::{F32, I64};
+use orator_onnx::convert::GraphPort;
 use std::path::{Path, PathBuf};
 
-/// A generator that was exported.
-#[derive(Clone, Debug)]
-pub struct ExportedModel {
-    /// Name of the speaker.
-    pub name: String,
-    pub fps: FrameRate,
-    /// Files in the order in which they are run.
-    pub files: Vec<PathBuf>,
-}
-
-/// Files that [`export`] writes for the output `out`, in the order in which they are run.
-pub fn files(out: &Path) -> [PathBuf; 2] {
-    [out.with_extension("mel.onnx"), out.to_owned()]
-}
+/// Metadata of a file: key and value.
+type Fact = (&'static str, String);
 
 /// Writes the generator of a checkpoint file, for the chosen speaker and variant, as ONNX to `out`, and its front end
-/// beside it (see [`files`]).
+/// from samples beside it, `NAME.mel.onnx`; for a sequence network also the conversion of all poses to joints,
+/// `NAME.joints.onnx`. `carry_state` is that of [`SequenceGenerator::seams`]. Returns the files in the order of their use.
 ///
 /// # Errors
 /// A checkpoint that cannot be read; an unknown speaker, or a variant of a network without variants; an output that is
-/// not `.onnx` or cannot be written; a network that has no ONNX form.
-pub fn export(checkpoint: &Path, choice: &GenerationChoice, out: &Path) -> Result<ExportedModel> {
-    ensure!(
-        out.extension().is_some_and(|extension| extension == "onnx"),
-        "--export {}: expected a file name that ends in .onnx",
-        out.display()
-    );
-    ensure!(!out.is_dir(), "output {} is a folder, expected a file", out.display());
-    let kind = &checkpoint::facts(checkpoint)?["speaker"]["kind"];
-    ensure!(
-        !is_sequence_kind(kind),
-        "{} is a checkpoint of `orator train seq2seq`, which cannot be exported",
-        checkpoint.display()
-    );
-    let (metadata, _, contents) = load_with_contents(checkpoint, choice, &Device::Cpu)?;
-    let mut common = common_facts(checkpoint, &metadata.name, metadata.fps)?;
-    common.push(("sample_rate", SAMPLE_RATE.to_string()));
-    common.push(("spectrogram", serde_json::to_string(&metadata.audio)?));
-    let [front_end, network] = files(out);
+/// not `.onnx` or cannot be written; a network that animates a captured skeleton.
+pub fn export(checkpoint: &Path, choice: &GenerationChoice, out: &Path, carry_state: bool) -> Result<Vec<PathBuf>> {
+    let is_onnx = out.extension().is_some_and(|extension| extension == "onnx") && !out.is_dir();
+    ensure!(is_onnx, "--export {}: expected a file that ends in .onnx", out.display());
+    let trained = TrainedSpeaker::open_as(checkpoint, choice, &Device::Cpu)?;
+    let mut facts = vec![
+        ("program", format!("orator {}", env!("CARGO_PKG_VERSION"))),
+        ("checkpoint_blake3", hash_file(checkpoint)?),
+        ("speaker", trained.name().to_owned()),
+        ("frame_rate", format!("{}/{}", trained.fps().num, trained.fps().den)),
+        ("sample_rate", trained.rate().to_string()),
+    ];
+    if let Some(words) = trained.known_words() {
+        facts.push(("vocabulary", serde_json::to_string(words.vocabulary.words())?));
+    }
+    match trained {
+        TrainedSpeaker::Gan(_) => {
+            ensure!(!carry_state, "{} has no state: omit --carry-state", checkpoint.display());
+            gan(checkpoint, choice, out, &facts)
+        }
+        TrainedSpeaker::Sequence(speaker) => sequence(&speaker, out, carry_state, &facts),
+    }
+}
 
-    let mels_shape = [Dim::Size(1), Dim::Size(N_MELS), Dim::Any("mel_frames")];
-    let mels_port: GraphPort = ("mels", ElementType::F32, &mels_shape);
-    let samples: GraphPort = ("samples", ElementType::F32, &[Dim::Size(1), Dim::Any("samples")]);
-    let frames: GraphPort = ("frames", ElementType::I64, &[Dim::Size(1)]);
+fn gan(checkpoint: &Path, choice: &GenerationChoice, out: &Path, facts: &[Fact]) -> Result<Vec<PathBuf>> {
+    let (metadata, _, contents) = load_with_contents(checkpoint, choice, &Device::Cpu)?;
+    let front_end = out.with_extension("mel.onnx");
+    let mels: GraphPort = ("mels", F32, "1,64,mel_frames");
     let text = "The sound is extended by its mirror image to complete blocks of 32 pose frames. `frames` is the number \
-                of pose frames of the sound itself.";
-    let facts = [&common[..], &[("description", text.to_owned())]].concat();
+                of pose frames of the sound.";
+    let about = [("spectrogram", serde_json::to_string(&metadata.audio)?), ("description", text.to_owned())];
     let graph = mels::front_end(metadata.fps)?;
-    write(&front_end, graph, (&[samples], &[mels_port, frames]), &facts)?;
+    write(&front_end, graph, (&[SAMPLES], &[mels, FRAMES]), &[facts, &about].concat())?;
 
     let mut graph = NetworkGraph::new(contents.part(GENERATOR));
     gan::add_generator(&mut graph, &metadata)?;
-    let n_frames = Dim::Any("pose_frames");
-    let (words_shape, times_shape) = ([Dim::Size(1), n_frames], [Dim::Size(1), n_frames, Dim::Size(N_TIMES)]);
-    let mut inputs = vec![mels_port];
-    let mut outputs: Vec<GraphPort> =
-        vec![("joints", ElementType::F32, &[Dim::Any("pose_frames"), Dim::Size(N_JOINTS), Dim::Size(3)])];
+    let (mut inputs, mut outputs) = (vec![mels], vec![("joints", F32, JOINTS)]);
     if metadata.words.is_some() {
-        inputs.push(("words", ElementType::I64, &words_shape));
-        inputs.push(("word_times", ElementType::F32, &times_shape));
+        inputs.extend([("words", I64, "1,frames"), ("word_times", F32, "1,frames,2")]);
     }
-    let angles_shape = [n_frames, Dim::Size(3 * metadata.normalisation.channels.len())];
-    if !metadata.normalisation.channels.is_empty() {
-        outputs.push(("angles", ElementType::F32, &angles_shape));
-    }
-    let facts = [common, generator_facts(&metadata)?].concat();
-    write(&network, graph, (&inputs, &outputs), &facts)?;
-    Ok(ExportedModel { name: metadata.name, fps: metadata.fps, files: vec![front_end, network] })
+    let n_angles = 3 * metadata.normalisation.channels.len();
+    let angles = format!("frames,{n_angles}");
+    outputs.extend((n_angles > 0).then_some(("angles", F32, &*angles)));
+    let about = [joint_facts(), generator_facts(&metadata)?].concat();
+    write(out, graph, (&inputs, &outputs), &[facts, &about].concat())?;
+    Ok(vec![front_end, out.to_owned()])
 }
 
-fn write(
-    path: &Path,
-    graph: NetworkGraph,
-    (inputs, outputs): (&[GraphPort], &[GraphPort]),
-    facts: &[(&str, String)],
-) -> Result<()> {
-    let facts: Vec<(String, String)> = facts.iter().map(|(key, value)| ((*key).to_owned(), value.clone())).collect();
-    write_file(path, &graph.graph.file("gestures", inputs, outputs, &facts))
+/// Metadata of the network of a GAN.
+fn generator_facts(metadata: &SpeakerMetadata) -> Result<Vec<Fact>> {
+    let text = "Retain the first `frames` (an output of the front end) of the joints: the others belong to the \
+                extension of the sound.";
+    let mut facts = vec![("description", text.to_owned())];
+    if metadata.words.is_some() {
+        let text = "Index of the word at each of 32 (frames / 32 + 1) pose frames: 0 without a word, 1 for a word outside \
+                    the vocabulary, 2 for its first. It is the last word that has begun by half a frame later, unless it \
+                    has ended half a frame before. `word_times` are the seconds since its start and until its end, at \
+                    least 0, or 0 without a word.";
+        facts.push(("words", text.to_owned()));
+    }
+    let channels = &metadata.normalisation.channels;
+    let names = channels.iter().map(|of| serde_json::to_value(of.channel)).collect::<serde_json::Result<Vec<_>>>()?;
+    if !names.is_empty() {
+        facts.push(("angles", format!("3 angles in radians for each of {}", serde_json::to_string(&names)?)));
+    }
+    Ok(facts)
 }
 
-/// Metadata of every file.
-fn common_facts(checkpoint: &Path, name: &str, fps: FrameRate) -> Result<Vec<(&'static str, String)>> {
-    Ok(vec![
-        ("program", format!("orator {}", env!("CARGO_PKG_VERSION"))),
-        ("checkpoint_blake3", hash_file(checkpoint)?),
-        ("speaker", name.to_owned()),
-        ("frame_rate", format!("{}/{}", fps.num, fps.den)),
-    ])
+fn sequence(speaker: &SequenceGenerator, out: &Path, carry_state: bool, facts: &[Fact]) -> Result<Vec<PathBuf>> {
+    let metadata = &speaker.metadata;
+    let PoseFormat::Joints { normalisation, representation } = &metadata.poses else {
+        bail!(
+            "the model of {} animates the BVH skeleton that it was trained on, whose joints the ONNX file cannot have: \
+             train on a dataset of 49 joints (`orator import`), or use `orator generate --out motion.bvh`",
+            metadata.name
+        )
+    };
+    let [front_end, decoder] = ["mel.onnx", "joints.onnx"].map(|extension| out.with_extension(extension));
+    let sizes = &metadata.network;
+    let text = "Mel-frequency cepstra of the poses, with silence around the sound, for complete segments. `frames` is the \
+                number of pose frames of the sound.";
+    let cepstra: GraphPort = ("cepstra", F32, &format!("1,cepstra_frames,{N_CEPSTRA}"));
+    let graph = cepstra::front_end(metadata)?;
+    let about = [("description", text.to_owned())];
+    write(&front_end, graph, (&[SAMPLES], &[cepstra, FRAMES]), &[facts, &about].concat())?;
+
+    let is_carried = speaker.seams(carry_state) == StateAtSeams::Carried;
+    let mut graph = NetworkGraph::new(speaker.tensors());
+    sequence::add_network(&mut graph, metadata, is_carried)?;
+    let of_segment = format!("1,{},{N_CEPSTRA}", sizes.audio_frames());
+    let [previous, predicted] = [sizes.previous, sizes.predicted].map(|n| format!("1,{n},{}", sizes.pose));
+    let (words, state) = (format!("{},words", sizes.predicted), format!("1,{}", sizes.hidden));
+    let mut inputs = vec![("cepstra", F32, &*of_segment), ("previous", F32, &*previous)];
+    let mut outputs = vec![("poses", F32, &*predicted), ("next", F32, &*previous)];
+    inputs.extend(match metadata.architecture {
+        Architecture::Contextual => Some(("words", I64, &*words)),
+        Architecture::Words => Some(("words", I64, "1,words")),
+        Architecture::Audio | Architecture::Adversarial | Architecture::Autoencoder => None,
+    });
+    if is_carried {
+        inputs.extend([("segment", I64, "1"), ("state", F32, &*state)]);
+        outputs.push(("next_state", F32, &*state));
+    }
+    let about = [("segment_frames", sizes.predicted.to_string()), ("description", segment_text(speaker, is_carried))];
+    write(out, graph, (&inputs, &outputs), &[facts, &about].concat())?;
+
+    let mut graph = NetworkGraph::new(Default::default());
+    let smoothed = joints::smoothed(&mut graph, "poses")?;
+    joints::add_joints(&mut graph, &smoothed, representation, normalisation)?;
+    let text = "The poses of all segments, shortened to `frames`, are smoothed and converted to joints.";
+    let about = [joint_facts(), vec![("description", text.to_owned())]].concat();
+    let poses = format!("frames,{}", sizes.pose);
+    write(&decoder, graph, (&[("poses", F32, &poses)], &[("joints", F32, JOINTS)]), &[facts, &about].concat())?;
+    Ok(vec![front_end, out.to_owned(), decoder])
 }
+
+/// How to run a sequence network.
+fn segment_text(speaker: &SequenceGenerator, is_carried: bool) -> String {
+    let n = speaker.metadata.network.predicted;
+    let mut text = format!(
+        "Run segment by segment: segment k reads the cepstra from row {n} k on, and as `previous` the output `next` of the \
+         segment before, zeros at first."
+    );
+    if is_carried {
+        text += " `segment` is k, and `state` the output `next_state` of the segment before.";
+    }
+    match speaker.metadata.architecture {
+        Architecture::Contextual => {
+            text += " Row t of `words` has the words within 1.5 s around pose t, padded at the end with 0.";
+        }
+        Architecture::Words => {
+            let around = speaker.metadata.words_around_secs;
+            text += &format!(" `words` are those from {around} s before the segment to {around} s after it.");
+        }
+        Architecture::Audio | Architecture::Adversarial | Architecture::Autoencoder => {}
+    }
+    if speaker.reads_words() {
+        text += " Their indices are 1 for a word outside the vocabulary and 2 for its first word; without words one 0.";
+    }
+    text
+}
+
+const SAMPLES: GraphPort = ("samples", F32, "1,samples");
+const FRAMES: GraphPort = ("frames", I64, "1");
+const JOINTS: &str = "frames,49,3";
 
 /// Metadata about the joints.
-fn joint_facts() -> Vec<(&'static str, String)> {
+fn joint_facts() -> Vec<Fact> {
     let list = |of: &dyn Fn(usize) -> String| (0..N_JOINTS).map(of).collect::<Vec<_>>().join(",");
     let parent = |joint: usize| skeleton::parent(joint).map_or("-1".to_owned(), |parent| parent.to_string());
     vec![
@@ -119,26 +184,6 @@ fn joint_facts() -> Vec<(&'static str, String)> {
     ]
 }
 
-/// Metadata of the network of a GAN.
-fn generator_facts(metadata: &SpeakerMetadata) -> Result<Vec<(&'static str, String)>> {
-    let mut facts = joint_facts();
-    let text = "Retain the first `frames` (output of the front end) of the joints: the others belong to the extension.";
-    facts.push(("description", text.to_owned()));
-    if let Some(words) = &metadata.words {
-        facts.push(("vocabulary", serde_json::to_string(words.vocabulary.words())?));
-        let text = format!(
-            "`words` has the index of the word at each of F pose frames, {FRAMES_MULTIPLE} (frames / \
-             {FRAMES_MULTIPLE} + 1) in all: 0 without a word, 1 for a word outside the vocabulary, 2 for its first. The \
-             word is the last that has begun by half a frame later, unless it has ended half a frame before. \
-             `word_times` are the seconds since its start and until its end, at least 0, or 0 without a word."
-        );
-        facts.push(("words", text));
-    }
-    let channels = metadata.normalisation.channels.iter();
-    let channels: Vec<serde_json::Value> =
-        channels.map(|of| serde_json::to_value(of.channel)).collect::<serde_json::Result<_>>()?;
-    if !channels.is_empty() {
-        facts.push(("angles", format!("{}; 3 each, radians", serde_json::to_string(&channels)?)));
-    }
-    Ok(facts)
+fn write(path: &Path, graph: NetworkGraph, ports: (&[GraphPort], &[GraphPort]), facts: &[Fact]) -> Result<()> {
+    write_file(path, &graph.graph.file("gestures", ports.0, ports.1, facts))
 }

@@ -1,10 +1,14 @@
-//! Joints in metres from the features of poses: un-normalisation, bone lengths and forward kinematics.
+//! Joints in metres from the features of poses: un-normalisation, bone lengths and forward kinematics; and
+//! their smoothing.
 
 use super::graph::NetworkGraph;
 use crate::generate::normalisation::{N_FEATURES, Normalisation};
 use crate::generate::representation::Representation;
 use anyhow::Result;
+use orator_base::math::savitzky_golay::SavitzkyGolay;
+use orator_base::math::vec3::Vec3;
 use orator_base::types::skeleton::{N_BONES, N_JOINTS, NECK, is_duplicate, parent};
+use orator_formats::bvh::exponential_maps::SMOOTHING;
 use orator_onnx::convert::AttributeValue;
 
 /// Shortest bone that has a direction, metres.
@@ -90,4 +94,47 @@ fn paths() -> Vec<f32> {
         }
     }
     matrix
+}
+
+/// Smooths `poses` [T, C] over time like `orator_formats::bvh::exponential_maps::smooth`.
+pub fn smoothed(g: &mut NetworkGraph, poses: &str) -> Result<String> {
+    let (half, order) = SMOOTHING;
+    let window = 2 * half + 1;
+    // For every length up to that of the window: the window that fits, and its weights for each position in it.
+    let (mut windows, mut weights) = (Vec::new(), vec![0.0; (window + 1) * window * window]);
+    for n in 0..=window {
+        let half = n.saturating_sub(1) / 2;
+        let fitting = if 2 * half > order { 2 * half + 1 } else { 1 };
+        let filter = SavitzkyGolay::new(half, order.min(2 * half));
+        for k in 0..fitting {
+            let impulse: Vec<Vec3> = (0..fitting).map(|i| [f64::from(u8::from(i == k)), 0.0, 0.0]).collect();
+            for (i, value) in filter.run(&impulse).iter().enumerate() {
+                weights[(n * window + i) * window + k] = value[0] as f32;
+            }
+        }
+        windows.push(fitting as i64);
+    }
+    let n = g.size(poses, 0)?;
+    let length = g.by("Min", &n, window as i64)?;
+    let windows = g.graph.ints(&windows)?;
+    let weights = g.graph.floats(&[window + 1, window, window], &weights)?;
+    let [fitting, weights] = [windows, weights].map(|table| g.op("Gather", &[&table, &length]));
+    let t = g.range(&n)?;
+    let behind = g.by("Div", &fitting, 2)?;
+    let start = g.op("Sub", &[&t, &behind]);
+    let start = g.by("Max", &start, 0)?;
+    let last = g.op("Sub", &[&n, &fitting]);
+    let start = g.op("Min", &[&start, &last]);
+    let place = g.op("Sub", &[&t, &start]);
+    let weights = g.op("Gather", &[&weights, &place]);
+    let weights = g.shaped("Unsqueeze", &weights, &[2])?;
+    let start = g.shaped("Unsqueeze", &start, &[1])?;
+    let offsets = g.graph.ints(&(0..window as i64).collect::<Vec<_>>())?;
+    let at = g.op("Add", &[&start, &offsets]);
+    let end = g.by("Sub", &n, 1)?;
+    let at = g.op("Min", &[&at, &end]);
+    let values = g.op("Gather", &[poses, &at]);
+    let products = g.op("Mul", &[&values, &weights]);
+    let axis = g.graph.ints(&[1])?;
+    Ok(g.graph.op("ReduceSum", &[&products, &axis], &[("keepdims", AttributeValue::Int(0))]))
 }

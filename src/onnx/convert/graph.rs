@@ -33,16 +33,8 @@ pub enum AttributeValue<'a> {
     Ints(&'a [i64]),
 }
 
-/// Size of an axis of an input or output.
-#[derive(Clone, Copy)]
-pub enum Dim<'a> {
-    Size(usize),
-    /// Any size, with the name of the axis.
-    Any(&'a str),
-}
-
-/// Name, element type and axes of an input or output.
-pub type GraphPort<'a> = (&'a str, ElementType, &'a [Dim<'a>]);
+/// Name, element type and axes of an input or output; an axis is a size or, for any size, a name: `1,64,frames`.
+pub type GraphPort<'a> = (&'a str, ElementType, &'a str);
 
 /// First size of an input or output that has one entry per image of a batch of any size.
 pub(crate) const ANY_BATCH: usize = 0;
@@ -206,15 +198,15 @@ impl OnnxGraph {
 
     /// Contents of the model file with these float32 inputs and outputs (name and shape).
     pub fn model(self, inputs: &[(&str, &[usize])], outputs: &[(&str, &[usize])]) -> Vec<u8> {
-        let dim = |dim: &usize| if *dim == ANY_BATCH { Dim::Any(BATCH) } else { Dim::Size(*dim) };
-        let shapes = |ports: &[(&str, &[usize])]| -> Vec<Vec<Dim>> {
-            ports.iter().map(|(_, dims)| dims.iter().map(dim).collect()).collect()
+        let axis = |dim: &usize| if *dim == ANY_BATCH { BATCH.to_owned() } else { dim.to_string() };
+        let axes = |ports: &[(&str, &[usize])]| -> Vec<String> {
+            ports.iter().map(|(_, dims)| dims.iter().map(axis).collect::<Vec<_>>().join(",")).collect()
         };
-        let (of_inputs, of_outputs) = (shapes(inputs), shapes(outputs));
+        let (of_inputs, of_outputs) = (axes(inputs), axes(outputs));
         let inputs: Vec<GraphPort> =
-            inputs.iter().zip(&of_inputs).map(|((name, _), dims)| (*name, ElementType::F32, &dims[..])).collect();
+            inputs.iter().zip(&of_inputs).map(|((name, _), axes)| (*name, ElementType::F32, &**axes)).collect();
         let outputs: Vec<GraphPort> =
-            outputs.iter().zip(&of_outputs).map(|((name, _), dims)| (*name, ElementType::F32, &dims[..])).collect();
+            outputs.iter().zip(&of_outputs).map(|((name, _), axes)| (*name, ElementType::F32, &**axes)).collect();
         self.file("pose", &inputs, &outputs, &[])
     }
 
@@ -224,7 +216,7 @@ impl OnnxGraph {
         title: &str,
         inputs: &[GraphPort],
         outputs: &[GraphPort],
-        metadata: &[(String, String)],
+        metadata: &[(&str, String)],
     ) -> Vec<u8> {
         let mut graph = self.nodes;
         bytes(&mut graph, 2, title.as_bytes());
@@ -278,13 +270,13 @@ fn attribute(name: &str, value: AttributeValue) -> Vec<u8> {
 }
 
 /// Declaration of an input or output.
-fn port((name, element, dims): GraphPort) -> Vec<u8> {
+fn port((name, element, axes): GraphPort) -> Vec<u8> {
     let (mut shape, mut tensor, mut kind, mut port) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
-    for dim in dims {
+    for axis in axes.split(',') {
         let mut size = Vec::new();
-        match dim {
-            Dim::Size(n) => number(&mut size, 1, *n as i64),
-            Dim::Any(name) => bytes(&mut size, 2, name.as_bytes()),
+        match axis.parse() {
+            Ok(n) => number(&mut size, 1, n),
+            Err(_) => bytes(&mut size, 2, axis.as_bytes()),
         }
         bytes(&mut shape, 1, &size);
     }
