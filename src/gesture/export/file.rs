@@ -61,8 +61,8 @@ fn gan(checkpoint: &Path, choice: &GenerationChoice, out: &Path, facts: &[Fact])
     let graph = mels::front_end(metadata.fps)?;
     write(&front_end, graph, (&[SAMPLES], &[mels, FRAMES]), &[facts, &about].concat())?;
 
-    let mut graph = NetworkGraph::new(contents.part(GENERATOR));
-    gan::add_generator(&mut graph, &metadata)?;
+    let graph = NetworkGraph::new(contents.part(GENERATOR));
+    gan::add_generator(&graph, &metadata)?;
     let (mut inputs, mut outputs) = (vec![mels], vec![("joints", F32, JOINTS)]);
     if metadata.words.is_some() {
         inputs.extend([("words", I64, "1,frames"), ("word_times", F32, "1,frames,2")]);
@@ -114,8 +114,8 @@ fn sequence(speaker: &SequenceGenerator, out: &Path, carry_state: bool, facts: &
     write(&front_end, graph, (&[SAMPLES], &[cepstra, FRAMES]), &[facts, &about].concat())?;
 
     let is_carried = speaker.seams(carry_state) == StateAtSeams::Carried;
-    let mut graph = NetworkGraph::new(speaker.tensors());
-    sequence::add_network(&mut graph, metadata, is_carried)?;
+    let graph = NetworkGraph::new(speaker.tensors());
+    sequence::add_network(&graph, metadata, is_carried)?;
     let of_segment = format!("1,{},{N_CEPSTRA}", sizes.audio_frames());
     let [previous, predicted] = [sizes.previous, sizes.predicted].map(|n| format!("1,{n},{}", sizes.pose));
     let (words, state) = (format!("{},words", sizes.predicted), format!("1,{}", sizes.hidden));
@@ -133,9 +133,9 @@ fn sequence(speaker: &SequenceGenerator, out: &Path, carry_state: bool, facts: &
     let about = [("segment_frames", sizes.predicted.to_string()), ("description", segment_text(speaker, is_carried))];
     write(out, graph, (&inputs, &outputs), &[facts, &about].concat())?;
 
-    let mut graph = NetworkGraph::new(Default::default());
-    let smoothed = joints::smoothed(&mut graph, "poses")?;
-    joints::add_joints(&mut graph, &smoothed, representation, normalisation)?;
+    let graph = NetworkGraph::new(Default::default());
+    let smoothed = joints::smoothed(&graph, "poses")?;
+    joints::add_joints(&graph, &smoothed, representation, normalisation)?;
     let text = "The poses of all segments, shortened to `frames`, are smoothed and converted to joints.";
     let about = [joint_facts(), vec![("description", text.to_owned())]].concat();
     let poses = format!("frames,{}", sizes.pose);
@@ -185,5 +185,5 @@ fn joint_facts() -> Vec<Fact> {
 }
 
 fn write(path: &Path, graph: NetworkGraph, ports: (&[GraphPort], &[GraphPort]), facts: &[Fact]) -> Result<()> {
-    write_file(path, &graph.graph.file("gestures", ports.0, ports.1, facts))
+    write_file(path, &graph.into_inner().file("gestures", ports.0, ports.1, facts))
 }

@@ -7,6 +7,7 @@ use crate::generate::normalisation::N_FEATURES;
 use anyhow::Result;
 use orator_base::audio::mel::HOP;
 use orator_base::types::sound::SAMPLE_RATE;
+use orator_base::types::time::FrameRate;
 use orator_nn::gan::generator::{Config, EPS, FRAMES_MULTIPLE, Preset, SLOPE};
 use orator_nn::gan::speaker_layer::{SPEAKER_EMBEDDING, SPEAKER_WEIGHT};
 use orator_nn::gan::words::WORDS;
@@ -15,69 +16,54 @@ use orator_onnx::convert::{AttributeValue, ElementType};
 
 /// Adds the network from `mels` [1, 64, T] (and `words` [1, F], `word_times` [1, F, 2]) to `joints` [F, 49, 3] and, if it
 /// was trained on them, `angles` [F, 3 per channel].
-pub fn add_generator(g: &mut NetworkGraph, metadata: &SpeakerMetadata) -> Result<()> {
+pub fn add_generator(g: &NetworkGraph, metadata: &SpeakerMetadata) -> Result<()> {
     let network = &metadata.network;
-    let encoded = encoded(g, network)?;
-    let n_frames = n_frames(g, metadata)?;
-    let mut x = interpolated(g, &encoded, &n_frames)?;
-    for name in ["enter.0", "enter.1"] {
-        x = block(g, name, &x, 1, true)?;
-    }
+    let x = interpolated(g, &encoded(g, network)?, &n_frames(g, metadata.fps)?)?;
+    let mut x = blocks(g, "enter", x)?;
     let mut skips = Vec::new();
-    for level in 0.. {
-        if g.tensor(&format!("down.{level}.conv.weight")).is_err() {
-            break;
-        }
-        let down = block(g, &format!("down.{level}"), &x, 2, true)?;
+    while g.has_tensor(&format!("down.{}.conv.weight", skips.len())) {
+        let down = block(g, &format!("down.{}", skips.len()), &x, 2, true)?;
         skips.push(std::mem::replace(&mut x, down));
     }
     for (level, skip) in skips.iter().rev().enumerate() {
         let once = g.shaped("Unsqueeze", &x, &[3])?;
-        let twice = g.along("Concat", &[&once, &once], 3);
-        let doubled = g.shaped("Reshape", &twice, &[1, network.width as i64, -1])?;
-        let sum = g.op("Add", &[&doubled, skip]);
-        x = block(g, &format!("up.{level}"), &sum, 1, true)?;
+        let twice = g.shaped("Reshape", &g.along("Concat", &[&once, &once], 3), &[1, network.width as i64, -1])?;
+        x = block(g, &format!("up.{level}"), &g.op("Add", &[&twice, skip]), 1, true)?;
     }
-    for layer in 0..4 {
-        x = block(g, &format!("decoder.{layer}"), &x, 1, true)?;
-    }
+    x = blocks(g, "decoder", x)?;
     if network.vocabulary > 0 {
-        let words = words(g)?;
-        x = g.op("Add", &[&x, &words]);
+        let vectors = g.op("Gather", &[&g.weight(&table_name(WORDS))?, "words"]);
+        let spoken = g.transposed(&g.along("Concat", &[&vectors, "word_times"], 2), &[0, 2, 1]);
+        x = g.op("Add", &[&x, &layer(g, &format!("{WORDS}.output"), &spoken)?]);
     }
-    let features = layer(g, "last", &x)?;
-    let features = g.shaped("Squeeze", &features, &[0])?;
-    let features = g.transposed(&features, &[1, 0]);
-    let n_joint_features = N_FEATURES as i64;
-    let of_joints = g.slice(&features, 1, [0, n_joint_features])?;
+    let features = g.transposed(&g.shaped("Squeeze", &layer(g, "last", &x)?, &[0])?, &[1, 0]);
+    let of_joints = g.slice(&features, 1, [0, N_FEATURES as i64])?;
     add_joints(g, &of_joints, &metadata.representation, &metadata.normalisation)?;
     let channels = &metadata.normalisation.channels;
     if !channels.is_empty() {
-        let of_channels = g.slice(&features, 1, [n_joint_features, 0])?;
-        let std: Vec<f32> = channels.iter().flat_map(|channel| channel.std).collect();
         // Angles that were never visible are NaN.
+        let std: Vec<f32> = channels.iter().flat_map(|channel| channel.std).collect();
         let mean = channels.iter().flat_map(|channel| channel.mean).zip(&std);
         let mean: Vec<f32> = mean.map(|(mean, std)| if *std == 0.0 { f32::NAN } else { mean }).collect();
-        let [std, mean] = [g.graph.floats(&[std.len()], &std)?, g.graph.floats(&[mean.len()], &mean)?];
-        let scaled = g.op("Mul", &[&of_channels, &std]);
-        g.graph.output("angles", "Add", &[&scaled, &mean], &[]);
+        let of_channels = g.slice(&features, 1, [N_FEATURES as i64, 0])?;
+        let scaled = g.op("Mul", &[&of_channels, &g.floats(&[std.len()], &std)?]);
+        g.output("angles", "Add", &[&scaled, &g.floats(&[mean.len()], &mean)?]);
     }
     Ok(())
 }
 
 /// Audio encoder and speaker layer: [1, width, about T / 8].
-fn encoded(g: &mut NetworkGraph, network: &Config) -> Result<String> {
+fn encoded(g: &NetworkGraph, network: &Config) -> Result<String> {
+    let is_paper = network.preset == Preset::Paper;
     let mut x = "mels".to_owned();
-    if network.preset == Preset::Paper {
-        let time_first = g.transposed(&x, &[0, 2, 1]);
-        x = g.shaped("Unsqueeze", &time_first, &[1])?;
+    if is_paper {
+        x = g.shaped("Unsqueeze", &g.transposed(&x, &[0, 2, 1]), &[1])?;
     }
     for i in 0..7 {
         x = block(g, &format!("front.{i}"), &x, 1 + i % 2, true)?;
     }
-    if network.preset == Preset::Paper {
-        x = block(g, "front.7", &x, 1, false)?;
-        x = g.shaped("Squeeze", &x, &[3])?;
+    if is_paper {
+        x = g.shaped("Squeeze", &block(g, "front.7", &x, 1, false)?, &[3])?;
     }
     if network.n_speakers == 0 {
         return Ok(x);
@@ -91,86 +77,68 @@ fn encoded(g: &mut NetworkGraph, network: &Config) -> Result<String> {
 }
 
 /// Number of pose frames that a spectrogram of T frames covers, rounded to a multiple of 32.
-fn n_frames(g: &mut NetworkGraph, metadata: &SpeakerMetadata) -> Result<String> {
-    let (multiple, fps) = (FRAMES_MULTIPLE as i64, metadata.fps);
-    let n_mel_frames = g.size("mels", 2)?;
-    let per_mel_frame = 2 * HOP as i64 * i64::from(fps.num);
-    let per_block = multiple * i64::from(fps.den) * i64::from(SAMPLE_RATE);
-    let blocks = g.by("Mul", &n_mel_frames, per_mel_frame)?;
-    let blocks = g.by("Add", &blocks, per_block)?;
-    let blocks = g.by("Div", &blocks, 2 * per_block)?;
-    let blocks = g.by("Max", &blocks, 1)?;
-    g.by("Mul", &blocks, multiple)
+fn n_frames(g: &NetworkGraph, fps: FrameRate) -> Result<String> {
+    let block = FRAMES_MULTIPLE as i64;
+    let (per_mel_frame, per_block) =
+        (HOP as i64 * i64::from(fps.num), block * i64::from(fps.den) * i64::from(SAMPLE_RATE));
+    let steps = [("Mul", 2 * per_mel_frame), ("Add", per_block), ("Div", 2 * per_block), ("Max", 1), ("Mul", block)];
+    g.chain(&g.size("mels", 2)?, &steps)
 }
 
 /// Linear interpolation over time, in integers as far as possible: frame i of F is at i * T / F.
-fn interpolated(g: &mut NetworkGraph, x: &str, n_frames: &str) -> Result<String> {
+fn interpolated(g: &NetworkGraph, x: &str, n_frames: &str) -> Result<String> {
     let n = g.size(x, 2)?;
-    let index = g.range(n_frames)?;
-    let at = g.op("Mul", &[&index, &n]);
+    let at = g.op("Mul", &[&g.range(n_frames)?, &n]);
     let before = g.op("Div", &[&at, n_frames]);
-    let rest = g.op("Mul", &[&before, n_frames]);
-    let rest = g.op("Sub", &[&at, &rest]);
-    let [rest, n_frames] = [rest.as_str(), n_frames].map(|value| g.cast(value, ElementType::F32));
-    let share = g.op("Div", &[&rest, &n_frames]);
-    let last = g.by("Sub", &n, 1)?;
-    let after = g.by("Add", &before, 1)?;
-    let after = g.op("Min", &[&after, &last]);
+    let rest = g.op("Sub", &[&at, &g.op("Mul", &[&before, n_frames])]);
+    let share = g.op("Div", &[&g.cast(&rest, ElementType::F32), &g.cast(n_frames, ElementType::F32)]);
+    let after = g.op("Min", &[&g.chain(&before, &[("Add", 1)])?, &g.chain(&n, &[("Sub", 1)])?]);
     let [before, after] = [before, after].map(|at| g.along("Gather", &[x, &at], 2));
-    let step = g.op("Sub", &[&after, &before]);
-    let step = g.op("Mul", &[&step, &share]);
-    Ok(g.op("Add", &[&before, &step]))
-}
-
-/// Words to the input of the last layer, [1, width, F].
-fn words(g: &mut NetworkGraph) -> Result<String> {
-    let table = g.weight(&table_name(WORDS))?;
-    let vectors = g.op("Gather", &[&table, "words"]);
-    let spoken = g.along("Concat", &[&vectors, "word_times"], 2);
-    let spoken = g.transposed(&spoken, &[0, 2, 1]);
-    layer(g, &format!("{WORDS}.output"), &spoken)
+    Ok(g.op("Add", &[&before, &g.op("Mul", &[&g.op("Sub", &[&after, &before]), &share])]))
 }
 
 /// Convolution with padding, without batch norm.
-fn layer(g: &mut NetworkGraph, name: &str, x: &str) -> Result<String> {
-    let (dims, weight) = g.tensor(&format!("{name}.weight"))?;
-    let (_, bias) = g.tensor(&format!("{name}.bias"))?;
+fn layer(g: &NetworkGraph, name: &str, x: &str) -> Result<String> {
+    let ((dims, weight), (_, bias)) = (g.tensor(&format!("{name}.weight"))?, g.tensor(&format!("{name}.bias"))?);
     conv(g, x, (&dims, &weight), &bias, 1, true)
 }
 
+/// Blocks `<name>.0`, `<name>.1`, ... that preserve the frame rate.
+fn blocks(g: &NetworkGraph, name: &str, x: String) -> Result<String> {
+    let names = (0..).map(|i| format!("{name}.{i}")).take_while(|name| g.has_tensor(&format!("{name}.conv.weight")));
+    names.into_iter().try_fold(x, |x, name| block(g, &name, &x, 1, true))
+}
+
 /// Convolution, batch norm and leaky ReLU.
-fn block(g: &mut NetworkGraph, name: &str, x: &str, stride: usize, is_padded: bool) -> Result<String> {
-    let (dims, mut weight) = g.tensor(&format!("{name}.conv.weight"))?;
-    let of = |part: &str| g.tensor(&format!("{name}.{part}")).map(|(_, values)| values);
-    let (mut bias, gain, shift) = (of("conv.bias")?, of("norm.weight")?, of("norm.bias")?);
-    let (mean, variance) = (of("norm.running_mean")?, of("norm.running_var")?);
-    let n_inputs = (weight.len() / bias.len().max(1)).max(1);
-    for (channel, weights) in weight.chunks_mut(n_inputs).enumerate() {
+fn block(g: &NetworkGraph, name: &str, x: &str, stride: usize, is_padded: bool) -> Result<String> {
+    let of = |part: &str| g.tensor(&format!("{name}.{part}"));
+    let ((dims, mut weight), (_, mut bias)) = (of("conv.weight")?, of("conv.bias")?);
+    let ((_, gain), (_, shift)) = (of("norm.weight")?, of("norm.bias")?);
+    let ((_, mean), (_, variance)) = (of("norm.running_mean")?, of("norm.running_var")?);
+    for (channel, weights) in weight.chunks_mut(dims[1..].iter().product()).enumerate() {
         let scale = f64::from(gain[channel]) / (f64::from(variance[channel]) + EPS).sqrt();
         weights.iter_mut().for_each(|weight| *weight = (f64::from(*weight) * scale) as f32);
         let centred = f64::from(bias[channel]) - f64::from(mean[channel]);
         bias[channel] = (centred * scale + f64::from(shift[channel])) as f32;
     }
     let x = conv(g, x, (&dims, &weight), &bias, stride, is_padded)?;
-    Ok(g.graph.op("LeakyRelu", &[&x], &[("alpha", AttributeValue::Float(SLOPE as f32))]))
+    Ok(g.with("LeakyRelu", &[&x], &[("alpha", AttributeValue::Float(SLOPE as f32))]))
 }
 
-/// Convolution over one axis or two. A last zero of the padding that TensorFlow would omit is never read.
+/// Convolution over one axis or two. TensorFlow omits the last zero of the padding if it is not read.
 fn conv(
-    g: &mut NetworkGraph,
+    g: &NetworkGraph,
     x: &str,
     (dims, weight): (&[usize], &[f32]),
     bias: &[f32],
     stride: usize,
     is_padded: bool,
 ) -> Result<String> {
-    let weight = g.graph.floats(dims, weight)?;
-    let bias = g.graph.floats(&[bias.len()], bias)?;
-    let before = |kernel: &usize| if is_padded { (kernel.saturating_sub(stride) / 2) as i64 } else { 0 };
+    let before = |kernel: &usize| if is_padded { ((kernel - stride) / 2) as i64 } else { 0 };
     let after = |kernel: &usize| if is_padded { *kernel as i64 - 1 - before(kernel) } else { 0 };
     let kernel = &dims[2..];
     let pads: Vec<i64> = kernel.iter().map(before).chain(kernel.iter().map(after)).collect();
     let strides = vec![stride as i64; kernel.len()];
     let attributes = [("pads", AttributeValue::Ints(&pads)), ("strides", AttributeValue::Ints(&strides))];
-    Ok(g.graph.op("Conv", &[x, &weight, &bias], &attributes))
+    Ok(g.with("Conv", &[x, &g.floats(dims, weight)?, &g.floats(&[bias.len()], bias)?], &attributes))
 }

@@ -16,83 +16,56 @@ const PARTS: usize = WINDOW.div_ceil(HOP);
 
 /// Front end from `samples` [1, N] at 16 kHz to `mels` [1, 64, T] and the number of pose frames, `frames` [1].
 pub fn front_end(fps: FrameRate) -> Result<NetworkGraph> {
-    let mut graph = NetworkGraph::new(Default::default());
-    let g = &mut graph;
+    let g = NetworkGraph::new(Default::default());
     let n = g.size("samples", 1)?;
     let frames = g.pose_frames(&n, fps, SAMPLE_RATE)?;
-    let one = g.graph.ints(&[1])?;
-    g.graph.output("frames", "Reshape", &[&frames, &one], &[]);
-    let multiple = FRAMES_MULTIPLE as i64;
-    let padded = g.by("Div", &frames, multiple)?;
-    let padded = g.by("Add", &padded, 1)?;
-    // First sample after the padded frames, rounded to the nearest integer, and the nearest hop.
-    let (num, den) = (i64::from(fps.num), i64::from(fps.den));
-    let end = g.by("Mul", &padded, multiple * 2 * den * i64::from(SAMPLE_RATE))?;
-    let end = g.by("Add", &end, num)?;
-    let end = g.by("Div", &end, 2 * num)?;
-    let end = g.by("Add", &end, HOP as i64 / 2)?;
-    let n_mel_frames = g.by("Div", &end, HOP as i64)?;
-    let n_hops = g.by("Add", &n_mel_frames, PARTS as i64 - 1)?;
-    let n_extended = g.by("Mul", &n_hops, HOP as i64)?;
-    let sound = mirrored(g, &n, &n_extended)?;
-    let hops = g.shaped("Reshape", &sound, &[-1, HOP as i64])?;
-    let hops = g.cast(&hops, ElementType::F64);
-    add_spectrogram(g, &hops)?;
-    Ok(graph)
+    let (num, den, hop, block) = (i64::from(fps.num), i64::from(fps.den), HOP as i64, FRAMES_MULTIPLE as i64);
+    let blocks = g.chain(&frames, &[("Div", block), ("Add", 1)])?;
+    // First sample after the blocks, rounded to the nearest integer; the nearest hop; the hops of the windows.
+    let end = g.chain(&blocks, &[("Mul", block * 2 * den * i64::from(SAMPLE_RATE)), ("Add", num), ("Div", 2 * num)])?;
+    let n_hops = g.chain(&end, &[("Add", hop / 2), ("Div", hop), ("Add", PARTS as i64 - 1)])?;
+    // The sound, extended periodically by its mirror image.
+    let last = g.chain(&n, &[("Sub", 1)])?;
+    let period = g.chain(&last, &[("Mul", 2), ("Max", 1)])?;
+    let index = g.op("Mod", &[&g.range(&g.chain(&n_hops, &[("Mul", hop)])?)?, &period]);
+    let at = g.op("Sub", &[&last, &g.op("Abs", &[&g.op("Sub", &[&index, &last])])]);
+    let hops = g.shaped("Reshape", &g.along("Gather", &["samples", &at], 1), &[-1, hop])?;
+    add_spectrogram(&g, &g.cast(&hops, ElementType::F64))?;
+    Ok(g)
 }
 
-/// The sound with `n` samples, extended periodically by its mirror image to `n_extended`.
-fn mirrored(g: &mut NetworkGraph, n: &str, n_extended: &str) -> Result<String> {
-    let last = g.by("Sub", n, 1)?;
-    let period = g.by("Mul", &last, 2)?;
-    let period = g.by("Max", &period, 1)?;
-    let index = g.range(n_extended)?;
-    let index = g.op("Mod", &[&index, &period]);
-    let away = g.op("Sub", &[&index, &last]);
-    let away = g.op("Abs", &[&away]);
-    let at = g.op("Sub", &[&last, &away]);
-    Ok(g.along("Gather", &["samples", &at], 1))
-}
-
-/// Spectrogram of the windows that begin at each of the `hops` [n, 160] but the last ones.
-fn add_spectrogram(g: &mut NetworkGraph, hops: &str) -> Result<()> {
+/// Adds the output `mels` for the windows that begin at each of the `hops` [n, 160] but the last ones.
+fn add_spectrogram(g: &NetworkGraph, hops: &str) -> Result<()> {
     let bands = mel::all_bands();
     // Bins outside all bands are not computed.
     let first = bands.iter().map(|band| band.first).min().unwrap_or(0);
     let end = bands.iter().map(|band| band.first + band.weights.len()).max().unwrap_or(0);
     let (n_bins, window) = (end - first, hann(WINDOW));
-    let mut sums: Option<String> = None;
-    for part in 0..PARTS {
-        let basis = (part * HOP..(part + 1) * HOP).flat_map(|i| {
-            let weight = window.get(i).copied().map_or(0.0, f64::from);
-            let angle = move |bin: usize| TAU * ((i * bin) % FFT) as f64 / FFT as f64;
-            let cosines = (first..end).map(move |bin| weight * angle(bin).cos());
-            cosines.chain((first..end).map(move |bin| weight * angle(bin).sin()))
-        });
-        let basis = g.doubles(&[HOP, 2 * n_bins], &basis.collect::<Vec<_>>())?;
-        let hops = g.slice(hops, 0, [part as i64, part as i64 + 1 - PARTS as i64])?;
-        let products = g.op("MatMul", &[&hops, &basis]);
-        sums = Some(sums.map_or(products.clone(), |sums| g.op("Add", &[&sums, &products])));
+    let mut power: Option<String> = None;
+    for wave in [f64::cos, f64::sin] {
+        let mut sums: Option<String> = None;
+        for part in 0..PARTS {
+            let basis = (part * HOP..(part + 1) * HOP).flat_map(|i| {
+                let weight = window.get(i).copied().map_or(0.0, f64::from);
+                (first..end).map(move |bin| weight * wave(TAU * ((i * bin) % FFT) as f64 / FFT as f64))
+            });
+            let hops = g.slice(hops, 0, [part as i64, (part + 1) as i64 - PARTS as i64])?;
+            let products = g.op("MatMul", &[&hops, &g.doubles(&[HOP, n_bins], basis)?]);
+            sums = Some(sums.map_or(products.clone(), |sums| g.op("Add", &[&sums, &products])));
+        }
+        let sums = sums.unwrap_or_default();
+        let squares = g.op("Mul", &[&sums, &sums]);
+        power = Some(power.map_or(squares.clone(), |power| g.op("Add", &[&power, &squares])));
     }
-    let sums = sums.unwrap_or_default();
-    let squares = g.op("Mul", &[&sums, &sums]);
-    let real = g.slice(&squares, 1, [0, n_bins as i64])?;
-    let imaginary = g.slice(&squares, 1, [n_bins as i64, 0])?;
-    let power = g.op("Add", &[&real, &imaginary]);
-    let magnitudes = g.op("Sqrt", &[&power]);
     let mut weights = vec![0.0; n_bins * N_MELS];
     for (column, band) in bands.iter().enumerate() {
         let rows = band.weights.iter().zip(band.first - first..);
         rows.for_each(|(weight, row)| weights[row * N_MELS + column] = f64::from(*weight));
     }
-    let weights = g.doubles(&[n_bins, N_MELS], &weights)?;
-    let floor = g.doubles(&[], &[f64::from(FLOOR)])?;
-    let mels = g.op("MatMul", &[&magnitudes, &weights]);
-    let mels = g.op("Add", &[&mels, &floor]);
-    let mels = g.op("Log", &[&mels]);
-    let mels = g.cast(&mels, ElementType::F32);
-    let mels = g.transposed(&mels, &[1, 0]);
-    let batch = g.graph.ints(&[0])?;
-    g.graph.output("mels", "Unsqueeze", &[&mels, &batch], &[]);
+    let magnitudes = g.op("Sqrt", &[&power.unwrap_or_default()]);
+    let mels = g.op("MatMul", &[&magnitudes, &g.doubles(&[n_bins, N_MELS], weights)?]);
+    let logs = g.op("Log", &[&g.op("Add", &[&mels, &g.double(f64::from(FLOOR))?])]);
+    let mels = g.transposed(&g.cast(&logs, ElementType::F32), &[1, 0]);
+    g.output("mels", "Unsqueeze", &[&mels, &g.integers(&[0])?]);
     Ok(())
 }
