@@ -9,7 +9,7 @@ use std::f64::consts::TAU;
 
 /// Front end from `samples` [1, N] to `cepstra` [1, M + context - 1, 26] for M pose frames in complete segments, and the
 /// number of pose frames of the sound, `frames` [1].
-pub fn front_end(metadata: &SequenceMetadata) -> Result<NetworkGraph> {
+pub(super) fn front_end(metadata: &SequenceMetadata) -> Result<NetworkGraph> {
     let g = NetworkGraph::new(Default::default());
     let n = g.size("samples", 1)?;
     let frames = g.pose_frames(&n, metadata.fps, metadata.rate)?;

@@ -16,7 +16,7 @@ use orator_onnx::convert::{AttributeValue, ElementType};
 
 /// Adds the network from `mels` [1, 64, T] (and `words` [1, F], `word_times` [1, F, 2]) to `joints` [F, 49, 3] and, if it
 /// was trained on them, `angles` [F, 3 per channel].
-pub fn add_generator(g: &NetworkGraph, metadata: &SpeakerMetadata) -> Result<()> {
+pub(super) fn add_generator(g: &NetworkGraph, metadata: &SpeakerMetadata) -> Result<()> {
     let network = &metadata.network;
     let x = interpolated(g, &encoded(g, network)?, &n_frames(g, metadata.fps)?)?;
     let mut x = blocks(g, "enter", x)?;

@@ -12,7 +12,7 @@ use orator_formats::bvh::exponential_maps::SMOOTHING;
 const MIN_LENGTH: f32 = 1e-9;
 
 /// Adds the output `joints` [T, 49, 3] for features [T, 144], as `SpeakerMetadata::motion` computes them.
-pub fn add_joints(
+pub(super) fn add_joints(
     g: &NetworkGraph,
     features: &str,
     representation: &Representation,
@@ -72,7 +72,7 @@ fn paths() -> Vec<f32> {
 }
 
 /// Smooths `poses` [T, C] over time like `orator_formats::bvh::exponential_maps::smooth`.
-pub fn smoothed(g: &NetworkGraph, poses: &str) -> Result<String> {
+pub(super) fn smoothed(g: &NetworkGraph, poses: &str) -> Result<String> {
     let (half, order) = SMOOTHING;
     let window = 2 * half + 1;
     // For every length up to that of the window: the window that fits, and its weights for each position in it.

@@ -15,7 +15,7 @@ use std::f64::consts::TAU;
 const PARTS: usize = WINDOW.div_ceil(HOP);
 
 /// Front end from `samples` [1, N] at 16 kHz to `mels` [1, 64, T] and the number of pose frames, `frames` [1].
-pub fn front_end(fps: FrameRate) -> Result<NetworkGraph> {
+pub(super) fn front_end(fps: FrameRate) -> Result<NetworkGraph> {
     let g = NetworkGraph::new(Default::default());
     let n = g.size("samples", 1)?;
     let frames = g.pose_frames(&n, fps, SAMPLE_RATE)?;

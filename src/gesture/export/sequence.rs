@@ -12,7 +12,7 @@ use orator_onnx::convert::AttributeValue;
 /// [1, previous, C] and, if it reads them, its `words`, to its `poses` [1, predicted, C] and the previous poses of the
 /// next segment, `next` [1, previous, C]. `is_carried`: also from the number of the `segment` [1] and the `state` [1, H]
 /// of the segment before, which segment 0 ignores, to the `next_state`.
-pub fn add_network(g: &NetworkGraph, metadata: &SequenceMetadata, is_carried: bool) -> Result<()> {
+pub(super) fn add_network(g: &NetworkGraph, metadata: &SequenceMetadata, is_carried: bool) -> Result<()> {
     let audio = g.shaped("Squeeze", "cepstra", &[0])?;
     let poses = match metadata.architecture {
         Architecture::Autoencoder => autoencoder(g, metadata, &audio)?,
