@@ -16,11 +16,7 @@ pub fn run(given: &Path, choice: &GenerationChoice, out: &Path, carry_state: boo
     if checkpoint != *given {
         ui.say(&format!("checkpoint {}", checkpoint.display()));
     }
-    ensure!(
-        !is_same_file(out, &checkpoint),
-        "output {} is the checkpoint; choose another path",
-        out.display()
-    );
+    ensure!(!is_same_file(out, &checkpoint), "output {} is the checkpoint; choose another path", out.display());
     let _lock = model_lock(&checkpoint)?;
     let files = export::export(&checkpoint, choice, out, carry_state)?;
     let names: Vec<String> = files.iter().map(|file| file.display().to_string()).collect();

@@ -31,7 +31,7 @@ pub(super) fn front_end(metadata: &SequenceMetadata) -> Result<NetworkGraph> {
 /// Cepstra every 10 ms, [rows, 26], of `n` samples.
 fn rows(g: &NetworkGraph, n: &str, rate: u32) -> Result<String> {
     let [length, step] = mfcc::window_and_hop(rate).map(|n| n as i64);
-    let sound = g.cast(&g.shaped("Squeeze", "samples", &[0])?, ElementType::F64);
+    let sound = g.cast(&g.reshaped("Squeeze", "samples", &[0])?, ElementType::F64);
     let sound = g.op("Mul", &[&sound, &g.double(FULL_SCALE)?]);
     let zero = g.doubles(&[1], [0.0])?;
     let before = g.along("Concat", &[&zero, &g.slice(&sound, 0, [0, -1])?], 0);
@@ -39,7 +39,7 @@ fn rows(g: &NetworkGraph, n: &str, rate: u32) -> Result<String> {
     // Samples after the end are zero.
     let padded = g.along("Concat", &[&emphasised, &zero], 0);
     let n_rows = g.chain(n, &[("Add", step - 1 - length), ("Div", step), ("Max", 0), ("Add", 1)])?;
-    let starts = g.shaped("Unsqueeze", &g.chain(&g.range(&n_rows)?, &[("Mul", step)])?, &[1])?;
+    let starts = g.reshaped("Unsqueeze", &g.chain(&g.range(&n_rows)?, &[("Mul", step)])?, &[1])?;
     let offsets = g.integers(&(0..length).collect::<Vec<_>>())?;
     let at = g.op("Min", &[&g.op("Add", &[&starts, &offsets]), n]);
     cepstra(g, &g.along("Gather", &[&padded, &at], 0), length as usize, rate)
@@ -77,7 +77,7 @@ fn cepstra(g: &NetworkGraph, windows: &str, length: usize, rate: u32) -> Result<
 /// Means [frames, 26] over `per_pose` rows each, where rows at the edges of a pose count partly and the last row is
 /// repeated after the end.
 fn means(g: &NetworkGraph, rows: &str, frames: &str, per_pose: f64) -> Result<String> {
-    let index = g.cast(&g.shaped("Unsqueeze", &g.range(frames)?, &[1])?, ElementType::F64);
+    let index = g.cast(&g.reshaped("Unsqueeze", &g.range(frames)?, &[1])?, ElementType::F64);
     let (one, length) = (g.double(1.0)?, g.double(per_pose)?);
     let start = g.op("Mul", &[&index, &length]);
     let end = g.op("Mul", &[&g.op("Add", &[&index, &one]), &length]);
@@ -90,5 +90,5 @@ fn means(g: &NetworkGraph, rows: &str, frames: &str, per_pose: f64) -> Result<St
     let last = g.chain(&g.size(rows, 0)?, &[("Sub", 1)])?;
     let at = g.op("Min", &[&g.cast(&from, ElementType::I64), &last]);
     let values = g.along("Gather", &[rows, &at], 0);
-    g.sum(&g.op("Mul", &[&values, &g.shaped("Unsqueeze", &weights, &[2])?]), 1, false)
+    g.sum(&g.op("Mul", &[&values, &g.reshaped("Unsqueeze", &weights, &[2])?]), 1, false)
 }

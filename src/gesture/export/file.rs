@@ -4,7 +4,7 @@ use super::graph::NetworkGraph;
 use super::{cepstra, gan, joints, mels, sequence};
 use crate::generate::model::{GENERATOR, GenerationChoice, SpeakerMetadata, load_with_contents};
 use crate::generate::seq2seq::SequenceGenerator;
-use crate::generate::seq2seq::architecture::Architecture;
+use crate::generate::seq2seq::architecture::{AROUND_POSE_SECS, Architecture};
 use crate::generate::seq2seq::poses::PoseFormat;
 use crate::generate::trained::TrainedSpeaker;
 use anyhow::{Result, bail, ensure};
@@ -119,22 +119,24 @@ fn sequence(speaker: &SequenceGenerator, out: &Path, carry_state: bool, facts: &
     let of_segment = format!("1,{},{N_CEPSTRA}", sizes.audio_frames());
     let [previous, predicted] = [sizes.previous, sizes.predicted].map(|n| format!("1,{n},{}", sizes.pose));
     let (words, state) = (format!("{},words", sizes.predicted), format!("1,{}", sizes.hidden));
+    let mut about = vec![("segment_frames", sizes.predicted.to_string()), ("description", SEGMENT_TEXT.to_owned())];
     let mut inputs = vec![("cepstra", F32, &*of_segment), ("previous", F32, &*previous)];
     let mut outputs = vec![("poses", F32, &*predicted), ("next", F32, &*previous)];
-    inputs.extend(match metadata.architecture {
-        Architecture::Contextual => Some(("words", I64, &*words)),
-        Architecture::Words => Some(("words", I64, "1,words")),
-        Architecture::Audio | Architecture::Adversarial | Architecture::Autoencoder => None,
-    });
+    if speaker.reads_words() {
+        let is_of_poses = metadata.architecture == Architecture::Contextual;
+        let (axes, secs) =
+            if is_of_poses { (&*words, AROUND_POSE_SECS) } else { ("1,words", metadata.words_around_secs) };
+        inputs.push(("words", I64, axes));
+        about.push(("words_around_secs", secs.to_string()));
+    }
     if is_carried {
         inputs.extend([("segment", I64, "1"), ("state", F32, &*state)]);
         outputs.push(("next_state", F32, &*state));
     }
-    let about = [("segment_frames", sizes.predicted.to_string()), ("description", segment_text(speaker, is_carried))];
     write(out, graph, (&inputs, &outputs), &[facts, &about].concat())?;
 
     let graph = NetworkGraph::new(Default::default());
-    let smoothed = joints::smoothed(&graph, "poses")?;
+    let smoothed = joints::smooth(&graph, "poses")?;
     joints::add_joints(&graph, &smoothed, representation, normalisation)?;
     let text = "The poses of all segments, shortened to `frames`, are smoothed and converted to joints.";
     let about = [joint_facts(), vec![("description", text.to_owned())]].concat();
@@ -144,30 +146,10 @@ fn sequence(speaker: &SequenceGenerator, out: &Path, carry_state: bool, facts: &
 }
 
 /// How to run a sequence network.
-fn segment_text(speaker: &SequenceGenerator, is_carried: bool) -> String {
-    let n = speaker.metadata.network.predicted;
-    let mut text = format!(
-        "Run segment by segment: segment k reads the cepstra from row {n} k on, and as `previous` the output `next` of the \
-         segment before, zeros at first."
-    );
-    if is_carried {
-        text += " `segment` is k, and `state` the output `next_state` of the segment before.";
-    }
-    match speaker.metadata.architecture {
-        Architecture::Contextual => {
-            text += " Row t of `words` has the words within 1.5 s around pose t, padded at the end with 0.";
-        }
-        Architecture::Words => {
-            let around = speaker.metadata.words_around_secs;
-            text += &format!(" `words` are those from {around} s before the segment to {around} s after it.");
-        }
-        Architecture::Audio | Architecture::Adversarial | Architecture::Autoencoder => {}
-    }
-    if speaker.reads_words() {
-        text += " Their indices are 1 for a word outside the vocabulary and 2 for its first word; without words one 0.";
-    }
-    text
-}
+const SEGMENT_TEXT: &str = "Run segment by segment: segment k reads the cepstra from row k times `segment_frames` on, \
+     and as `previous` the output `next` of the segment before, zeros at first. Where there is a `state`, it is the \
+     `next_state` of the segment before, and `segment` is k. `words` has the words within `words_around_secs` of each pose in a row [poses, W], padded \
+     at the end with 0, or of the segment [1, W]: 1 for a word outside the vocabulary, 2 for its first; 0 without words.";
 
 const SAMPLES: GraphPort = ("samples", F32, "1,samples");
 const FRAMES: GraphPort = ("frames", I64, "1");

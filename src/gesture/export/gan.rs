@@ -26,8 +26,8 @@ pub(super) fn add_generator(g: &NetworkGraph, metadata: &SpeakerMetadata) -> Res
         skips.push(std::mem::replace(&mut x, down));
     }
     for (level, skip) in skips.iter().rev().enumerate() {
-        let once = g.shaped("Unsqueeze", &x, &[3])?;
-        let twice = g.shaped("Reshape", &g.along("Concat", &[&once, &once], 3), &[1, network.width as i64, -1])?;
+        let once = g.reshaped("Unsqueeze", &x, &[3])?;
+        let twice = g.reshaped("Reshape", &g.along("Concat", &[&once, &once], 3), &[1, network.width as i64, -1])?;
         x = block(g, &format!("up.{level}"), &g.op("Add", &[&twice, skip]), 1, true)?;
     }
     x = blocks(g, "decoder", x)?;
@@ -36,7 +36,7 @@ pub(super) fn add_generator(g: &NetworkGraph, metadata: &SpeakerMetadata) -> Res
         let spoken = g.transposed(&g.along("Concat", &[&vectors, "word_times"], 2), &[0, 2, 1]);
         x = g.op("Add", &[&x, &layer(g, &format!("{WORDS}.output"), &spoken)?]);
     }
-    let features = g.transposed(&g.shaped("Squeeze", &layer(g, "last", &x)?, &[0])?, &[1, 0]);
+    let features = g.transposed(&g.reshaped("Squeeze", &layer(g, "last", &x)?, &[0])?, &[1, 0]);
     let of_joints = g.slice(&features, 1, [0, N_FEATURES as i64])?;
     add_joints(g, &of_joints, &metadata.representation, &metadata.normalisation)?;
     let channels = &metadata.normalisation.channels;
@@ -57,13 +57,13 @@ fn encoded(g: &NetworkGraph, network: &Config) -> Result<String> {
     let is_paper = network.preset == Preset::Paper;
     let mut x = "mels".to_owned();
     if is_paper {
-        x = g.shaped("Unsqueeze", &g.transposed(&x, &[0, 2, 1]), &[1])?;
+        x = g.reshaped("Unsqueeze", &g.transposed(&x, &[0, 2, 1]), &[1])?;
     }
     for i in 0..7 {
         x = block(g, &format!("front.{i}"), &x, 1 + i % 2, true)?;
     }
     if is_paper {
-        x = g.shaped("Squeeze", &block(g, "front.7", &x, 1, false)?, &[3])?;
+        x = g.reshaped("Squeeze", &block(g, "front.7", &x, 1, false)?, &[3])?;
     }
     if network.n_speakers == 0 {
         return Ok(x);

@@ -90,9 +90,9 @@ impl NetworkGraph {
 
     /// Adds operators on a value and integers without axes.
     pub(super) fn chain(&self, value: &str, steps: &[(&str, i64)]) -> Result<String> {
-        steps.iter().try_fold(value.to_owned(), |value, (kind, integer)| {
-            Ok(self.op(kind, &[&value, &self.integer(*integer)?]))
-        })
+        steps
+            .iter()
+            .try_fold(value.to_owned(), |value, (kind, integer)| Ok(self.op(kind, &[&value, &self.integer(*integer)?])))
     }
 
     /// Size of an axis, an integer without axes.
@@ -110,7 +110,7 @@ impl NetworkGraph {
     }
 
     /// Adds `Reshape`, `Squeeze` or `Unsqueeze` with these sizes or axes.
-    pub(super) fn shaped(&self, kind: &str, value: &str, integers: &[i64]) -> Result<String> {
+    pub(super) fn reshaped(&self, kind: &str, value: &str, integers: &[i64]) -> Result<String> {
         Ok(self.op(kind, &[value, &self.integers(integers)?]))
     }
 

@@ -24,7 +24,7 @@ pub(super) fn add_joints(
     };
     let scaled = g.op("Mul", &[features, &g.floats(&[N_FEATURES], std)?]);
     let values = g.op("Add", &[&scaled, &g.floats(&[N_FEATURES], mean)?]);
-    let mut directions = g.shaped("Reshape", &values, &[-1, N_BONES as i64, 3])?;
+    let mut directions = g.reshaped("Reshape", &values, &[-1, N_BONES as i64, 3])?;
     let is_position = !representation.keeps_lengths();
     if is_position {
         directions = g.op("MatMul", &[&g.floats(&[N_BONES, N_BONES], &differences())?, &directions]);
@@ -72,7 +72,7 @@ fn paths() -> Vec<f32> {
 }
 
 /// Smooths `poses` [T, C] over time like `orator_formats::bvh::exponential_maps::smooth`.
-pub(super) fn smoothed(g: &NetworkGraph, poses: &str) -> Result<String> {
+pub(super) fn smooth(g: &NetworkGraph, poses: &str) -> Result<String> {
     let (half, order) = SMOOTHING;
     let window = 2 * half + 1;
     // For every length up to that of the window: the window that fits, and its weights for each position in it.
@@ -99,8 +99,8 @@ pub(super) fn smoothed(g: &NetworkGraph, poses: &str) -> Result<String> {
     let start = g.op("Min", &[&g.chain(&start, &[("Max", 0)])?, &last]);
     let weights = g.op("Gather", &[&weights, &g.op("Sub", &[&t, &start])]);
     let offsets = g.integers(&(0..window as i64).collect::<Vec<_>>())?;
-    let at = g.op("Add", &[&g.shaped("Unsqueeze", &start, &[1])?, &offsets]);
+    let at = g.op("Add", &[&g.reshaped("Unsqueeze", &start, &[1])?, &offsets]);
     let at = g.op("Min", &[&at, &g.chain(&n, &[("Sub", 1)])?]);
-    let products = g.op("Mul", &[&g.op("Gather", &[poses, &at]), &g.shaped("Unsqueeze", &weights, &[2])?]);
+    let products = g.op("Mul", &[&g.op("Gather", &[poses, &at]), &g.reshaped("Unsqueeze", &weights, &[2])?]);
     g.sum(&products, 1, false)
 }

@@ -29,7 +29,7 @@ pub(super) fn front_end(fps: FrameRate) -> Result<NetworkGraph> {
     let period = g.chain(&last, &[("Mul", 2), ("Max", 1)])?;
     let index = g.op("Mod", &[&g.range(&g.chain(&n_hops, &[("Mul", hop)])?)?, &period]);
     let at = g.op("Sub", &[&last, &g.op("Abs", &[&g.op("Sub", &[&index, &last])])]);
-    let hops = g.shaped("Reshape", &g.along("Gather", &["samples", &at], 1), &[-1, hop])?;
+    let hops = g.reshaped("Reshape", &g.along("Gather", &["samples", &at], 1), &[-1, hop])?;
     add_spectrogram(&g, &g.cast(&hops, ElementType::F64))?;
     Ok(g)
 }

@@ -13,7 +13,7 @@ use orator_onnx::convert::AttributeValue;
 /// next segment, `next` [1, previous, C]. `is_carried`: also from the number of the `segment` [1] and the `state` [1, H]
 /// of the segment before, which segment 0 ignores, to the `next_state`.
 pub(super) fn add_network(g: &NetworkGraph, metadata: &SequenceMetadata, is_carried: bool) -> Result<()> {
-    let audio = g.shaped("Squeeze", "cepstra", &[0])?;
+    let audio = g.reshaped("Squeeze", "cepstra", &[0])?;
     let poses = match metadata.architecture {
         Architecture::Autoencoder => autoencoder(g, metadata, &audio)?,
         Architecture::Contextual => {
@@ -79,21 +79,21 @@ fn n_states(g: &NetworkGraph, name: &str, layer: usize) -> Result<usize> {
 
 /// States [T, 2 H] of a layer of a GRU in both directions over `x` [T, I].
 fn both_directions(g: &NetworkGraph, name: &str, layer: usize, x: &str) -> Result<String> {
-    let [states, _] = gru(g, name, layer, &g.shaped("Unsqueeze", x, &[1])?, None)?;
-    g.shaped("Reshape", &states, &[-1, 2 * n_states(g, name, layer)? as i64])
+    let [states, _] = gru(g, name, layer, &g.reshaped("Unsqueeze", x, &[1])?, None)?;
+    g.reshaped("Reshape", &states, &[-1, 2 * n_states(g, name, layer)? as i64])
 }
 
 /// Last state [B, H] of a GRU over `x` [T, B, I] in one direction.
 fn last_state(g: &NetworkGraph, name: &str, x: &str) -> Result<String> {
     let [_, last] = gru(g, name, 0, x, None)?;
-    g.shaped("Squeeze", &last, &[0])
+    g.reshaped("Squeeze", &last, &[0])
 }
 
 /// Audio around each pose, [context, predicted, 26].
 fn windows(g: &NetworkGraph, metadata: &SequenceMetadata, audio: &str) -> Result<String> {
     let (context, predicted) = (metadata.network.context as i64, metadata.network.predicted as i64);
     let at: Vec<i64> = (0..context).flat_map(|k| (0..predicted).map(move |t| k + t)).collect();
-    let at = g.shaped("Reshape", &g.integers(&at)?, &[context, predicted])?;
+    let at = g.reshaped("Reshape", &g.integers(&at)?, &[context, predicted])?;
     Ok(g.op("Gather", &[audio, &at]))
 }
 
@@ -140,10 +140,10 @@ fn word_states(g: &NetworkGraph, is_last: bool) -> Result<String> {
     let [mut states, _] = gru(g, "word_encoder.gru", 0, &vectors, None)?;
     if is_last {
         // At the last word the backward direction has read only that word.
-        let last = g.shaped("Squeeze", &g.slice(&states, 0, [-1, 0])?, &[0])?;
+        let last = g.reshaped("Squeeze", &g.slice(&states, 0, [-1, 0])?, &[0])?;
         states = g.transposed(&last, &[1, 0, 2]);
     }
-    g.shaped("Reshape", &states, &[-1, 2 * n_states(g, "word_encoder.gru", 0)? as i64])
+    g.reshaped("Reshape", &states, &[-1, 2 * n_states(g, "word_encoder.gru", 0)? as i64])
 }
 
 /// Poses [predicted, C] of the decoder, which attends to `encoded` sequences [K, n], that of the audio first.
@@ -154,9 +154,9 @@ fn decoder(g: &NetworkGraph, metadata: &SequenceMetadata, encoded: &[String], is
     let first = affine(g, "decoder.init", &g.along("Concat", &[&end, &beginning], 1))?;
     let previous = g.transposed("previous", &[1, 0, 2]);
     let mut input = g.slice(&previous, 0, [-1, 0])?;
-    let [_, mut state] = gru(g, "decoder.gru", 0, &previous, Some(&g.shaped("Unsqueeze", &first, &[0])?))?;
+    let [_, mut state] = gru(g, "decoder.gru", 0, &previous, Some(&g.reshaped("Unsqueeze", &first, &[0])?))?;
     if is_carried {
-        let [_, carried] = gru(g, "decoder.gru", 0, &input, Some(&g.shaped("Unsqueeze", "state", &[0])?))?;
+        let [_, carried] = gru(g, "decoder.gru", 0, &input, Some(&g.reshaped("Unsqueeze", "state", &[0])?))?;
         state = g.op("Where", &[&g.chain("segment", &[("Equal", 0)])?, &state, &carried]);
     }
     let names = ["decoder.attention", "decoder.word_attention"];
@@ -164,7 +164,7 @@ fn decoder(g: &NetworkGraph, metadata: &SequenceMetadata, encoded: &[String], is
     let mut poses = Vec::new();
     for _ in 0..metadata.network.predicted {
         [_, state] = gru(g, "decoder.gru", 0, &input, Some(&state))?;
-        let own = g.shaped("Squeeze", &state, &[0])?;
+        let own = g.reshaped("Squeeze", &state, &[0])?;
         let mut read = own.clone();
         for keys in &keys {
             let scores = g.op("MatMul", &[&own, &g.transposed(keys, &[1, 0])]);
@@ -172,7 +172,7 @@ fn decoder(g: &NetworkGraph, metadata: &SequenceMetadata, encoded: &[String], is
             read = g.along("Concat", &[&read, &context], 1);
         }
         let predicted = affine(g, "decoder.output", &read)?;
-        input = g.shaped("Reshape", &predicted, &[1, 1, pose])?;
+        input = g.reshaped("Reshape", &predicted, &[1, 1, pose])?;
         poses.push(predicted);
     }
     if is_carried {

@@ -1,19 +1,16 @@
-//! `orator generate --export`: the exported files give the joints of generation, in the program's own ONNX Runtime, in
-//! Python and in a browser, for networks of every kind.
+//! `orator generate --export`: the exported files give the joints of generation in the program's own ONNX Runtime, for
+//! networks of every kind.
 
 use crate::fixtures::figures::{FPS, swinging};
 use crate::fixtures::untrained::{generate, write_untrained_sequence, write_untrained_speaker};
-use base64::Engine as _;
 use candle_core::{Device, Tensor as CandleTensor};
 use ndarray::{ArrayView3, Axis, s};
-use orator::guide::TOPICS;
 use orator_avatar::animate::rig::rig::bone_metres;
 use orator_base::types::pose3d::Motion;
 use orator_base::types::posture::PostureChannel;
 use orator_base::types::sound::Sound;
 use orator_base::types::time::FrameRate;
 use orator_formats::transcript::{Word, WordSource};
-use orator_formats::{npy, wav};
 use orator_gesture::generate::GestureGenerator;
 use orator_gesture::generate::model::{GENERATOR, GenerationChoice, SpeakerMetadata};
 use orator_gesture::generate::normalisation::{ChannelNormalisation, Normalisation};
@@ -26,21 +23,20 @@ use orator_nn::gan::generator::{Config, Generator, Preset};
 use orator_nn::params::Params;
 use orator_nn::weights::Contents;
 use orator_onnx::{Runtime, session};
-use orator_test_support::skip::{browser_driver, onnx_web, readers, skip};
+use orator_test_support::skip::skip;
 use ort::session::{Session, SessionInputValue};
 use ort::value::Tensor;
 use std::collections::BTreeMap;
 use std::path::Path;
-use std::process::Command;
 
 /// Largest accepted distance of a joint's coordinate, metres.
-const TOLERANCE: f32 = 1e-4;
+pub(crate) const TOLERANCE: f32 = 1e-4;
 /// Shorter than a block of 32 frames, which its mirror images fill; some blocks; many blocks.
 const SECS: [f64; 3] = [0.3, 2.05, 7.3];
 const SPOKEN: [&str; 3] = ["big", "ball", "other"];
 
 /// A rising and falling tone with noise.
-fn sound(secs: f64) -> Sound {
+pub(crate) fn sound(secs: f64) -> Sound {
     let n = (secs * 16_000.0) as usize;
     let at = |i: usize| {
         let t = i as f64 / 16_000.0;
@@ -150,7 +146,7 @@ fn features(session: &mut Session, sound: &Sound) -> (Vec<usize>, Vec<f32>, usiz
 }
 
 /// Largest difference between the joints of a motion and the first of `joints` [frames, 49, 3].
-fn difference(motion: &Motion, joints: &[f32]) -> f32 {
+pub(crate) fn difference(motion: &Motion, joints: &[f32]) -> f32 {
     let n = motion.n_frames();
     let joints = ArrayView3::from_shape((n, 49, 3), &joints[..n * 49 * 3]).unwrap();
     let worst = (&motion.joints - &joints).iter().fold(0.0f32, |worst, v| worst.max(v.abs()));
@@ -160,7 +156,7 @@ fn difference(motion: &Motion, joints: &[f32]) -> f32 {
     worst
 }
 
-fn export(dir: &Path, args: &str) {
+pub(crate) fn export(dir: &Path, args: &str) {
     let output = generate(dir, args);
     assert!(output.status.success(), "{args}: {}", String::from_utf8_lossy(&output.stderr));
 }
@@ -235,7 +231,7 @@ fn exported_gans_of_every_kind_give_the_joints_of_generation() {
 }
 
 /// Writes a sequence network with random weights; `audio-context` is `audio` with a GRU over the audio around a frame.
-fn write_sequence(file: &Path, architecture: Architecture, has_context: bool) {
+pub(crate) fn write_sequence(file: &Path, architecture: Architecture, has_context: bool) {
     write_untrained_sequence(file, architecture, false, &["ball", "big"]);
     let mut contents = Contents::read(file).unwrap();
     let speaker = SequenceGenerator::open(file).unwrap();
@@ -253,7 +249,13 @@ fn write_sequence(file: &Path, architecture: Architecture, has_context: bool) {
 }
 
 /// Joints of an exported sequence network, run segment by segment.
-fn sequence_joints(runtime: &Runtime, dir: &Path, speaker: &SequenceGenerator, sound: &Sound, is_carried: bool) -> Vec<f32> {
+fn sequence_joints(
+    runtime: &Runtime,
+    dir: &Path,
+    speaker: &SequenceGenerator,
+    sound: &Sound,
+    is_carried: bool,
+) -> Vec<f32> {
     let [mut front_end, mut network, mut decoder] =
         ["model.mel.onnx", "model.onnx", "model.joints.onnx"].map(|file| open(runtime, &dir.join(file)));
     let (_, cepstra, frames) = features(&mut front_end, sound);
@@ -313,85 +315,13 @@ fn exported_sequence_networks_give_the_joints_of_generation() {
             for secs in SECS {
                 let sound = sound(secs);
                 let prepared = speaker.prepare(&sound, &words()).unwrap();
-                let motion =
-                    speaker.motion(&speaker.generate(&prepared, speaker.seams(is_carried)).unwrap()).unwrap();
+                let motion = speaker.motion(&speaker.generate(&prepared, speaker.seams(is_carried)).unwrap()).unwrap();
                 let joints = sequence_joints(&runtime, dir, &speaker, &sound, is_carried);
                 let worst = difference(&motion, &joints);
                 eprintln!("ONNX: {architecture:?}, carried {is_carried}, {secs} s: joints differ by {worst:.2e} m");
                 assert!(worst < TOLERANCE && joints.len() == motion.n_frames() * 147, "{architecture:?}: {worst}");
             }
         }
-    }
-}
-
-/// Code blocks of the guide in a language.
-fn guide(language: &str) -> Vec<String> {
-    let page = TOPICS.iter().find(|topic| topic.name == "onnx").unwrap().text;
-    let blocks = page.split(&format!("```{language}\n")).skip(1);
-    blocks.map(|block| block.split("```").next().unwrap().to_owned()).collect()
-}
-
-/// A GAN and a sequence network in folders with their exported files and `speech.wav`, and the joints of generation.
-fn exported_folders(dir: &Path) -> [(&'static str, Motion); 2] {
-    ["gan", "sequence"].map(|name| {
-        let dir = dir.join(name);
-        std::fs::create_dir(&dir).unwrap();
-        wav::write(&dir.join("speech.wav"), &sound(3.3)).unwrap();
-        match name {
-            "gan" => write_untrained_speaker(&dir.join("host.safetensors")),
-            _ => write_sequence(&dir.join("host.safetensors"), Architecture::Adversarial, false),
-        }
-        export(&dir, "--checkpoint host.safetensors --export model.onnx");
-        export(&dir, "--checkpoint host.safetensors --audio speech.wav --out generated.npy");
-        (name, npy::read(&dir.join("generated.npy"), FPS).unwrap())
-    })
-}
-
-#[test]
-fn the_programs_of_the_guide_run_exported_models_in_python() {
-    let Some(readers) = readers("onnxruntime") else { return };
-    let folder = tempfile::tempdir().unwrap();
-    let blocks = guide("python");
-    for ((name, motion), second) in exported_folders(folder.path()).into_iter().zip([1, 2]) {
-        let dir = folder.path().join(name);
-        let program = format!("{}{}np.save('joints.npy', joints)\n", blocks[0], blocks[second]);
-        let mut python = Command::new("python3");
-        let python = python.args(["-c", &program, "speech.wav"]).env("PYTHONPATH", &readers).current_dir(&dir);
-        let output = python.output().unwrap();
-        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-        let joints = npy::read(&dir.join("joints.npy"), FPS).unwrap().joints;
-        assert_eq!(joints.dim(), motion.joints.dim());
-        let worst = difference(&motion, joints.as_slice().unwrap());
-        eprintln!("ONNX: {name} in Python: joints differ by {worst:.2e} m");
-        assert!(worst < TOLERANCE, "{name}: {worst}");
-    }
-}
-
-#[test]
-fn the_program_of_the_guide_runs_exported_models_in_a_browser() {
-    let (Some(web), Some(_)) = (onnx_web(), browser_driver()) else { return };
-    if !Path::new("/usr/bin/chromium").exists() {
-        return skip("no browser is installed (package chromium)");
-    }
-    let folder = tempfile::tempdir().unwrap();
-    let dir = folder.path();
-    let motions = exported_folders(dir);
-    std::fs::write(dir.join("gestures.mjs"), &guide("js")[0]).unwrap();
-    let samples: Vec<u8> = sound(3.3).samples.iter().flat_map(|sample| sample.to_le_bytes()).collect();
-    std::fs::write(dir.join("samples.f32"), samples).unwrap();
-    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/it/generate/onnx_page.mjs");
-    let mut node = Command::new("node");
-    let output = node.arg(script).arg(dir).args(["gan", "sequence"]).env("ORATOR_WEB", web).output().unwrap();
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-    let results: BTreeMap<String, String> = serde_json::from_slice(&output.stdout).unwrap();
-    for (name, motion) in motions {
-        let bytes = base64::engine::general_purpose::STANDARD.decode(&results[name]).unwrap();
-        let joints: Vec<f32> =
-            bytes.chunks_exact(4).map(|bytes| f32::from_le_bytes(bytes.try_into().unwrap())).collect();
-        assert_eq!(joints.len(), motion.n_frames() * 147);
-        let worst = difference(&motion, &joints);
-        eprintln!("ONNX: {name} in Chromium: joints differ by {worst:.2e} m");
-        assert!(worst < TOLERANCE, "{name}: {worst}");
     }
 }
 
