@@ -41,7 +41,7 @@ pub struct Args {
     #[arg(long, value_name = "FILE|DIR", required_unless_present = "batch")]
     checkpoint: Option<PathBuf>,
     /// Audio file with the speech.
-    #[arg(long, value_name = "FILE", required_unless_present_any = ["audio_folder", "batch", "export"], requires = "out")]
+    #[arg(long, value_name = "FILE", required_unless_present_any = WITHOUT_AUDIO, requires = "out")]
     audio: Option<PathBuf>,
     /// Timed transcript for a model that uses words (.tsv, .json, .TextGrid, .ctm, .srt, .vtt); for many audio files,
     /// a folder of transcripts with the same file names. Defaults to the files next to the audio when many files are
@@ -92,6 +92,8 @@ pub struct Args {
     device: DeviceArgs,
 }
 
+/// Arguments that replace --audio.
+const WITHOUT_AUDIO: [&str; 3] = ["audio_folder", "batch", "export"];
 /// Arguments that are about a sound or its motion.
 const EXCLUDED_BY_EXPORT: [&str; 5] = ["audio", "audio_folder", "batch", "transcript", "words"];
 

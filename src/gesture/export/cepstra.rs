@@ -7,8 +7,8 @@ use orator_base::audio::mfcc::{self, FFT, FULL_SCALE, N_CEPSTRA, PRE_EMPHASIS, S
 use orator_onnx::convert::ElementType;
 use std::f64::consts::TAU;
 
-/// Front end from `samples` [1, N] to `cepstra` [1, M + context - 1, 26] for M pose frames in complete segments, and the
-/// number of pose frames of the sound, `frames` [1].
+/// Front end from `samples` [1, N] to `cepstra` [1, M + context - 1, 26] for M pose frames in complete segments, and
+/// the number of pose frames of the sound, `frames` [1].
 pub(super) fn front_end(metadata: &SequenceMetadata) -> Result<NetworkGraph> {
     let g = NetworkGraph::new(Default::default());
     let n = g.size("samples", 1)?;

@@ -14,8 +14,8 @@ use orator_nn::gan::words::WORDS;
 use orator_nn::seq2seq::encoders::table_name;
 use orator_onnx::convert::{AttributeValue, ElementType};
 
-/// Adds the network from `mels` [1, 64, T] (and `words` [1, F], `word_times` [1, F, 2]) to `joints` [F, 49, 3] and, if it
-/// was trained on them, `angles` [F, 3 per channel].
+/// Adds the network from `mels` [1, 64, T] (and `words` [1, F], `word_times` [1, F, 2]) to `joints` [F, 49, 3] and, if
+/// it was trained on them, `angles` [F, 3 per channel].
 pub(super) fn add_generator(g: &NetworkGraph, metadata: &SpeakerMetadata) -> Result<()> {
     let network = &metadata.network;
     let x = interpolated(g, &encoded(g, network)?, &n_frames(g, metadata.fps)?)?;

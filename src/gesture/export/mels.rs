@@ -1,5 +1,5 @@
-//! The front end of the GAN: from samples to the log-mel spectrogram of the sound, which is extended by its mirror image
-//! as in generation. Computed in float64, since sums over a window are less exact than a fast Fourier transform.
+//! The front end of the GAN: from samples to the log-mel spectrogram of the sound, extended by its mirror image as in
+//! generation. Computed in float64, since sums over a window are less exact than a fast Fourier transform.
 
 use super::graph::NetworkGraph;
 use anyhow::Result;

@@ -1,5 +1,5 @@
-//! The sequence networks for one segment, unrolled: encoders by the GRU of ONNX, and every step of the decoder. Values are
-//! time first, without a batch: [T, C], or [T, 1, C] for a GRU.
+//! The sequence networks for one segment, unrolled: encoders by the GRU of ONNX, and every step of the decoder. Values
+//! are time first, without a batch: [T, C], or [T, 1, C] for a GRU.
 
 use super::graph::NetworkGraph;
 use crate::generate::seq2seq::architecture::Architecture;
@@ -10,8 +10,8 @@ use orator_onnx::convert::AttributeValue;
 
 /// Adds the network from the `cepstra` of a segment [1, predicted + context - 1, 26], the `previous` poses
 /// [1, previous, C] and, if it reads them, its `words`, to its `poses` [1, predicted, C] and the previous poses of the
-/// next segment, `next` [1, previous, C]. `is_carried`: also from the number of the `segment` [1] and the `state` [1, H]
-/// of the segment before, which segment 0 ignores, to the `next_state`.
+/// next segment, `next` [1, previous, C]. `is_carried`: also from the number of the `segment` [1] and the `state`
+/// [1, H] of the segment before, which segment 0 ignores, to the `next_state`.
 pub(super) fn add_network(g: &NetworkGraph, metadata: &SequenceMetadata, is_carried: bool) -> Result<()> {
     let audio = g.reshaped("Squeeze", "cepstra", &[0])?;
     let poses = match metadata.architecture {
@@ -43,8 +43,8 @@ fn affine(g: &NetworkGraph, name: &str, x: &str) -> Result<String> {
     Ok(g.op("Add", &[&g.op("MatMul", &[x, &weight]), &g.weight(&format!("{name}.bias"))?]))
 }
 
-/// Layer of a GRU over `x` [T, B, I] from the state `first` [directions, B, H] or zeros, in one direction, or in both if
-/// the network has the tensors: all states [T, directions, B, H] and the last ones [directions, B, H].
+/// Layer of a GRU over `x` [T, B, I] from the state `first` [directions, B, H] or zeros, in one direction, or in both
+/// if the network has the tensors: all states [T, directions, B, H] and the last ones [directions, B, H].
 fn gru(g: &NetworkGraph, name: &str, layer: usize, x: &str, first: Option<&str>) -> Result<[String; 2]> {
     let is_bidirectional = g.has_tensor(&format!("{name}.weight_ih_l{layer}_reverse"));
     let (n, hidden) = (1 + usize::from(is_bidirectional), n_states(g, name, layer)?);

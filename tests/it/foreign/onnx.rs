@@ -1,5 +1,5 @@
-//! Exported generators in Python (`make readers`) and in headless Chromium (`make web`, `make driver`), by the programs of
-//! the guide: their joints are those of generation.
+//! Exported generators in Python (`make readers`) and in headless Chromium (`make web`, `make driver`), by the programs
+//! of the guide: their joints are those of generation.
 
 use crate::fixtures::figures::FPS;
 use crate::fixtures::untrained::write_untrained_speaker;

@@ -20,7 +20,8 @@ const server = createServer((request, response) => {
     const isPage = rest.length === 1 && rest[0] === "";
     const file = first === "runtime" ? join(runtime, ...rest) : join(folder, path);
     const body = isPage ? page(first) : readFileSync(file);
-    response.writeHead(200, { "content-type": isPage ? "text/html" : (types[extname(path)] ?? "application/octet-stream") });
+    const type = isPage ? "text/html" : (types[extname(path)] ?? "application/octet-stream");
+    response.writeHead(200, { "content-type": type });
     response.end(body);
   } catch {
     response.writeHead(404).end();
