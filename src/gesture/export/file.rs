@@ -75,7 +75,7 @@ pub fn export(checkpoint: &Path, choice: &GenerationChoice, out: &Path, carry_st
     let mut files = ModelFiles { out, facts, written: Vec::new() };
     match trained {
         TrainedSpeaker::Gan(_) => {
-            ensure!(!carry_state, "{} has no state: omit --carry-state", checkpoint.display());
+            ensure!(!carry_state, "the model of {} has no decoder state: omit --carry-state", trained.name());
             files.gan(checkpoint, choice)?;
         }
         TrainedSpeaker::Sequence(speaker) => files.sequence(&speaker, carry_state)?,

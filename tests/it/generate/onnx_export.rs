@@ -59,7 +59,8 @@ fn words() -> Vec<Word> {
 
 /// Replaces the initial values of biases, batch norms and speaker layers, which are zeros and ones.
 fn disturbed(name: &str, tensor: &CandleTensor) -> CandleTensor {
-    let is_factor = name.ends_with("running_var") || name.ends_with("norm.weight");
+    let is_norm_weight = name.contains("norm") && name.ends_with("weight");
+    let is_factor = is_norm_weight || name.ends_with("running_var") || name == "scale";
     let [around, wide] = if is_factor { [1.0, 0.5] } else { [0.0, 0.2] };
     let wave = (0..tensor.elem_count()).map(|i| (around + wide * ((i + name.len()) as f64 * 1.3).sin()) as f32);
     CandleTensor::from_iter(wave, &Device::Cpu).unwrap().reshape(tensor.dims()).unwrap()
@@ -242,7 +243,7 @@ pub(crate) fn write_sequence(file: &Path, architecture: Architecture, has_contex
     contents.facts["speaker"]["network"] = serde_json::to_value(&network).unwrap();
     let mut tensors = params.tensors().unwrap();
     let norms = tensors.iter_mut().filter(|(name, _)| name.contains("norm.") || *name == "scale");
-    norms.for_each(|(name, tensor)| *tensor = disturbed(&name.replace("norm.0.weight", "norm.weight"), tensor));
+    norms.for_each(|(name, tensor)| *tensor = disturbed(name, tensor));
     contents.tensors.clear();
     contents.add(NETWORK, tensors);
     contents.write(file).unwrap();
