@@ -6,6 +6,7 @@ use crate::fixtures::untrained::{generate, write_untrained_sequence, write_untra
 use candle_core::{Device, Tensor as CandleTensor};
 use ndarray::{ArrayView3, Axis, s};
 use orator_avatar::animate::rig::rig::bone_metres;
+use orator_base::audio::mel;
 use orator_base::types::pose3d::Motion;
 use orator_base::types::posture::PostureChannel;
 use orator_base::types::sound::Sound;
@@ -188,6 +189,11 @@ fn exported_gans_of_every_kind_give_the_joints_of_generation() {
             let (motion, posture) = generator.motion_and_posture(&sound, &words).unwrap();
             let (shape, mels, frames) = features(&mut front_end, &sound);
             assert_eq!(frames, motion.n_frames(), "{name}, {secs} s");
+            let expected = mel::log_mel(&sound.samples);
+            let at = |(t, band): (usize, usize)| mels[band * shape[2] + t];
+            let off = expected.indexed_iter().fold(0.0f32, |worst, (i, value)| worst.max((value - at(i)).abs()));
+            eprintln!("ONNX: {name}, {secs} s: mels differ by {off:.2e}");
+            assert!(off < TOLERANCE, "{name}, {secs} s: {off}");
             let padded = (frames / 32 + 1) * 32;
             let inputs = |mels: &[f32]| {
                 let mut inputs = vec![("mels", floats(&shape, mels.to_vec()))];
@@ -261,6 +267,11 @@ fn sequence_joints(
         ["model.mel.onnx", "model.onnx", "model.joints.onnx"].map(|file| open(runtime, &dir.join(file)));
     let (_, cepstra, frames) = features(&mut front_end, sound);
     let (of, sizes) = (&speaker.metadata, &speaker.metadata.network);
+    let n_padded = frames.next_multiple_of(sizes.predicted);
+    let expected = architecture::audio_features(sound, of.fps, frames, n_padded, sizes.context);
+    assert_eq!(cepstra.len(), expected.len());
+    let off = expected.iter().zip(&cepstra).fold(0.0f32, |worst, (a, b)| worst.max((a - b).abs()));
+    assert!(off < TOLERANCE, "cepstra differ by {off}");
     let (spoken, _) = speaker.known_words().numbered(&words()).unwrap();
     let (mut previous, mut state) = (vec![0.0; sizes.previous * sizes.pose], vec![0.0; sizes.hidden]);
     let mut poses = Vec::new();
