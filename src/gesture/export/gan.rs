@@ -105,8 +105,9 @@ fn layer(g: &NetworkGraph, name: &str, x: &str) -> Result<String> {
 
 /// Blocks `<name>.0`, `<name>.1`, ... that preserve the frame rate.
 fn blocks(g: &NetworkGraph, name: &str, x: String) -> Result<String> {
-    let names = (0..).map(|i| format!("{name}.{i}")).take_while(|name| g.has_tensor(&format!("{name}.conv.weight")));
-    names.into_iter().try_fold(x, |x, name| block(g, &name, &x, 1, true))
+    let mut names =
+        (0..).map(|i| format!("{name}.{i}")).take_while(|name| g.has_tensor(&format!("{name}.conv.weight")));
+    names.try_fold(x, |x, name| block(g, &name, &x, 1, true))
 }
 
 /// Convolution, batch norm and leaky ReLU.

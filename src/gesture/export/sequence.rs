@@ -108,8 +108,8 @@ fn frame_encoder(g: &NetworkGraph, metadata: &SequenceMetadata, audio: &str) -> 
     for name in ["encoder.linear.0", "encoder.linear.2"] {
         x = g.op("Relu", &[&affine(g, name, &x)?]);
     }
-    let layers = (0..).take_while(|layer| g.has_tensor(&format!("encoder.gru.weight_ih_l{layer}")));
-    layers.into_iter().try_fold(x, |x, layer| both_directions(g, "encoder.gru", layer, &x))
+    let mut layers = (0..).take_while(|layer| g.has_tensor(&format!("encoder.gru.weight_ih_l{layer}")));
+    layers.try_fold(x, |x, layer| both_directions(g, "encoder.gru", layer, &x))
 }
 
 /// Batch norm and ReLU, where the channels are an axis of `dims`.
