@@ -165,7 +165,7 @@ impl ModelFiles<'_> {
         description: &str,
         about: &[Fact],
     ) -> Result<()> {
-        let facts = [&self.facts, &[("description", description.to_owned())], about].concat();
+        let facts = [&self.facts[..], &[("description", description.to_owned())], about].concat();
         let path = self.out.with_extension(extension);
         write_file(&path, &graph.into_inner().file("gestures", inputs, outputs, &facts))?;
         self.written.push(path);
