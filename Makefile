@@ -14,7 +14,7 @@
 SHELL := /bin/bash
 .SHELLFLAGS := -euo pipefail -c
 .DEFAULT_GOAL := build
-.PHONY: cuda spelling test-data setup runtime models readers aligner browser blender validator vrm driver loader build dist check test prove prove-dist prove-rule prove-words prove-people prove-cluster prove-cuda prove-study demo demo-quick demo-study clean-demo docs
+.PHONY: cuda spelling test-data setup runtime models readers aligner browser blender validator vrm web driver loader build dist check test prove prove-dist prove-rule prove-words prove-people prove-cluster prove-cuda prove-study demo demo-quick demo-study clean-demo docs
 
 TARGET := $(or $(CARGO_TARGET_DIR),target)
 ORATOR := $(TARGET)/release/orator
@@ -29,13 +29,14 @@ export ORATOR_BLENDER ?= $(abspath $(TARGET)/blender)
 export INSTA_UPDATE := no
 export ORATOR_GLTF_VALIDATOR ?= $(abspath $(TARGET)/validator)
 export ORATOR_VRM ?= $(abspath $(TARGET)/vrm)
+export ORATOR_WEB ?= $(abspath $(TARGET)/web)
 export ORATOR_LOADER ?= $(abspath $(TARGET)/loader)
 export ORATOR_DRIVER ?= $(abspath $(TARGET)/driver)
 
 setup: ; @.ci/setup/system.sh
 runtime: ; @.ci/setup/onnxruntime.sh
 readers spelling: ; @.ci/setup/python.sh $@
-aligner browser blender cuda validator vrm driver loader: ; @.ci/setup/$@.sh
+aligner browser blender cuda validator vrm web driver loader: ; @.ci/setup/$@.sh
 models: build ; @.ci/setup/models.sh
 
 build: setup runtime
@@ -55,7 +56,7 @@ check:
 	cargo test --release --locked --workspace --lib --bins
 	cargo test --release --locked --test it -- $(QUICK)
 
-test: dist models readers aligner browser blender validator vrm driver spelling
+test: dist models readers aligner browser blender validator vrm web driver spelling
 	@rm -f $(SKIPPED)
 	cargo fmt --check
 	$(ORATOR_SPELLING)/bin/typos

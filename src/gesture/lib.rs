@@ -3,6 +3,7 @@
 
 pub mod batch;
 pub mod evaluate;
+pub mod export;
 pub mod generate;
 pub mod metrics;
 pub mod phases;

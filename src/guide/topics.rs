@@ -18,13 +18,14 @@ macro_rules! topic {
 }
 
 /// Every page, in reading order.
-pub const TOPICS: [Topic; 18] = [
+pub const TOPICS: [Topic; 19] = [
     topic!("tutorial", "from videos to generated motion: every command with its output"),
     topic!("questions", "minutes of video, own rig, own language, phone videos, seated speakers"),
     topic!("dataset", "files of a dataset, rejected seconds, transcripts, splits, import and removal"),
     topic!("lifting", "2D keypoints to 3D joints: input, output, errors, custom lifters"),
     topic!("keypoints", "keypoints of OpenPose, MMPose, AlphaPose, MediaPipe and PATS instead of videos"),
     topic!("training", "training: settings, recipes, fine-tuning, validation, checkpoints; generating motion"),
+    topic!("onnx", "trained models in Python, browsers and Unity: files, example programs"),
     topic!("gpu", "training and generation on an NVIDIA GPU: building, libraries, measurements"),
     topic!("animation", "joints to BVH, GLB, JSON and MP4: rig, smoothing, constraints"),
     topic!("evaluation", "metrics, baselines, conclusions, conventions, comparison of results, rendered persons"),

@@ -19,7 +19,7 @@ pub use batch::{Inference, PICTURES_ON_GPU};
 pub use entry::*;
 pub use fetch::FetchSource;
 pub use manifest::{MANIFEST_FILE, Manifest};
-pub use model::{Model, ModelError, Outputs, sha256_of};
+pub use model::{Model, ModelError, Outputs, SessionKind, session, sha256_of};
 pub use runtime::{LIBRARY, Runtime, TELEMETRY_OFF, find_library};
 pub use source::{Conversion, ModelSource, PinnedFile, SourceFile, SourceKind};
 pub use store::{AUTO, Fetched, ModelRequest, ModelState, ModelStore};

@@ -194,7 +194,7 @@ pub(super) fn open_session(
 
 /// Pictures per run of a session, and its processor.
 #[derive(Clone, Copy)]
-pub(super) enum SessionKind {
+pub enum SessionKind {
     OnePicture,
     Batches,
     /// Batches on the NVIDIA GPU of this number.
@@ -202,7 +202,7 @@ pub(super) enum SessionKind {
 }
 
 /// Creates a session with one thread, no spinning, full optimisation and deterministic results.
-pub(super) fn session(runtime: &Runtime, bytes: &[u8], kind: SessionKind) -> Result<Session> {
+pub fn session(runtime: &Runtime, bytes: &[u8], kind: SessionKind) -> Result<Session> {
     fn to_anyhow<T>(error: ort::Error<T>) -> anyhow::Error {
         anyhow!("{}", error.to_string().trim_end())
     }

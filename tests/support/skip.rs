@@ -129,6 +129,17 @@ pub fn three_vrm() -> Option<PathBuf> {
     is_installed.then_some(folder)
 }
 
+/// Folder whose `node_modules` contain ONNX Runtime for browsers.
+#[track_caller]
+pub fn onnx_web() -> Option<PathBuf> {
+    let folder = folder("ORATOR_WEB", "web");
+    let is_installed = folder.join("node_modules/onnxruntime-web/package.json").is_file();
+    if !is_installed {
+        skip(&format!("no onnxruntime-web in {} (`make web`)", folder.display()));
+    }
+    is_installed.then_some(folder)
+}
+
 /// Folder whose `node_modules` contain puppeteer-core and axe-core.
 #[track_caller]
 pub fn browser_driver() -> Option<PathBuf> {

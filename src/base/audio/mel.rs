@@ -59,6 +59,11 @@ fn mel_of(hz: f64) -> f64 {
     1127.0 * (1.0 + hz / 700.0).ln()
 }
 
+/// Weights of the bins of every band, from the lowest band up.
+pub fn all_bands() -> &'static [Band] {
+    &BANDS
+}
+
 static BANDS: LazyLock<Vec<Band>> = LazyLock::new(bands);
 
 /// Bins of one band, with their weights.

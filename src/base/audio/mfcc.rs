@@ -8,20 +8,21 @@ use std::f64::consts::PI;
 
 /// Number of cepstral coefficients, and of mel bands.
 pub const N_CEPSTRA: usize = 26;
-const FFT: usize = 1024;
+/// Length of the Fourier transform in samples.
+pub const FFT: usize = 1024;
 /// Window length and hop in seconds.
 const WINDOW_SECS: f64 = 0.02;
-const STEP_SECS: f64 = 0.01;
-const PRE_EMPHASIS: f64 = 0.97;
+pub const STEP_SECS: f64 = 0.01;
+/// Part of the preceding sample that is subtracted from a sample.
+pub const PRE_EMPHASIS: f64 = 0.97;
 const LIFTER: f64 = 22.0;
 /// Full scale of 16-bit samples, on which the log energy depends.
-const FULL_SCALE: f64 = 32_768.0;
+pub const FULL_SCALE: f64 = 32_768.0;
 
 /// Coefficients of mono sound at `rate` samples per second (at most 51.2 kHz, where a window fills the transform),
 /// samples in -1..1: [n, 26]. Row k covers the 20 ms from k * 10 ms on; the last window is padded with zeros.
 pub fn mfcc(samples: &[f32], rate: u32) -> Array2<f64> {
-    let length = ((WINDOW_SECS * f64::from(rate)).round() as usize).clamp(1, FFT);
-    let step = ((STEP_SECS * f64::from(rate)).round() as usize).max(1);
+    let [length, step] = window_and_hop(rate);
     let n = match samples.len() {
         0 => 0,
         n if n <= length => 1,
@@ -49,12 +50,22 @@ pub fn mfcc(samples: &[f32], rate: u32) -> Array2<f64> {
         let mels: Vec<f64> =
             bands.iter().map(|band| log(band.iter().zip(&power).map(|(weight, power)| weight * power).sum())).collect();
         for (c, value) in row.iter_mut().enumerate() {
-            let lift = 1.0 + LIFTER / 2.0 * (PI * c as f64 / LIFTER).sin();
-            *value = lift * mels.iter().zip(cosines.row(c)).map(|(mel, cosine)| mel * cosine).sum::<f64>();
+            *value = lift(c) * mels.iter().zip(cosines.row(c)).map(|(mel, cosine)| mel * cosine).sum::<f64>();
         }
         row[0] = log(power.iter().sum());
     }
     cepstra
+}
+
+/// Window length and hop in samples.
+pub fn window_and_hop(rate: u32) -> [usize; 2] {
+    let samples = |secs: f64| ((secs * f64::from(rate)).round() as usize).max(1);
+    [samples(WINDOW_SECS).min(FFT), samples(STEP_SECS)]
+}
+
+/// Factor of coefficient `c`.
+pub fn lift(c: usize) -> f64 {
+    1.0 + LIFTER / 2.0 * (PI * c as f64 / LIFTER).sin()
 }
 
 /// Computes coefficients of `n` poses [n, 26] at `fps` per second: the mean of the rows of [`mfcc`] over each pose,
@@ -100,7 +111,7 @@ pub fn silence(rate: u32) -> [f64; N_CEPSTRA] {
 }
 
 /// Weights of each band over the bins [26][513]: triangles between bins that are equally spaced in mel.
-fn bands(rate: u32) -> Vec<Vec<f64>> {
+pub fn bands(rate: u32) -> Vec<Vec<f64>> {
     let max_mel = 2595.0 * (1.0 + f64::from(rate) / 2.0 / 700.0).log10();
     let corner = |i: usize| {
         let hz = 700.0 * (10f64.powf(max_mel * i as f64 / (N_CEPSTRA + 1) as f64 / 2595.0) - 1.0);
@@ -119,7 +130,7 @@ fn bands(rate: u32) -> Vec<Vec<f64>> {
 }
 
 /// Orthonormal cosine transform [coefficient, band].
-fn cosines() -> Array2<f64> {
+pub fn cosines() -> Array2<f64> {
     let n = N_CEPSTRA as f64;
     Array2::from_shape_fn((N_CEPSTRA, N_CEPSTRA), |(c, band)| {
         let scale = if c == 0 { 1.0 / n } else { 2.0 / n };

@@ -1,6 +1,6 @@
 //! `orator generate`: one audio file (here), or a folder or table of them (`batch`).
 
-use super::batch;
+use super::{batch, export};
 use crate::cli::Outcome;
 use crate::cli::config_args::DeviceArgs;
 use crate::cli::figure_args::FigureArgs;
@@ -41,7 +41,7 @@ pub struct Args {
     #[arg(long, value_name = "FILE|DIR", required_unless_present = "batch")]
     checkpoint: Option<PathBuf>,
     /// Audio file with the speech.
-    #[arg(long, value_name = "FILE", required_unless_present_any = ["audio_folder", "batch"], requires = "out")]
+    #[arg(long, value_name = "FILE", required_unless_present_any = WITHOUT_AUDIO, requires = "out")]
     audio: Option<PathBuf>,
     /// Timed transcript for a model that uses words (.tsv, .json, .TextGrid, .ctm, .srt, .vtt); for many audio files,
     /// a folder of transcripts with the same file names. Defaults to the files next to the audio when many files are
@@ -52,13 +52,13 @@ pub struct Args {
     #[arg(long, value_name = "FILE")]
     words: Option<PathBuf>,
     /// Speaker, for a model of several speakers.
-    #[arg(long, value_name = "NAME", requires = "audio")]
+    #[arg(long, value_name = "NAME", conflicts_with_all = ["audio_folder", "batch"])]
     speaker: Option<String>,
     /// Keep the decoder state of a sequence-to-sequence network across segments.
     #[arg(long)]
     carry_state: bool,
     /// Seed of a variant of the motion: different seeds give different motion, equal seeds give equal motion.
-    #[arg(long, value_name = "N", requires = "audio")]
+    #[arg(long, value_name = "N", conflicts_with_all = ["audio_folder", "batch"])]
     seed: Option<u64>,
     /// Number of variants, with consecutive seeds from --seed (or 1): `motion.bvh` becomes `motion-1.bvh`,
     /// `motion-2.bvh`, ...
@@ -84,12 +84,25 @@ pub struct Args {
     /// Regenerate outputs of --audio-folder and --batch that are up to date.
     #[arg(long, conflicts_with = "audio")]
     force: bool,
+    /// Instead of generating, write the trained network as ONNX for other programs and browsers, and its front end
+    /// from audio samples beside it: `model.onnx` and `model.mel.onnx`. `orator guide onnx` shows how to run them.
+    #[arg(long, value_name = "FILE", requires = "checkpoint", conflicts_with_all = EXCLUDED_BY_EXPORT)]
+    export: Option<PathBuf>,
     #[command(flatten)]
     device: DeviceArgs,
 }
 
+/// Arguments that replace --audio.
+const WITHOUT_AUDIO: [&str; 3] = ["audio_folder", "batch", "export"];
+/// Arguments that are about a sound or its motion.
+const EXCLUDED_BY_EXPORT: [&str; 5] = ["audio", "audio_folder", "batch", "transcript", "words"];
+
 pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     let device = args.device;
+    if let (Some(out), Some(checkpoint)) = (&args.export, &args.checkpoint) {
+        let choice = GenerationChoice { speaker: args.speaker, seed: args.seed };
+        return export::run(checkpoint, &choice, out, args.carry_state, ui);
+    }
     let Some(audio) = &args.audio else { return batch::run(&batch(args)?, device, ui) };
     let variants = variants(&args);
     let files: Vec<Vec<PathBuf>> = variants.iter().map(|variant| variant.files(&args.out)).collect();

@@ -37,7 +37,7 @@ const MIN_STD: f64 = 1e-6;
 /// Added to the largest absolute value of a column, which is a divisor.
 const EPS: f64 = 1e-8;
 /// Half width of the smoothing window in frames, and order of its polynomial.
-const SMOOTHING: (usize, usize) = (4, 3);
+pub const SMOOTHING: (usize, usize) = (4, 3);
 
 /// Names of the joints in a skeleton other than GENEA's: joint name to the skeleton's own name, or to an empty name
 /// if the skeleton has no such joint. Joints that are not listed have GENEA's names.

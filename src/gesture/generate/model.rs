@@ -144,6 +144,15 @@ pub struct GenerationChoice {
 
 /// Loads a checkpoint of `orator train gan` as a network of one speaker on `device`. Errors name the file and the cause.
 pub fn load(path: &Path, choice: &GenerationChoice, device: &Device) -> Result<(SpeakerMetadata, Generator)> {
+    load_with_contents(path, choice, device).map(|(metadata, generator, _)| (metadata, generator))
+}
+
+/// Like `load`, with the tensors of the chosen speaker and variant.
+pub fn load_with_contents(
+    path: &Path,
+    choice: &GenerationChoice,
+    device: &Device,
+) -> Result<(SpeakerMetadata, Generator, Contents)> {
     let mut contents = Contents::read(path)?;
     let context = || format!("{} is not a checkpoint of `orator train gan`", path.display());
     check(&contents.facts["speaker"]).with_context(context)?;
@@ -151,7 +160,8 @@ pub fn load(path: &Path, choice: &GenerationChoice, device: &Device) -> Result<(
     if let Some(seed) = choice.seed {
         trained::vary(&mut contents, GENERATOR, seed).with_context(|| format!("{} has no variants", path.display()))?;
     }
-    build(&contents, device).with_context(context)
+    let (metadata, generator) = build(&contents, device).with_context(context)?;
+    Ok((metadata, generator, contents))
 }
 
 /// Speakers of a checkpoint of `orator train gan` in the order of their indices, from its metadata `facts`.

@@ -264,7 +264,8 @@ fn audio_encoder(params: &mut Params, config: &Config) -> Result<Vec<ConvBlock>>
     Ok(blocks)
 }
 
-const EPS: f64 = 1e-3;
+/// Number added to the variance in the batch norms.
+pub const EPS: f64 = 1e-3;
 /// Default weight of a new batch in the running statistics.
 pub const MOMENTUM: f64 = 0.1;
 /// Negative slope of the leaky ReLU.

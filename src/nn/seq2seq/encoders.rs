@@ -61,8 +61,8 @@ impl FrameEncoder {
     }
 }
 
-/// PyTorch's defaults.
-const EPS: f64 = 1e-5;
+/// PyTorch's defaults for the batch norms.
+pub const EPS: f64 = 1e-5;
 const MOMENTUM: f64 = 0.1;
 
 /// Encoder of the audio around each pose: three layers over the frames of its context, normalised per position in the

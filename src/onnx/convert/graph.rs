@@ -12,6 +12,7 @@ pub enum ElementType {
     I32 = 6,
     I64 = 7,
     F16 = 10,
+    F64 = 11,
 }
 
 impl ElementType {
@@ -19,7 +20,7 @@ impl ElementType {
         match self {
             Self::F16 => 2,
             Self::F32 | Self::I32 => 4,
-            Self::I64 => 8,
+            Self::I64 | Self::F64 => 8,
         }
     }
 }
@@ -31,6 +32,9 @@ pub enum AttributeValue<'a> {
     Text(&'a str),
     Ints(&'a [i64]),
 }
+
+/// Name, element type and axes of an input or output; an axis is a size or, for any size, a name: `1,64,frames`.
+pub type GraphPort<'a> = (&'a str, ElementType, &'a str);
 
 /// First size of an input or output that has one entry per image of a batch of any size.
 pub(crate) const ANY_BATCH: usize = 0;
@@ -194,11 +198,31 @@ impl OnnxGraph {
 
     /// Contents of the model file with these float32 inputs and outputs (name and shape).
     pub fn model(self, inputs: &[(&str, &[usize])], outputs: &[(&str, &[usize])]) -> Vec<u8> {
+        let axis = |dim: &usize| if *dim == ANY_BATCH { BATCH.to_owned() } else { dim.to_string() };
+        let axes = |ports: &[(&str, &[usize])]| -> Vec<String> {
+            ports.iter().map(|(_, dims)| dims.iter().map(axis).collect::<Vec<_>>().join(",")).collect()
+        };
+        let (of_inputs, of_outputs) = (axes(inputs), axes(outputs));
+        let inputs: Vec<GraphPort> =
+            inputs.iter().zip(&of_inputs).map(|((name, _), axes)| (*name, ElementType::F32, &**axes)).collect();
+        let outputs: Vec<GraphPort> =
+            outputs.iter().zip(&of_outputs).map(|((name, _), axes)| (*name, ElementType::F32, &**axes)).collect();
+        self.file("pose", &inputs, &outputs, &[])
+    }
+
+    /// Contents of the model file with the name `title`, these inputs and outputs, and metadata (key and value).
+    pub fn file(
+        self,
+        title: &str,
+        inputs: &[GraphPort],
+        outputs: &[GraphPort],
+        metadata: &[(&str, String)],
+    ) -> Vec<u8> {
         let mut graph = self.nodes;
-        bytes(&mut graph, 2, b"pose");
+        bytes(&mut graph, 2, title.as_bytes());
         graph.extend_from_slice(&self.weights);
-        inputs.iter().for_each(|(name, dims)| bytes(&mut graph, 11, &port(name, dims)));
-        outputs.iter().for_each(|(name, dims)| bytes(&mut graph, 12, &port(name, dims)));
+        inputs.iter().for_each(|input| bytes(&mut graph, 11, &port(*input)));
+        outputs.iter().for_each(|output| bytes(&mut graph, 12, &port(*output)));
         let (mut opset, mut model) = (Vec::new(), Vec::with_capacity(graph.len() + 64));
         bytes(&mut opset, 1, b"");
         number(&mut opset, 2, 13);
@@ -206,6 +230,12 @@ impl OnnxGraph {
         bytes(&mut model, 2, b"orator");
         bytes(&mut model, 7, &graph);
         bytes(&mut model, 8, &opset);
+        for (key, value) in metadata {
+            let mut entry = Vec::new();
+            bytes(&mut entry, 1, key.as_bytes());
+            bytes(&mut entry, 2, value.as_bytes());
+            bytes(&mut model, 14, &entry);
+        }
         model
     }
 }
@@ -239,19 +269,18 @@ fn attribute(name: &str, value: AttributeValue) -> Vec<u8> {
     out
 }
 
-/// Declaration of a float32 input or output with its name and shape.
-fn port(name: &str, dims: &[usize]) -> Vec<u8> {
+/// Declaration of an input or output.
+fn port((name, element, axes): GraphPort) -> Vec<u8> {
     let (mut shape, mut tensor, mut kind, mut port) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
-    for dim in dims {
+    for axis in axes.split(',') {
         let mut size = Vec::new();
-        if *dim == ANY_BATCH {
-            bytes(&mut size, 2, BATCH.as_bytes());
-        } else {
-            number(&mut size, 1, *dim as i64);
+        match axis.parse() {
+            Ok(n) => number(&mut size, 1, n),
+            Err(_) => bytes(&mut size, 2, axis.as_bytes()),
         }
         bytes(&mut shape, 1, &size);
     }
-    number(&mut tensor, 1, ElementType::F32 as i64);
+    number(&mut tensor, 1, element as i64);
     bytes(&mut tensor, 2, &shape);
     bytes(&mut kind, 1, &tensor);
     bytes(&mut port, 1, name.as_bytes());

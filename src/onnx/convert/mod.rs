@@ -16,5 +16,5 @@ mod tfjs_file;
 mod tflite;
 
 pub(crate) use graph::BATCH;
-pub use graph::{AttributeValue, OnnxGraph};
+pub use graph::{AttributeValue, ElementType, GraphPort, OnnxGraph};
 pub use source::{ConversionOptions, SourceFormat, convert};

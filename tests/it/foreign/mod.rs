@@ -7,6 +7,7 @@ pub(crate) mod dataset_readers;
 pub(crate) mod elan;
 pub(crate) mod fbx;
 pub(crate) mod joint_structure;
+pub(crate) mod onnx;
 pub(crate) mod read_speech;
 pub(crate) mod recognised_words;
 pub(crate) mod retargeted;

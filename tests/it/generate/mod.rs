@@ -6,5 +6,6 @@ pub(crate) mod generate_audio;
 pub(crate) mod generate_batch;
 pub(crate) mod generate_sequence;
 pub(crate) mod normalisation;
+pub(crate) mod onnx_export;
 pub(crate) mod transcripts;
 pub(crate) mod variants;

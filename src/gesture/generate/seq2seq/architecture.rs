@@ -24,7 +24,7 @@ const PREVIOUS_SECS: f64 = 0.5;
 /// Seconds of audio context on either side of a pose.
 const AUDIO_CONTEXT_SECS: f64 = 1.5;
 /// Word context of `contextual` on either side of a pose, seconds.
-const AROUND_POSE_SECS: f64 = 1.5;
+pub const AROUND_POSE_SECS: f64 = 1.5;
 /// Word context of `words` on either side of a segment in the authors' code, seconds.
 pub const AROUND_SEGMENT_SECS: f64 = 2.0;
 /// Tolerance of word times against rounding errors, seconds.

@@ -17,6 +17,7 @@ use orator_formats::word_vectors::WordVectors;
 use orator_nn::params::Params;
 use orator_nn::seq2seq::config::Config;
 use orator_nn::seq2seq::predict::{GesturePredictor, StateAtSeams, generate};
+use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -68,6 +69,11 @@ impl SequenceGenerator {
         check_vectors(name, *has_word_vectors, network.word, &vectors)?;
         self.vectors = Some(vectors);
         Ok(())
+    }
+
+    /// Tensors of the network.
+    pub fn tensors(&self) -> BTreeMap<String, Tensor> {
+        self.params.all().map(|(name, var)| (name.to_owned(), var.as_detached_tensor())).collect()
     }
 
     /// Whether the network has a decoder, whose state can be carried over segment seams.
