@@ -109,7 +109,7 @@ fn read_table(folder: &Path) -> Result<Option<(PathBuf, BTreeMap<String, GeneaSp
     Ok(Some((path, speakers)))
 }
 
-pub fn is_table(path: &Path) -> bool {
+fn is_table(path: &Path) -> bool {
     lower_name(path).ends_with("metadata.csv")
 }
 
@@ -181,6 +181,10 @@ pub fn select_speaker(takes: &mut Vec<TakeFiles>, id: u32) -> Result<Option<Stri
 pub fn notes(passed_over: &mut Vec<PathBuf>) -> Vec<String> {
     let (mut inputs, mut interlocutors) = (BTreeSet::new(), 0);
     passed_over.retain(|path| {
+        let is_split = |folder: &Path| SPLITS.iter().any(|(name, _)| *name == lower_name(folder));
+        if is_table(path) && path.parent().is_some_and(is_split) {
+            return false;
+        }
         let Some(location) = locate(path) else { return true };
         let is_input = matches!(path.extension().and_then(OsStr::to_str), Some("wav" | "tsv" | "json" | "txt"));
         match location.is_interlocutor {
@@ -201,7 +205,7 @@ pub fn notes(passed_over: &mut Vec<PathBuf>) -> Vec<String> {
         notes.push(format!("passed over {n} of {split} without motion: {}", first_three(&stems)));
     }
     if interlocutors > 0 {
-        let n = counted(interlocutors, "motion file and transcript");
+        let n = counted(interlocutors, "file");
         notes.push(format!("passed over {n} of interlocutors ({INTERLOCUTOR}/): only their audio is imported"));
     }
     notes
