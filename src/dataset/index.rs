@@ -71,6 +71,9 @@ pub struct SampleRef {
     /// Trunk angles (`trunk.npy`); present if and only if `head` is.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub trunk: Option<ByteRange>,
+    /// Sound of the interlocutor (`interlocutor.wav`); `None`: not recorded apart.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub interlocutor: Option<ByteRange>,
 }
 
 /// Range of bytes in a shard.
@@ -96,7 +99,7 @@ impl SampleRef {
         sample_end <= shard_bytes
             && members
                 .iter()
-                .chain([&self.words, &self.head, &self.trunk].into_iter().flatten())
+                .chain([self.words, self.head, self.trunk, self.interlocutor].iter().flatten())
                 .all(|m| m.offset >= self.offset && end(m.offset, m.size).is_some_and(|e| e <= sample_end))
     }
 }

@@ -214,7 +214,7 @@ impl DatasetInfo {
 
     /// Adds the descriptions of the members `head.npy` and `trunk.npy`.
     pub fn with_posture(mut self) -> Self {
-        let [_, head, trunk] = OPTIONAL_EXTENSIONS;
+        let [_, head, trunk, _] = OPTIONAL_EXTENSIONS;
         let angles = "yaw to the person's left, pitch downwards, roll towards the right shoulder, radians, in the axes of the joints; \
                       NaN where an angle was not seen, which is the mask";
         for (name, of) in
@@ -223,6 +223,14 @@ impl DatasetInfo {
             let meaning = format!("{of}: {angles}");
             self.members.insert(name.to_owned(), Member { shape: "T, 3".into(), element: "float32".into(), meaning });
         }
+        self
+    }
+
+    /// Adds the description of the member `interlocutor.wav`.
+    pub fn with_interlocutor(mut self) -> Self {
+        let sound = self.members["wav"].clone();
+        let meaning = "the person whom the speaker talks to, like `wav`".to_owned();
+        self.members.insert(OPTIONAL_EXTENSIONS[3].to_owned(), Member { meaning, ..sound });
         self
     }
 

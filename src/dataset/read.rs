@@ -150,10 +150,12 @@ impl Dataset {
         let pose2d =
             Array3::from_shape_vec((frames.len(), N_KEYPOINTS, 3), pose2d).context("invalid number of keypoints")?;
         let sound = self.sound(sample, 0..sample.n_sound_samples())?;
+        let of_interlocutor = sample.interlocutor.map(|wav| SampleRef { wav, ..sample.clone() });
+        let interlocutor = of_interlocutor.map(|other| self.sound(&other, 0..other.n_sound_samples())).transpose()?;
         let posture = self.posture(sample, frames.clone())?;
         let (key, words) = (sample.key.to_string(), self.words(sample)?);
         let motion = self.motion(sample, frames)?;
-        Ok(Sample { key, motion, pose2d, sound, words, posture, meta })
+        Ok(Sample { key, motion, pose2d, sound, words, posture, interlocutor, meta })
     }
 
     /// Reads the words of a sample; `None`: no transcripts were requested.

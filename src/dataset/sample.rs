@@ -29,6 +29,8 @@ pub struct Sample {
     pub words: Option<Vec<Word>>,
     /// Angles of head and trunk; `None`: posture was not requested.
     pub posture: Option<Posture>,
+    /// Sound of the person whom the speaker talks to, like `sound`; `None`: not recorded apart.
+    pub interlocutor: Option<Sound>,
     /// Metadata: source and properties of the interval.
     pub meta: serde_json::Value,
 }
@@ -38,7 +40,7 @@ pub const EXTENSIONS: [&str; 5] = ["json", "mask.npy", "pose2d.npy", "pose3d.npy
 /// Extension of the member with the words.
 pub const WORDS_EXTENSION: &str = "words.json";
 /// Extensions of the optional members, after `EXTENSIONS` in a shard; `head.npy` and `trunk.npy` occur together.
-pub const OPTIONAL_EXTENSIONS: [&str; 3] = [WORDS_EXTENSION, "head.npy", "trunk.npy"];
+pub const OPTIONAL_EXTENSIONS: [&str; 4] = [WORDS_EXTENSION, "head.npy", "trunk.npy", "interlocutor.wav"];
 
 impl Sample {
     pub fn n_frames(&self) -> usize {
@@ -60,28 +62,21 @@ impl Sample {
         ensure!(self.motion.joints.shape() == [n_frames, N_JOINTS, 3], "{key}: joints are not [T, 49, 3]");
         ensure!(self.motion.mask.shape() == [n_frames, N_JOINTS], "{key}: the mask is not [{n_frames}, 49]");
         ensure!(self.pose2d.shape() == [n_frames, N_KEYPOINTS, 3], "{key}: keypoints are not [{n_frames}, 59, 3]");
-        ensure!(self.sound.rate == SAMPLE_RATE, "{key}: audio at {} Hz, expected {SAMPLE_RATE} Hz", self.sound.rate);
-        let expected = sample_at(self.motion.fps, SAMPLE_RATE, n_frames);
-        ensure!(
-            self.sound.samples.len().abs_diff(expected) <= 1,
-            "{key}: {} audio samples for {n_frames} frames, expected {expected}",
-            self.sound.samples.len()
-        );
         let json = pretty(&self.meta).context("cannot encode the metadata of a sample as JSON")?;
         Ok([
             json,
             npy::write_bool(self.motion.mask.shape(), self.motion.mask.iter()),
             npy::write_f32(self.pose2d.shape(), self.pose2d.iter()),
             npy::write_f32(self.motion.joints.shape(), self.motion.joints.iter()),
-            wav::to_bytes(&self.sound)?,
+            self.encoded(&self.sound)?,
         ])
     }
 
     /// Encodes the members of `OPTIONAL_EXTENSIONS` that the sample has.
     ///
     /// # Errors
-    /// Words or angles that contradict the length of the sample.
-    pub fn optional_members(&self) -> Result<[Option<Vec<u8>>; 3]> {
+    /// Words, angles or sound that contradict the length of the sample.
+    pub fn optional_members(&self) -> Result<[Option<Vec<u8>>; 4]> {
         let n_frames = self.n_frames();
         let angles = |channel: PostureChannel| -> Result<Option<Vec<u8>>> {
             let Some(angles) = self.posture.as_ref().map(|posture| posture.channel(channel)) else { return Ok(None) };
@@ -89,7 +84,21 @@ impl Sample {
             ensure!(angles.shape() == [n_frames, 3], "{key}: angles of the {name} are not [{n_frames}, 3]");
             Ok(Some(npy::write_f32(angles.shape(), angles.iter())))
         };
-        Ok([self.words_member()?, angles(PostureChannel::Head)?, angles(PostureChannel::Trunk)?])
+        let interlocutor = self.interlocutor.as_ref().map(|sound| self.encoded(sound)).transpose()?;
+        Ok([self.words_member()?, angles(PostureChannel::Head)?, angles(PostureChannel::Trunk)?, interlocutor])
+    }
+
+    /// Encodes a sound that must have the sample's length.
+    fn encoded(&self, sound: &Sound) -> Result<Vec<u8>> {
+        let (key, n_frames) = (&self.key, self.n_frames());
+        ensure!(sound.rate == SAMPLE_RATE, "{key}: audio at {} Hz, expected {SAMPLE_RATE} Hz", sound.rate);
+        let expected = sample_at(self.motion.fps, SAMPLE_RATE, n_frames);
+        ensure!(
+            sound.samples.len().abs_diff(expected) <= 1,
+            "{key}: {} audio samples for {n_frames} frames, expected {expected}",
+            sound.samples.len()
+        );
+        wav::to_bytes(sound)
     }
 
     fn words_member(&self) -> Result<Option<Vec<u8>>> {

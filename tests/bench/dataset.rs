@@ -129,6 +129,7 @@ fn random_interval(seed: u64) -> Sample {
         sound: Sound { rate: SAMPLE_RATE, samples: (0..n_samples).map(|_| rng.random_range(-0.5f32..0.5)).collect() },
         words: None,
         posture: None,
+        interlocutor: None,
         meta: json!({ "n_frames": n_frames }),
     }
 }

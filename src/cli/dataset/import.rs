@@ -25,7 +25,8 @@ use std::path::{Path, PathBuf};
 /// line, TED Expressive (.npz with `human_joints`), SMPL-X and SMPL-H (.npz of BEAT2, EMAGE, AMASS or unpacked Seamless
 /// Interaction), BVH, and WebDataset shards or dataset folders of this program, to merge or re-import them. Audio
 /// (.wav, .flac, ...) and transcript (.tsv, .json, .TextGrid, .srt, .vtt, .txt) have the file name of the motion and
-/// are in its folder or in neighbouring folders (bvh/, wav/, tsv/).
+/// are in its folder or in neighbouring folders (bvh/, wav/, tsv/). Folders of the GENEA challenges of 2020, 2022 and
+/// 2023 keep their splits, speaker IDs and the audio of interlocutors.
 ///
 /// Each take is accepted, rejected with a reason, or failed. Exit code 2: a take failed.
 #[derive(clap::Args)]
@@ -36,9 +37,12 @@ pub struct Args {
     /// Import only files of this kind; `auto` detects it from the content.
     #[arg(long, value_enum, default_value_t = ImportKind::Auto)]
     kind: ImportKind,
-    /// Speaker name in the dataset: letters, digits, - and _.
+    /// Speaker name in the dataset: letters, digits, - and _; defaults to the name of the folder --out.
     #[arg(long, value_name = "NAME")]
-    speaker: String,
+    speaker: Option<String>,
+    /// Import only the takes of this speaker in the `metadata.csv` of a GENEA challenge.
+    #[arg(long, value_name = "ID")]
+    speaker_id: Option<u32>,
     /// Folder of the new dataset; must be empty unless --force is given.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
@@ -117,7 +121,8 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
 
 fn plan(args: &Args) -> Result<ImportPlan> {
     let plain = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
-    let name = &args.speaker;
+    let folder = args.out.file_name().unwrap_or_default().to_string_lossy();
+    let name = args.speaker.as_deref().unwrap_or(&folder);
     ensure!(!name.is_empty() && name.chars().all(plain), "--speaker {name:?}: expected letters, digits, - and _");
     let share = 0.0..=0.9;
     ensure!(
@@ -129,6 +134,7 @@ fn plan(args: &Args) -> Result<ImportPlan> {
     let (licence, consent, source) = (args.licence.clone(), args.consent.clone(), args.source.clone());
     Ok(ImportPlan {
         sources: args.sources.clone(),
+        speaker_id: args.speaker_id,
         kind: match args.kind {
             ImportKind::Auto => None,
             ImportKind::Authors => Some(Found::Authors),

@@ -1,6 +1,7 @@
 //! Search for motion files below the import sources. Files are classified by extension and content; each is matched
 //! with the sound and transcript of the same name in its own folder or in a sibling folder (`bvh/`, `wav/`, `tsv/`).
 
+use super::genea::{self, GeneaFolders, GeneaTake};
 use crate::INFO;
 use crate::config::patterns::SOUND_EXTENSIONS;
 use crate::write::entry;
@@ -25,6 +26,16 @@ pub struct TakeFiles {
     pub sound: Option<PathBuf>,
     /// In order of preference.
     pub transcripts: Vec<PathBuf>,
+    /// Data of a take in the folders of a GENEA challenge.
+    pub genea: Option<GeneaTake>,
+}
+
+impl TakeFiles {
+    /// Motion, sound, transcripts and the interlocutor's sound.
+    pub fn files(&self) -> impl Iterator<Item = &PathBuf> {
+        let interlocutor = self.genea.as_ref().and_then(|genea| genea.interlocutor.as_ref());
+        std::iter::once(&self.motion).chain(&self.sound).chain(&self.transcripts).chain(interlocutor)
+    }
 }
 
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -39,6 +50,8 @@ pub struct ImportSources {
     pub unknown: Vec<(PathBuf, String)>,
     /// Files that are neither motion nor belong to motion.
     pub passed_over: Vec<PathBuf>,
+    /// Notes on the folders of GENEA challenges, a sentence each.
+    pub notes: Vec<String>,
 }
 
 /// Names of sibling folders that hold sounds or transcripts, in lower case.
@@ -48,7 +61,7 @@ const TRANSCRIPT_FOLDERS: &str = "ctm tsv transcript transcripts text texts txt 
 /// Searches `sources` (files or folders); with `only`, files of other kinds are ignored.
 ///
 /// # Errors
-/// A source that does not exist, or sources without any motion.
+/// A source that does not exist, sources without any motion, or an invalid table of a GENEA challenge.
 pub fn find(sources: &[PathBuf], only: Option<MotionKind>) -> Result<ImportSources> {
     let (mut files, mut found) = (Vec::new(), ImportSources::default());
     for source in sources {
@@ -62,24 +75,26 @@ pub fn find(sources: &[PathBuf], only: Option<MotionKind>) -> Result<ImportSourc
     if only.is_some_and(|only| only != MotionKind::Shards) {
         found.datasets.clear();
     }
-    let mut named = NamedFiles::default();
+    let (mut named, mut genea) = (NamedFiles::default(), GeneaFolders::default());
     for path in files {
         match kind(&path) {
             Ok(None) => found.passed_over.push(path),
             Ok(Some(kind)) if only.is_some_and(|only| only != kind) => {}
             Ok(Some(MotionKind::Shards)) => found.tars.push(path),
-            Ok(Some(kind)) => found.takes.push(with_companions(kind, path, &mut named)),
+            Ok(Some(MotionKind::Bvh)) if genea::is_of_interlocutor(&path) => found.passed_over.push(path),
+            Ok(Some(kind)) => {
+                let genea = if kind == MotionKind::Bvh { genea.take(&path, &mut named)? } else { None };
+                found.takes.push(TakeFiles { genea, ..with_companions(kind, path, &mut named) });
+            }
             Err(_) if only.is_some_and(|only| ![MotionKind::Ted, MotionKind::Smplx].contains(&only)) => {}
             Err(why) => found.unknown.push((path, why)),
         }
     }
-    let files_of = |take: &TakeFiles| {
-        let files = take.sound.iter().chain(&take.transcripts).cloned();
-        files.chain([path_of(&take.motion)]).collect::<Vec<_>>()
-    };
-    let used: BTreeSet<PathBuf> = found.takes.iter().flat_map(files_of).collect();
+    let used: BTreeSet<&PathBuf> = found.takes.iter().flat_map(TakeFiles::files).collect();
+    let described: BTreeSet<PathBuf> = found.takes.iter().map(|take| path_of(&take.motion)).collect();
     // Files that belong to motion of another kind are left out on request.
-    found.passed_over.retain(|path| only.is_none() && !used.contains(path));
+    found.passed_over.retain(|path| only.is_none() && !used.contains(path) && !described.contains(path));
+    found.notes = genea::notes(&mut found.passed_over);
     let is_empty =
         found.takes.is_empty() && found.datasets.is_empty() && found.tars.is_empty() && found.unknown.is_empty();
     ensure!(
@@ -143,7 +158,7 @@ fn with_companions(kind: MotionKind, motion: PathBuf, named: &mut NamedFiles) ->
     stems.extend(["gt_interval_", "prediction_interval_"].iter().filter_map(|prefix| stem.strip_prefix(prefix)));
     let sound = companions(&motion, &stems, &SOUND_EXTENSIONS, SOUND_FOLDERS, named).into_iter().next();
     let transcripts = companions(&motion, &stems, &transcript::ENDINGS, TRANSCRIPT_FOLDERS, named);
-    TakeFiles { kind, motion, sound, transcripts }
+    TakeFiles { kind, motion, sound, transcripts, genea: None }
 }
 
 /// Existing files `<stem>.<ending>` in the folder of `motion`, then in its siblings in `folders` (separated by spaces).
@@ -200,6 +215,7 @@ mod tests {
             motion: motion.clone(),
             sound,
             transcripts: transcripts.to_vec(),
+            genea: None,
         };
         let expected = [
             take(MotionKind::Authors, &clip, Some(clip_sound), &[]),

@@ -6,6 +6,7 @@
 //! unchanged.
 
 pub mod find;
+pub mod genea;
 pub mod shards;
 pub mod source;
 pub mod take;

@@ -32,7 +32,7 @@ struct MemberLocation {
 pub struct ShardSample {
     pub key: String,
     members: [Option<MemberLocation>; 5],
-    optional: [Option<MemberLocation>; 3],
+    optional: [Option<MemberLocation>; OPTIONAL_EXTENSIONS.len()],
 }
 
 /// Samples whose keys differ only after the last dash.
@@ -119,7 +119,7 @@ fn list(
         let location = MemberLocation { tar: tar.to_owned(), offset: entry.raw_file_position(), bytes: entry.size() };
         ensure!(location.offset.saturating_add(location.bytes) <= length, "{}: {name} is truncated", reading());
         let new_sample =
-            || ShardSample { key: key.to_owned(), members: [const { None }; 5], optional: [const { None }; 3] };
+            || ShardSample { key: key.to_owned(), members: [const { None }; 5], optional: [const { None }; 4] };
         let sample = samples.entry(key.to_owned()).or_insert_with(new_sample);
         let Some(known) = sample.members.iter_mut().chain(&mut sample.optional).nth(member) else { continue };
         if let Some(first) = known {
@@ -167,7 +167,7 @@ impl ShardSample {
             *bytes = read_member(location)?;
         }
         let [json, mask, pose2d, pose3d, sound] = &members;
-        let [words, head, trunk] = &self.optional;
+        let [words, head, trunk, interlocutor] = &self.optional;
         let sample = || -> Result<Sample> {
             let words = words.as_ref().map(read_member).transpose()?;
             let words = words.map(|bytes| serde_json::from_slice(&bytes).context(WORDS_EXTENSION)).transpose()?;
@@ -176,7 +176,9 @@ impl ShardSample {
                 (None, None) => None,
                 _ => bail!("it has one of head.npy and trunk.npy: expected both or none"),
             };
-            let sample = Sample { words, posture, ..self.parse(json, mask, pose2d, pose3d, sound)? };
+            let interlocutor = interlocutor.as_ref().map(|location| read_wav(&read_member(location)?)).transpose();
+            let interlocutor = interlocutor.context(OPTIONAL_EXTENSIONS[3])?;
+            let sample = Sample { words, posture, interlocutor, ..self.parse(json, mask, pose2d, pose3d, sound)? };
             sample.optional_members()?;
             Ok(sample)
         };
@@ -202,7 +204,8 @@ impl ShardSample {
         let sound = read_wav(sound).context("wav")?;
         fps.checked().context("json: fps")?;
         let motion = Motion { fps, joints, mask }.in_range().context("pose3d.npy")?;
-        let sample = Sample { key: self.key.clone(), motion, pose2d, sound, words: None, posture: None, meta };
+        let (key, words, posture, interlocutor) = (self.key.clone(), None, None, None);
+        let sample = Sample { key, motion, pose2d, sound, words, posture, interlocutor, meta };
         sample.members()?;
         Ok(sample)
     }

@@ -79,7 +79,7 @@ impl ImportItem {
     /// Folders that hold the item's files, sorted, each once.
     fn folders(&self) -> Vec<String> {
         let files: Vec<&PathBuf> = match self {
-            Self::Take(found) => std::iter::once(&found.motion).chain(&found.sound).chain(&found.transcripts).collect(),
+            Self::Take(found) => found.files().collect(),
             Self::Part(path, _) | Self::Unknown(path, _) => vec![path],
             Self::ShardVideo(video) => video.tars(),
         };
@@ -217,7 +217,8 @@ fn inspect_take(found: &TakeFiles, plan: &ImportPlan) -> Result<InspectedItem> {
             let mut fingerprinter = Fingerprinter::default();
             fingerprinter.push(&accepted.sample.sound.samples);
             let codes = (!plan.limits.no_sound).then(|| fingerprinter.finish());
-            Ok(InspectedItem { source, codes, note, ..InspectedItem::default() })
+            let split = found.genea.as_ref().map(|genea| Assignment::In(genea.split, SplitBy::Name));
+            Ok(InspectedItem { source, split, codes, note, ..InspectedItem::default() })
         }
     }
 }
@@ -239,6 +240,10 @@ fn inputs_hash(found: &TakeFiles, n_transcripts: usize, plan: &ImportPlan) -> Re
     ]);
     if let (Some(unit), Some(all)) = (plan.limits.units, all.as_array_mut()) {
         all.push(unit.name.into());
+    }
+    if let (Some(genea), Some(all)) = (&found.genea, all.as_array_mut()) {
+        let sound = genea.interlocutor.as_deref().map(hash_file).transpose()?;
+        all.push(serde_json::json!([genea.speaker, sound]));
     }
     Ok(blake3::hash(all.to_string().as_bytes()).to_hex().to_string())
 }

@@ -2,6 +2,7 @@
 //! trimmed to their common length), or the reason for rejecting it. A take is one continuous interval.
 
 use super::find::TakeFiles;
+use super::genea::{GeneaSpeaker, GeneaTake};
 use crate::config::videos::slug;
 use crate::file_name;
 use crate::sample::{N_KEYPOINTS, Sample};
@@ -13,6 +14,7 @@ use orator_base::motion::{bones, resample};
 use orator_base::stage::fingerprint::hash_file;
 use orator_base::stage::ledger::TranscriptReport;
 use orator_base::stage::rejection::{FrameRejection, Rejection};
+use orator_base::text::number;
 use orator_base::types::pose3d::Motion;
 use orator_base::types::skeleton::{L_HAND, N_BONES, N_HAND_JOINTS, N_JOINTS, R_HAND};
 use orator_base::types::sound::{SAMPLE_RATE, Sound, sample_at};
@@ -97,7 +99,10 @@ impl ImportedTake {
         let content = hash_file(&found.motion)?;
         let stem = motion_file::stem(&found.motion).to_string_lossy();
         let name = format!("{}-{}", slug(&stem), content.get(..8).unwrap_or(&content));
-        let captured = captured::read_in(found.kind, &found.motion, limits.units)?;
+        let mut captured = captured::read_in(found.kind, &found.motion, limits.units)?;
+        if found.genea.as_ref().and_then(|genea| genea.speaker).is_some_and(|speaker| !speaker.has_fingers) {
+            remove_fingers(&mut captured.motion);
+        }
         let motion = resample::at_rate(&captured.motion, limits.fps);
         let n_frames = motion.n_frames();
         let sound = match &found.sound {
@@ -112,11 +117,53 @@ impl ImportedTake {
         let outcome = match (rejection(n_frames, sound.as_ref(), found, limits), sound) {
             (None, Some(sound)) => {
                 let accepted = to_accepted((&name, speaker), found, &captured, motion, sound)?;
-                TakeOutcome::Accepted(Box::new(AcceptedTake { sound_note, ..accepted }))
+                let mut accepted = AcceptedTake { sound_note, ..accepted };
+                if let Some(genea) = &found.genea {
+                    accepted.add_genea(genea, limits)?;
+                }
+                TakeOutcome::Accepted(Box::new(accepted))
             }
             (rejection, _) => TakeOutcome::Rejected(rejection.unwrap_or_else(|| no_sound(found))),
         };
         Ok(Self { name, content, n_frames, outcome })
+    }
+}
+
+impl AcceptedTake {
+    /// Adds what a challenge states about the take, and the interlocutor's sound at the sample's length.
+    fn add_genea(&mut self, genea: &GeneaTake, limits: &TakeLimits) -> Result<()> {
+        if let Some(path) = &genea.unlisted_in {
+            self.notes.push(format!("{} does not list this take: its speaker is unknown", file_name(path)));
+        }
+        if let (Some(speaker), Some(imported)) = (genea.speaker, self.sample.meta["imported"].as_object_mut()) {
+            let GeneaSpeaker { id, has_fingers, interlocutor_id } = speaker;
+            let facts = json!({ "speaker_id": id, "has_fingers": has_fingers, "interlocutor_id": interlocutor_id });
+            imported.extend(facts.as_object().cloned().unwrap_or_default());
+        }
+        let Some(path) = genea.interlocutor.as_ref().filter(|_| !limits.no_sound) else { return Ok(()) };
+        let Some(mut sound) = audio::read_mono_with_note(path, SAMPLE_RATE)?.map(|(sound, _)| sound) else {
+            self.notes.push(format!("{} holds no sound", file_name(path)));
+            return Ok(());
+        };
+        let difference_secs = sound.secs() - self.sample.sound.secs();
+        if difference_secs.abs() > limits.max_difference_secs {
+            let differs = number(difference_secs.abs());
+            let name = file_name(path);
+            self.notes.push(format!("{name} differs by {differs} s from the take's length: it is cut or filled up"));
+        }
+        sound.samples.resize(self.sample.sound.samples.len(), 0.0);
+        self.sample.meta["imported"]["interlocutor"] = file_name(path).into();
+        self.sample.interlocutor = Some(sound);
+        Ok(())
+    }
+}
+
+/// Masks the joints of the fingers.
+fn remove_fingers(motion: &mut Motion) {
+    for hand in [L_HAND, R_HAND] {
+        let fingers = hand + 1..hand + N_HAND_JOINTS;
+        motion.joints.slice_mut(s![.., fingers.clone(), ..]).fill(f32::NAN);
+        motion.mask.slice_mut(s![.., fingers]).fill(false);
     }
 }
 
@@ -219,7 +266,8 @@ fn to_accepted(
     let pose2d = Array3::zeros((n_frames, N_KEYPOINTS, 3));
     let key = format!("{name}-{:06}", 0);
     let in_sample = video_words.filter(|_| !is_untimed).map(|words| words.within(0.0, end_secs));
-    let sample = Sample { key, motion, pose2d, sound, words: in_sample, posture: None, meta };
+    let (words, posture, interlocutor) = (in_sample, None, None);
+    let sample = Sample { key, motion, pose2d, sound, words, posture, interlocutor, meta };
     sample.members().with_context(|| format!("cannot create a sample from {}", found.motion.display()))?;
     let words = report.filter(|_| !is_untimed);
     Ok(AcceptedTake { moved_mm: moved[0], sample, words, notes, n_transcripts, lengths, sound_note: None })

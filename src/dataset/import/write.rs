@@ -2,6 +2,7 @@
 //! leaks, then each item is read again and written. Memory: one take, and the codes of all sound.
 
 use super::find::{self, TakeFiles};
+use super::genea;
 use super::source::{ImportItem, InspectedItem};
 use crate::config::{self, SplitUnit};
 use crate::import::take::TakeLimits;
@@ -46,7 +47,10 @@ const NO_SOUND: &str =
 /// # Errors
 /// Nothing to import, or nothing kept; files that cannot be written. A failed take is an outcome, not an error.
 pub fn import(plan: &ImportPlan, out: &Path, progress: &dyn Progress) -> Result<Imported> {
-    let sources = find::find(&plan.sources, plan.kind)?;
+    let mut sources = find::find(&plan.sources, plan.kind)?;
+    if let Some(id) = plan.speaker_id {
+        sources.notes.extend(genea::select_speaker(&mut sources.takes, id)?);
+    }
     let (mut about, notes) = (plan.about.clone(), notes(&sources.takes));
     about.notes.extend(notes);
     about.no_sound = plan.limits.no_sound;
@@ -55,6 +59,7 @@ pub fn import(plan: &ImportPlan, out: &Path, progress: &dyn Progress) -> Result<
     }
     let (items, mut left_out) = ImportItem::all(&sources);
     left_out.extend(passed_over(&sources.passed_over));
+    left_out.extend(sources.notes.iter().cloned());
     let task = progress.begin("inspect", items.len() as u64);
     let mut names = BTreeSet::new();
     let mut inspected: Vec<InspectedItem> = Vec::new();
@@ -241,6 +246,8 @@ pub struct ImportPlan {
     pub sources: Vec<PathBuf>,
     /// Kind of the sources to import; `None`: every kind.
     pub kind: Option<MotionKind>,
+    /// Speaker of the takes of GENEA challenges to import; `None`: every speaker.
+    pub speaker_id: Option<u32>,
     /// Description of the dataset; `about.fps` equals `limits.fps`.
     pub about: About,
     pub limits: TakeLimits,

@@ -61,6 +61,7 @@ pub fn assemble_into(
     let (mut videos, mut bones, mut stats_collector) =
         (Vec::new(), Vec::<VideoBones>::new(), StatsCollector::default());
     let mut blocks_by_video: BTreeMap<String, Vec<TimeBlock>> = BTreeMap::new();
+    let mut has_interlocutor = false;
     for name in entry::names(dir)? {
         let path = VideoEntry::path(dir, &name);
         let entry = VideoEntry::read(&path)?;
@@ -68,6 +69,7 @@ pub fn assemble_into(
         checksums.insert(format!("{}/{name}.json", entry::FOLDER), orator_base::stage::fingerprint::hash_file(&path)?);
         stats_collector.push(&entry);
         entry.samples.iter().try_for_each(|sample| index.line(sample))?;
+        has_interlocutor |= entry.samples.iter().any(|sample| sample.interlocutor.is_some());
         let n_frames: usize = entry.samples.iter().map(|sample| sample.n_frames).sum();
         if !entry.samples.is_empty() {
             bones.push(entry.bones.clone());
@@ -103,6 +105,7 @@ pub fn assemble_into(
     let info = DatasetInfo::new(about, &of_speaker(&bones), splits, videos);
     let info = if stats.footage.words.is_some() { info.with_words() } else { info };
     let info = if stats.posture.is_some() { info.with_posture() } else { info };
+    let info = if has_interlocutor { info.with_interlocutor() } else { info };
     let texts = [
         (INFO, pretty(&info)?),
         (STATS, pretty(&stats)?),

@@ -75,7 +75,7 @@ impl ShardWriter {
             }
         }
         open.n_samples += 1;
-        let [json, mask, pose2d, pose3d, wav, words, head, trunk] = ranges;
+        let [json, mask, pose2d, pose3d, wav, words, head, trunk, interlocutor] = ranges;
         let [json, mask, pose2d, pose3d, wav] = [json, mask, pose2d, pose3d, wav].map(Option::unwrap_or_default);
         self.samples.push(SampleRef {
             key: FileName::new(&*sample.key)?,
@@ -93,6 +93,7 @@ impl ShardWriter {
             words,
             head,
             trunk,
+            interlocutor,
         });
         Ok(())
     }

@@ -127,6 +127,7 @@ mod tests {
             sound: Sound { rate: 16_000, samples: Vec::new() },
             words: None,
             posture: None,
+            interlocutor: None,
             meta: json!({}),
         };
         for first in [0, 90] {

@@ -273,7 +273,8 @@ impl LiftedSamples<'_> {
         let words =
             self.video.words.as_ref().map(|words| words.within(fps.secs(interval.start), fps.secs(interval.end)));
         let posture = self.posture.as_ref().map(|posture| posture.slice(interval.start..interval.end));
-        Ok(CutSample { sample: Sample { key, motion, pose2d, sound, words, posture, meta }, padded_secs })
+        let sample = Sample { key, motion, pose2d, sound, words, posture, interlocutor: None, meta };
+        Ok(CutSample { sample, padded_secs })
     }
 
     /// Audio of an interval, and the number of missing samples that are replaced by silence.

@@ -53,6 +53,7 @@ pub(crate) fn plan(sources: &[&Path]) -> ImportPlan {
     ImportPlan {
         sources: sources.iter().map(|path| path.to_path_buf()).collect(),
         kind: None,
+        speaker_id: None,
         about: About::new("host", FPS),
         limits: TakeLimits { fps: FPS, min_frames: 64, max_difference_secs: 0.5, no_sound: false, units: None },
         dataset: orator_dataset::config::DatasetConfig { validation: 0.0, test: 0.0, ..Default::default() },

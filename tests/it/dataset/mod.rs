@@ -4,6 +4,7 @@ pub(crate) mod audio_offset;
 pub(crate) mod dataset;
 pub(crate) mod dataset_verify;
 pub(crate) mod forget;
+mod genea_folders;
 pub(crate) mod import;
 pub(crate) mod import_readers;
 pub(crate) mod posture;

@@ -65,6 +65,7 @@ fn angles_are_stored_exactly_and_removed_with_their_video() {
     let plan = ImportPlan {
         sources: files_under(&target).into_iter().map(|(_, path)| path).filter(is_tar).collect(),
         kind: None,
+        speaker_id: None,
         about: About::new("host", fps),
         limits: TakeLimits { fps, min_frames: 64, max_difference_secs: 0.5, no_sound: false, units: None },
         dataset: DatasetConfig::default(),

@@ -96,6 +96,7 @@ fn every_word_is_in_one_sample_or_counted() {
     let plan = ImportPlan {
         sources: tars,
         kind: None,
+        speaker_id: None,
         about: About::new("host", fps),
         limits: TakeLimits { fps, min_frames: 64, max_difference_secs: 0.5, no_sound: false, units: None },
         dataset: DatasetConfig { validation: 0.0, test: 0.0, ..DatasetConfig::default() },
