@@ -84,6 +84,7 @@ impl SpokenVideo {
             sound: self.sound,
             words: self.words,
             posture: self.posture,
+            interlocutor: None,
             meta,
         }
     }

@@ -5,12 +5,13 @@ use crate::cli::outputs::is_same_file;
 use crate::cli::sandbox::enter_sandbox;
 use crate::cli::ui::Ui;
 use anyhow::{Result, ensure};
+use orator_base::stage::progress::Progress as _;
 use orator_gesture::export;
 use orator_gesture::generate::model::{GenerationChoice, checkpoint_file, model_lock};
 use serde_json::json;
 use std::path::Path;
 
-pub fn run(given: &Path, choice: &GenerationChoice, out: &Path, carry_state: bool, ui: &Ui) -> Result<Outcome> {
+pub(super) fn run(given: &Path, choice: &GenerationChoice, out: &Path, carry_state: bool, ui: &Ui) -> Result<Outcome> {
     enter_sandbox([out], [given]);
     let checkpoint = checkpoint_file(given)?;
     if checkpoint != *given {

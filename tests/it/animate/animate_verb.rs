@@ -175,6 +175,7 @@ fn samples_of_a_dataset_are_animated_with_their_faces() {
         sound: sound.clone(),
         words: None,
         posture: None,
+        interlocutor: None,
         meta: serde_json::json!({ "first_frame": 0, "n_frames": n_frames }),
     };
     let samples: Vec<(Split, Sample)> = vec![(Split::Train, sample(0)), (Split::Test, sample(1))];

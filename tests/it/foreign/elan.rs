@@ -106,6 +106,7 @@ fn write_dataset(dir: &Path) {
             sound,
             words: Some((0..19).map(word).collect()),
             posture: None,
+            interlocutor: None,
             meta: serde_json::json!({}),
         }
     };
