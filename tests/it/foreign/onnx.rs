@@ -17,8 +17,8 @@ use std::process::Command;
 /// Code blocks of the guide in a language.
 fn guide(language: &str) -> Vec<String> {
     let page = TOPICS.iter().find(|topic| topic.name == "onnx").unwrap().text;
-    let blocks = page.split(&format!("```{language}\n")).skip(1);
-    blocks.map(|block| block.split("```").next().unwrap().to_owned()).collect()
+    let fence = format!("```{language}\n");
+    page.split(&fence).skip(1).map(|block| block.split("```").next().unwrap().to_owned()).collect()
 }
 
 /// A GAN and a sequence network in folders with their exported files and `speech.wav`, and the joints of generation.
