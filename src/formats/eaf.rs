@@ -60,12 +60,9 @@ pub fn write(media: &str, tiers: &[AnnotationTier]) -> String {
         for (.., value) in spans {
             let [start, end] = [slot_ids[2 * n], slot_ids[2 * n + 1]];
             n += 1;
-            let _ = writeln!(
-                text,
-                "        <ANNOTATION><ALIGNABLE_ANNOTATION ANNOTATION_ID=\"a{n}\" TIME_SLOT_REF1=\"ts{start}\" \
-                 TIME_SLOT_REF2=\"ts{end}\"><ANNOTATION_VALUE>{}</ANNOTATION_VALUE></ALIGNABLE_ANNOTATION></ANNOTATION>",
-                escape(value)
-            );
+            let _ = write!(text, "        <ANNOTATION><ALIGNABLE_ANNOTATION ANNOTATION_ID=\"a{n}\" ");
+            let _ = write!(text, "TIME_SLOT_REF1=\"ts{start}\" TIME_SLOT_REF2=\"ts{end}\"><ANNOTATION_VALUE>");
+            let _ = writeln!(text, "{}</ANNOTATION_VALUE></ALIGNABLE_ANNOTATION></ANNOTATION>", escape(value));
         }
         text.push_str("    </TIER>\n");
     }

@@ -31,7 +31,7 @@ pub struct Args {
 pub fn run(args: &Args, ui: &Ui) -> Result<Outcome> {
     let Args { dir, out, videos } = args;
     ensure!(!out.is_file(), "{} is a file: expected a folder (--out)", out.display());
-    let is_inside = out.canonicalize().is_ok_and(|out| dir.canonicalize().is_ok_and(|dir| out.starts_with(dir)));
+    let is_inside = absolute(out)?.starts_with(absolute(dir)?);
     ensure!(!is_inside, "{} is in the dataset: choose another folder (--out)", out.display());
     let links = videos.as_deref().map(|videos| relative(videos, out)).transpose()?;
     enter_sandbox([out.join(PHASES).as_path()], [dir.as_path()]);
@@ -69,10 +69,13 @@ fn line(name: &str, hand: &PhaseTotals) -> String {
     format!("{name:5} {} ({rate} a minute); {}", counted(hand.n_strokes(), "stroke"), shares.join(", "))
 }
 
+fn absolute(path: &Path) -> Result<PathBuf> {
+    Ok(path.canonicalize().or_else(|_| std::path::absolute(path))?)
+}
+
 /// Path of the existing folder `to`, relative to the folder `from`.
 fn relative(to: &Path, from: &Path) -> Result<PathBuf> {
     ensure!(to.is_dir(), "{} is not a folder: expected the folder with the videos (--videos)", to.display());
-    let absolute = |path: &Path| path.canonicalize().or_else(|_| std::path::absolute(path));
     let (to, from) = (absolute(to)?, absolute(from)?);
     let n_common = to.components().zip(from.components()).take_while(|(a, b)| a == b).count();
     let up = from.components().skip(n_common).map(|_| Path::new(".."));

@@ -29,8 +29,8 @@ pub fn gestures(hands: &[PhaseTotals; 2]) -> Vec<Node> {
     if hands.iter().all(|hand| hand.secs <= 0.0) {
         return vec![node("p").class("empty").text("No accepted and lifted frames: no gestures to show.")];
     }
-    let about = "Strokes, retractions, holds and rests of the wrists relative to the shoulders, found by speed and by the \
-                 place where the hand pauses longest. `orator dataset annotate` writes each of them with its times.";
+    let about = "Strokes, retractions, holds and rests of the wrists relative to the shoulders, found by speed and \
+                 by the place where the hand pauses longest. `orator dataset annotate` writes each of them with its times.";
     let columns = ["hand", "strokes", "a minute", "median amplitude", "median duration"];
     let titles = columns.into_iter().chain(PhaseKind::ALL.map(PhaseKind::name));
     let heads = titles.map(|title| node("th").attr("scope", "col").text(title));

@@ -140,8 +140,8 @@ fn stroke_starts<'t>(segments: impl Iterator<Item = Option<&'t [WristTrack; 2]>>
     starts
 }
 
-/// Reorders clips so that each class of stroke rate, of equal size, is present equally often among the first ones; clips
-/// of a class stay in order.
+/// Reorders clips so that each class of stroke rate, of equal size, is present equally often among the first ones;
+/// clips of a class stay in order.
 fn interleave_classes(clips: &mut Vec<StudyClip>, n_classes: usize) {
     let mut by_rate: Vec<usize> = (0..clips.len()).collect();
     by_rate.sort_by(|a, b| {

@@ -187,7 +187,7 @@ fn the_annotations_of_a_dataset_are_those_of_its_table() {
     );
     fails(&["data", "--out", "deep/out", "--videos", "none"], "none is not a folder");
     fails(&["data", "--out", "films/my talk.mp4"], "is a file: expected a folder");
-    fails(&["data", "--out", "data"], "is in the dataset: choose another folder");
+    fails(&["data", "--out", "data/new"], "is in the dataset: choose another folder");
     fails(&["films", "--out", "deep/out"], "is not a dataset");
 }
 
