@@ -1,8 +1,9 @@
 //! Summary of an analysis for the terminal, and formatting of its numbers.
 
 use super::conclusions::scope;
-use super::result::{ClipShare, StudyAnalysis, TaskAnalysis};
+use super::result::{ClipShare, StrengthEstimate, StudyAnalysis, TaskAnalysis};
 use super::statistic::{StatisticMethod, StatisticRow};
+use crate::stats::bradley_terry::elo;
 use crate::stats::estimate::ConfidenceInterval;
 use orator_base::text::number;
 use std::fmt::Write as _;
@@ -118,7 +119,10 @@ fn rows(task: &TaskAnalysis) -> String {
         let _ = writeln!(text, "  {:<24} median {median:>5} {interval:<12} mean {:>6.2}", row.condition, row.mean);
     }
     for row in &task.strengths {
-        let _ = writeln!(text, "  {:<24} strength {:>+6.2}  Elo {:>6.0}", row.condition, row.log_strength, row.elo);
+        let ends = row.interval.as_ref().map(|interval| [interval.ends.low, interval.ends.high].map(elo));
+        let interval = ends.map(|[low, high]| format!(" [{low:.0}, {high:.0}]")).unwrap_or_default();
+        let StrengthEstimate { condition, log_strength, elo, .. } = row;
+        let _ = writeln!(text, "  {condition:<24} strength {log_strength:>+6.2}  Elo {elo:>6.0}{interval}");
     }
     if let Some(test) = &task.overall {
         let _ =

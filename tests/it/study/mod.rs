@@ -4,6 +4,7 @@ mod analyse;
 mod build;
 mod coverage;
 mod design;
+mod elo;
 mod end_to_end;
 mod films;
 mod glmm;
