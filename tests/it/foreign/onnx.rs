@@ -2,13 +2,13 @@
 //! of the guide: their joints are those of generation.
 
 use crate::fixtures::figures::FPS;
-use crate::fixtures::untrained::write_untrained_speaker;
-use crate::generate::onnx_export::{TOLERANCE, difference, export, sound, write_sequence};
+use crate::generate::onnx_export::{TOLERANCE, difference, export, sound, write_sequence, write_speaker};
 use base64::Engine as _;
 use orator::guide::TOPICS;
 use orator_base::types::pose3d::Motion;
 use orator_formats::{npy, wav};
 use orator_gesture::generate::seq2seq::architecture::Architecture;
+use orator_nn::gan::generator::Preset;
 use orator_test_support::skip::{browser_driver, onnx_web, readers, skip};
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -28,7 +28,7 @@ fn exported_folders(dir: &Path) -> [(&'static str, Motion); 2] {
         std::fs::create_dir(&dir).unwrap();
         wav::write(&dir.join("speech.wav"), &sound(3.3)).unwrap();
         match name {
-            "gan" => write_untrained_speaker(&dir.join("host.safetensors")),
+            "gan" => write_speaker(&dir.join("host.safetensors"), Preset::Light, FPS, true, false),
             _ => write_sequence(&dir.join("host.safetensors"), Architecture::Adversarial, false),
         }
         export(&dir, "--checkpoint host.safetensors --export model.onnx");
