@@ -44,23 +44,3 @@ fn write_with(path: &Path, motion: &Motion, extra: Option<&Array3<f32>>) -> Resu
         extra.map_or(Ok(()), |extra| npz.add_array("extra", extra))
     })
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use orator_base::types::time::FrameRate;
-
-    #[test]
-    fn nose_and_hips_are_stored_with_the_joints() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("joints.npz");
-        let joints = Array3::from_shape_fn((2, N_JOINTS, 3), |(t, joint, k)| (t + joint + k) as f32 * 0.1);
-        let mut motion = Motion::from_joints(FrameRate::new(30_000, 1001), joints);
-        motion.mask[[1, 3]] = false;
-        write(&path, &motion).unwrap();
-        assert_eq!(read_extra(&path).unwrap(), None);
-        let extra = Array3::from_shape_fn((2, 3, 3), |(t, point, k)| (9 * t + 3 * point + k) as f32);
-        write_lifted(&path, &motion, &extra).unwrap();
-        assert_eq!((read(&path).unwrap(), read_extra(&path).unwrap()), (motion, Some(extra)));
-    }
-}

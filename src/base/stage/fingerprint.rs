@@ -171,20 +171,3 @@ pub fn hash_file(path: &Path) -> Result<String> {
     };
     read().with_context(|| format!("cannot read {}", path.display()))
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn records_of_a_former_stage_name_equal_current_ones() {
-        let of = |name: &str| Fingerprint {
-            stage: name.to_owned(),
-            version: 2,
-            settings: serde_json::json!({ name: { "max_mb": 256 }, "tool": "1" }),
-            inputs: BTreeMap::new(),
-        };
-        assert_eq!(of("shard").renamed(), of("dataset"));
-        assert_eq!(of("lift").renamed(), of("lift"));
-    }
-}

@@ -135,19 +135,3 @@ pub fn windows(audio: &Tensor, width: usize) -> Result<Tensor> {
     let n = (audio.dim(1)? + 1).saturating_sub(width);
     Tensor::stack(&(0..n).map(|t| audio.narrow(1, t, width)).collect::<Result<Vec<_>>>()?, 1)
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_number_of_blocks_is_stored_unless_it_is_two() -> anyhow::Result<()> {
-        for (score_blocks, is_stored) in [(2, false), (5, true)] {
-            let config = Config { score_blocks, ..Config::default() };
-            let stored = serde_json::to_string(&config)?;
-            assert_eq!(stored.contains("score_blocks"), is_stored);
-            assert_eq!(serde_json::from_str::<Config>(&stored)?, config);
-        }
-        Ok(())
-    }
-}

@@ -267,20 +267,3 @@ fn open_film(path: &Path, name: &str) -> Result<ServedFilm> {
     let secs = probe(path)?.duration_secs.with_context(|| format!("{} does not state its duration", path.display()))?;
     Ok(ServedFilm { path: path.to_owned(), secs })
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn time_continues_from_the_wall_clock_or_the_latest_stored_time() {
-        let wall_ms = Clock::start(0).now_ms();
-        assert!(wall_ms > 1_700_000_000_000, "{wall_ms}");
-        let ahead_ms = wall_ms + 3_600_000;
-        let clock = Clock::start(ahead_ms);
-        std::thread::sleep(Duration::from_millis(20));
-        let now_ms = clock.now_ms();
-        assert!((ahead_ms + 20..ahead_ms + 60_000).contains(&now_ms), "{now_ms}");
-        assert_eq!(Clock::start(i64::MAX).now_ms(), i64::MAX);
-    }
-}

@@ -152,7 +152,10 @@ fn folders_of_2023_keep_splits_speakers_fingers_and_interlocutors() {
         keys.map(|key| fact(with, key)),
         serde_json::json!([1, true, 2, "trn_2023_v0_000_interloctr.wav"]).as_array().unwrap()[..]
     );
-    assert_eq!(keys[..3].iter().map(|key| fact(without, key)).collect::<Vec<_>>(), serde_json::json!([2, false, 1]).as_array().unwrap()[..]);
+    assert_eq!(
+        keys[..3].iter().map(|key| fact(without, key)).collect::<Vec<_>>(),
+        serde_json::json!([2, false, 1]).as_array().unwrap()[..]
+    );
     assert!(fingers_seen(with) >= 30 && fingers_seen(without) == 0, "{} {}", fingers_seen(with), fingers_seen(without));
     assert!(without.motion.joints.slice(ndarray::s![.., L_HAND + 1..L_HAND + 21, ..]).iter().all(|v| v.is_nan()));
     let words: Vec<_> = with.words.as_ref().unwrap().iter().map(|word| (word.word.as_str(), word.start_secs)).collect();

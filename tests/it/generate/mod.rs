@@ -8,4 +8,5 @@ pub(crate) mod generate_sequence;
 pub(crate) mod normalisation;
 pub(crate) mod onnx_export;
 pub(crate) mod transcripts;
+mod unit;
 pub(crate) mod variants;

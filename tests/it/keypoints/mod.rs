@@ -5,3 +5,4 @@ pub(crate) mod dataset_from_keypoints;
 pub(crate) mod follow;
 pub(crate) mod formats;
 pub(crate) mod point_orders;
+mod unit;

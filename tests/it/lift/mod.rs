@@ -7,4 +7,5 @@ pub(crate) mod lift_camera;
 pub(crate) mod lift_joints;
 pub(crate) mod lift_outliers;
 pub(crate) mod lift_units;
+mod unit;
 pub(crate) mod weights;

@@ -11,4 +11,5 @@ pub(crate) mod media_frames;
 pub(crate) mod shots;
 pub(crate) mod sound;
 pub(crate) mod sync;
+mod unit;
 pub(crate) mod warp;

@@ -14,5 +14,6 @@ mod predict;
 mod score_maps;
 mod spin_pool;
 mod transformer;
+mod unit;
 mod weights;
 mod winograd;

@@ -7,4 +7,5 @@ pub(crate) mod pose_chain;
 pub(crate) mod region;
 pub(crate) mod shared_models;
 pub(crate) mod tracker;
+mod unit;
 pub(crate) mod visibility;

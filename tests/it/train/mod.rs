@@ -16,4 +16,5 @@ pub(crate) mod run_train;
 pub(crate) mod seq2seq;
 pub(crate) mod seq2seq_program;
 pub(crate) mod several_speakers;
+mod unit;
 pub(crate) mod windows_from_shards;

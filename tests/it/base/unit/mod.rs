@@ -2,7 +2,13 @@
 
 mod eigen;
 mod exponential_map;
+mod file_name;
+mod fingerprint;
+mod fk;
+mod foreign_program;
+mod image;
 mod input;
+mod jerk;
 mod lock;
 mod skeleton;
 mod sound;

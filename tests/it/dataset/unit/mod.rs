@@ -1,5 +1,7 @@
 //! Tests of single modules of `orator-dataset`.
 
+mod auto;
+mod former;
 mod info;
 mod joint_stats;
 mod load;

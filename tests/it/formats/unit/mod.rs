@@ -1,5 +1,9 @@
 //! Tests of single modules of `orator-formats`.
 
+mod checkpoint;
 mod glove;
+mod joints_npz;
 mod skeleton;
+mod sound_offset_json;
 mod textgrid;
+mod timeline_npz;

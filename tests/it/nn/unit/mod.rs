@@ -1,0 +1,9 @@
+//! Tests of single modules.
+
+mod body;
+mod channel_stats;
+mod config;
+mod dropout;
+mod frames;
+mod generator;
+mod tensor;

@@ -1,0 +1,3 @@
+//! Tests of single modules.
+
+mod average;
