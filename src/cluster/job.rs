@@ -68,14 +68,3 @@ pub fn shell(words: &[String]) -> String {
     };
     words.iter().map(quoted).collect::<Vec<_>>().join(" ")
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn words_are_quoted_for_a_shell() {
-        let words = ["--set", "gan.steps=5", "my data", "it's", ""].map(str::to_owned);
-        assert_eq!(shell(&words), r"--set gan.steps=5 'my data' 'it'\''s' ''");
-    }
-}

@@ -54,16 +54,3 @@ pub fn size(pose: &Pose) -> f64 {
 pub fn metres_per_unit(poses: &[Pose]) -> f64 {
     upper_median(poses.iter().map(size).filter(|s| *s > 0.0)).map_or(1.0, |s| REFERENCE_SIZE / s)
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn metres_give_the_reference_size() {
-        let pose: Pose = std::array::from_fn(|j| [j as f64, (j * j) as f64, 1.0]);
-        let grow = metres_per_unit(&[pose]);
-        assert!((size(&pose.map(|p| vec3::scale(p, grow))) - REFERENCE_SIZE).abs() < 1e-12);
-        assert_eq!(metres_per_unit(&[]), 1.0);
-    }
-}

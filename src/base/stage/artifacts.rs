@@ -172,16 +172,3 @@ pub fn faces(work: &Path, speaker: &str) -> PathBuf {
 pub fn hashes(work: &Path) -> PathBuf {
     work.join("hashes.json")
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn stages_parse_by_name() {
-        for stage in StageName::ALL {
-            assert_eq!(stage.as_str().parse::<StageName>().unwrap(), stage);
-        }
-        assert!("lit".parse::<StageName>().unwrap_err().to_string().contains("segment, lift, transcribe, dataset"));
-    }
-}

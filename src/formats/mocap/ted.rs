@@ -48,14 +48,3 @@ pub fn read(path: &Path) -> Result<CapturedMotion> {
     }
     Ok(CapturedMotion { motion: Motion::from_joints(fps, joints), text: npz.text("sentence"), facts: Map::new() })
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn hand_joints_are_mapped_without_tips() {
-        assert_eq!((hand(Side::Left)[17], hand(Side::Right)[1]), (Some(14), Some(35)));
-        assert!([4, 8, 12, 16, 20].iter().all(|&tip| hand(Side::Left)[tip].is_none()));
-    }
-}

@@ -1,5 +1,7 @@
 //! Tests of single modules of `orator-base`.
 
+mod artifacts;
+mod cholesky;
 mod eigen;
 mod exponential_map;
 mod file_name;
@@ -12,3 +14,4 @@ mod jerk;
 mod lock;
 mod skeleton;
 mod sound;
+mod upper_body;

@@ -1,4 +1,5 @@
 //! Tests of single modules of `orator-cluster`.
 
+mod job;
 mod plan;
 mod slurm;

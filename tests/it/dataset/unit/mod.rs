@@ -5,4 +5,5 @@ mod former;
 mod info;
 mod joint_stats;
 mod load;
+mod seq2seq;
 mod transcripts;

@@ -1,5 +1,6 @@
 //! Tests of single modules.
 
+mod axis;
 mod body;
 mod channel_stats;
 mod config;
