@@ -203,10 +203,10 @@ mod tests {
         let flat = file("flat/a.bvh", "");
         let flat_sound = file("flat/a.wav", "");
         let flat_words = ["flat/a.json", "flat/a.TextGrid"].map(|name| file(name, ""));
-        let apart = file("trn/bvh/b.BVH", "");
-        let (apart_sound, apart_words) = (file("trn/Wav/b.Flac", ""), file("trn/TSV/b.TSV", ""));
-        let alone = file("trn/bvh/c.bvh", "");
-        let notes = file("trn/bvh/notes.txt", "words");
+        let apart = file("set/bvh/b.BVH", "");
+        let (apart_sound, apart_words) = (file("set/Wav/b.Flac", ""), file("set/TSV/b.TSV", ""));
+        let alone = file("set/bvh/c.bvh", "");
+        let notes = file("set/bvh/notes.txt", "words");
         let broken = file("d.npz", "no zip");
         let tar = file("train-000.tar", "");
         let found = find(&[dir.path().to_owned()], None).unwrap();

@@ -30,7 +30,7 @@ pub struct GeneaTake {
     /// `None`: the challenge has no table of speakers (2020), or it does not list the take.
     pub speaker: Option<GeneaSpeaker>,
     /// Table that should list the take, but does not.
-    pub unlisted_in: Option<PathBuf>,
+    pub missing_from: Option<PathBuf>,
     /// Audio of the interlocutor.
     pub interlocutor: Option<PathBuf>,
 }
@@ -93,10 +93,10 @@ impl GeneaFolders {
         let prefix = stem.strip_suffix(&format!("_{MAIN_AGENT}")).unwrap_or(&stem);
         let table = self.speakers.get(&folder).and_then(Option::as_ref);
         let speaker = table.and_then(|(_, speakers)| speakers.get(prefix).copied());
-        let unlisted_in = table.filter(|_| speaker.is_none()).map(|(path, _)| path.clone());
+        let missing_from = table.filter(|_| speaker.is_none()).map(|(path, _)| path.clone());
         let wav = folder.join(INTERLOCUTOR).join("wav");
         let interlocutor = named.find(&wav, &[&format!("{prefix}_{INTERLOCUTOR}")], &["wav"]).into_iter().next();
-        Ok(Some(GeneaTake { split: location.split, speaker, unlisted_in, interlocutor }))
+        Ok(Some(GeneaTake { split: location.split, speaker, missing_from, interlocutor }))
     }
 }
 
@@ -116,8 +116,8 @@ fn is_table(path: &Path) -> bool {
 /// Parses rows of name, fingers, id (2022, without header), or a table with a header (2023).
 fn parse_table(text: &str) -> Result<BTreeMap<String, GeneaSpeaker>> {
     let rows = text.trim_start_matches('\u{feff}').lines().enumerate();
-    let mut rows = rows.map(|(n, line)| (n + 1, line.split(',').map(str::trim).collect::<Vec<_>>()));
-    let mut rows = rows.by_ref().filter(|(_, cells)| cells.iter().any(|cell| !cell.is_empty())).peekable();
+    let rows = rows.map(|(n, line)| (n + 1, line.split(',').map(str::trim).collect::<Vec<_>>()));
+    let mut rows = rows.filter(|(_, cells)| cells.iter().any(|cell| !cell.is_empty())).peekable();
     let (_, first) = rows.peek().context("the table of speakers is empty")?;
     let (columns, width) = match first.iter().any(|cell| fingers(cell).is_some()) {
         true => ([Some(0), Some(2), Some(1), None], 3),
@@ -165,7 +165,7 @@ fn fingers(cell: &str) -> Option<bool> {
 ///
 /// # Errors
 /// No take has this speaker; the message lists those that there are.
-pub fn select_speaker(takes: &mut Vec<TakeFiles>, id: u32) -> Result<Option<String>> {
+pub fn filter_speaker(takes: &mut Vec<TakeFiles>, id: u32) -> Result<Option<String>> {
     let speaker = |take: &TakeFiles| Some(take.genea.as_ref()?.speaker?.id);
     let ids: BTreeSet<u32> = takes.iter().filter_map(speaker).collect();
     let listed = ids.iter().map(u32::to_string).collect::<Vec<_>>().join(", ");

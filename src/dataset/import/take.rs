@@ -132,7 +132,7 @@ impl ImportedTake {
 impl AcceptedTake {
     /// Adds what a challenge states about the take, and the interlocutor's sound at the sample's length.
     fn add_genea(&mut self, genea: &GeneaTake, limits: &TakeLimits) -> Result<()> {
-        if let Some(path) = &genea.unlisted_in {
+        if let Some(path) = &genea.missing_from {
             self.notes.push(format!("{} does not list this take: its speaker is unknown", file_name(path)));
         }
         if let (Some(speaker), Some(imported)) = (genea.speaker, self.sample.meta["imported"].as_object_mut()) {

@@ -49,7 +49,7 @@ const NO_SOUND: &str =
 pub fn import(plan: &ImportPlan, out: &Path, progress: &dyn Progress) -> Result<Imported> {
     let mut sources = find::find(&plan.sources, plan.kind)?;
     if let Some(id) = plan.speaker_id {
-        sources.notes.extend(genea::select_speaker(&mut sources.takes, id)?);
+        sources.notes.extend(genea::filter_speaker(&mut sources.takes, id)?);
     }
     let (mut about, notes) = (plan.about.clone(), notes(&sources.takes));
     about.notes.extend(notes);
