@@ -37,7 +37,7 @@ const CEPSTRA_TEXT: &str = "Mel-frequency cepstra of the poses for complete segm
                             `frames` is the number of pose frames of the sound.";
 const SEGMENT_TEXT: &str = "Run segment by segment: segment k reads the cepstra from row k times `segment_frames` on, and \
                             as `previous` the output `next` of the segment before, zeros at first. Where there is a \
-                            `state`, it is the `next_state` of the segment before, and `segment` is k. `words` has the \
+                            `state`, it is the `next_state` of the segment before, and `segment_index` is k. `words` has the \
                             words within `words_around_secs` of each pose in a row [poses, W], padded at the end with 0, \
                             or of the segment [1, W]: 1 for a word outside the vocabulary, 2 for its first; 0 without \
                             words.";
@@ -144,7 +144,7 @@ impl ModelFiles<'_> {
             about.push(("words_around_secs", secs.to_string()));
         }
         if is_carried {
-            inputs.extend([("segment", I64, "1"), ("state", F32, state)]);
+            inputs.extend([("segment_index", I64, "1"), ("state", F32, state)]);
             outputs.push(("next_state", F32, state));
         }
         self.write("onnx", graph, &inputs, &outputs, SEGMENT_TEXT, &about)?;

@@ -54,14 +54,14 @@ fn gru(g: &NetworkGraph, name: &str, layer: usize, x: &str, first: Option<&str>)
         let third = values.len() / 3;
         Ok([&values[third..2 * third], &values[..third], &values[2 * third..]].concat())
     };
-    let parts = |kinds: &[&str]| -> Result<Vec<f32>> {
-        let names = ["", "_reverse"][..n].iter().flat_map(|suffix| kinds.iter().map(move |kind| (kind, suffix)));
+    let parts = |kinds: &str| -> Result<Vec<f32>> {
+        let names = ["", "_reverse"][..n].iter().flat_map(|suffix| kinds.split(' ').map(move |kind| (kind, suffix)));
         Ok(names.map(|(kind, suffix)| part(kind, suffix)).collect::<Result<Vec<_>>>()?.concat())
     };
-    let (of_input, of_state) = (parts(&["weight_ih"])?, parts(&["weight_hh"])?);
+    let (of_input, of_state) = (parts("weight_ih")?, parts("weight_hh")?);
     let of_input = g.floats(&[n, 3 * hidden, of_input.len() / (3 * hidden * n)], &of_input)?;
     let of_state = g.floats(&[n, 3 * hidden, hidden], &of_state)?;
-    let biases = g.floats(&[n, 6 * hidden], &parts(&["bias_ih", "bias_hh"])?)?;
+    let biases = g.floats(&[n, 6 * hidden], &parts("bias_ih bias_hh")?)?;
     let mut inputs = vec![x, &of_input, &of_state, &biases];
     inputs.extend(first.map(|first| ["", first]).into_iter().flatten());
     let attributes = [
@@ -157,7 +157,7 @@ fn decoder(g: &NetworkGraph, metadata: &SequenceMetadata, encoded: &[String], is
     let [_, mut state] = gru(g, "decoder.gru", 0, &previous, Some(&g.reshaped("Unsqueeze", &first, &[0])?))?;
     if is_carried {
         let [_, carried] = gru(g, "decoder.gru", 0, &input, Some(&g.reshaped("Unsqueeze", "state", &[0])?))?;
-        state = g.op("Where", &[&g.chain("segment", &[("Equal", 0)])?, &state, &carried]);
+        state = g.op("Where", &[&g.chain("segment_index", &[("Equal", 0)])?, &state, &carried]);
     }
     let names = ["decoder.attention", "decoder.word_attention"];
     let keys = names.iter().zip(encoded).map(|(name, states)| affine(g, name, states)).collect::<Result<Vec<_>>>()?;

@@ -41,6 +41,8 @@ pub struct AnnotationTotals {
 struct VideoAnnotations {
     tiers: BTreeMap<String, Vec<Annotation>>,
     rows: Vec<Vec<String>>,
+    /// Sound of imported motion.
+    sound: Option<String>,
 }
 
 impl VideoAnnotations {
@@ -50,7 +52,7 @@ impl VideoAnnotations {
 }
 
 /// Writes `phases.csv` and `VIDEO.eaf` for every video of a dataset into the folder `out`. `media` returns the path of
-/// a video, given its file name, relative to `out`.
+/// a video or sound, given its file name, relative to `out`.
 ///
 /// # Errors
 /// A damaged sample, a file that cannot be written, or an error of `media`.
@@ -73,13 +75,13 @@ pub fn annotate(
     let mut table = csv::Writer::from_writer(Vec::new());
     table.write_record(COLUMNS.split(','))?;
     for video in &ledgers {
-        let path = media(&video.file)?;
         let mut samples = samples.remove(&video.name).unwrap_or_default();
         samples.sort_by_key(|(first, _)| *first);
         let mut annotations = VideoAnnotations::default();
         annotations.add_rejected(video);
         annotations.add_samples(dataset, &samples, video, &mut totals)?;
         annotations.rows.iter().try_for_each(|row| table.write_record(row))?;
+        let path = media(annotations.sound.as_deref().unwrap_or(&video.file))?;
         let text = eaf::write(&path, &annotations.in_order());
         workdir::write_file(&out.join(format!("{}.eaf", video.name)), text.as_bytes())?;
         task.advance(1);
@@ -112,6 +114,8 @@ impl VideoAnnotations {
         let mut words: Vec<Option<Vec<Word>>> = Vec::new();
         for (first, sample) in samples {
             let sample = dataset.read(sample)?;
+            // ELAN plays the sound of imported motion.
+            self.sound = sample.meta["imported"]["sound"].as_str().map(str::to_owned);
             let zero_secs = dataset.info().fps.secs(*first);
             for (tracks, (side, _)) in tracks.iter_mut().zip(HANDS) {
                 tracks.push(WristTrack::new(&sample.motion, side));

@@ -15,7 +15,6 @@ mod split;
 pub(crate) mod splits;
 pub(crate) mod splits_by_time;
 pub(crate) mod transcribe;
-pub(crate) mod transcribe_verb;
 pub(crate) mod transcripts;
 mod unit;
 pub(crate) mod words;

@@ -293,7 +293,7 @@ fn sequence_joints(
             inputs.push(("words", integers(shape, numbers.into_iter().map(i64::from).collect())));
         }
         if is_carried {
-            inputs.push(("segment", integers(&[1], vec![segment as i64])));
+            inputs.push(("segment_index", integers(&[1], vec![segment as i64])));
             inputs.push(("state", floats(&[1, sizes.hidden], state.clone())));
         }
         let outputs = network.run(inputs).unwrap();

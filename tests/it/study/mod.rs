@@ -4,7 +4,6 @@ mod analyse;
 mod build;
 mod coverage;
 mod design;
-mod elo;
 mod end_to_end;
 mod films;
 mod glmm;

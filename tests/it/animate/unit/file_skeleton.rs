@@ -4,7 +4,7 @@ use orator_avatar::animate::rig::file_skeleton::{FileSkeleton, RestAxes};
 use orator_avatar::animate::rig::names::Names;
 use orator_avatar::animate::rig::rig::Rig;
 use orator_base::math::rotation::Rotation;
-use orator_base::math::vec3::{Vec3, scale, unit};
+use orator_base::math::vec3::unit;
 use orator_base::math::vec3::{dot, norm, sub};
 use orator_base::types::pose3d::Motion;
 use orator_base::types::skeleton::N_JOINTS;

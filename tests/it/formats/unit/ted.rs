@@ -1,6 +1,6 @@
 //! Unit tests of `orator_formats::mocap::ted`.
 
-use orator_base::types::skeleton::{L_HAND, N_JOINTS, R_HAND, Side};
+use orator_base::types::skeleton::Side;
 use orator_formats::mocap::ted::hand;
 
 #[test]

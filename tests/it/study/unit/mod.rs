@@ -3,6 +3,7 @@
 mod bradley_terry;
 mod build;
 mod database;
+mod elo;
 mod estimate;
 mod exclusion;
 mod film;

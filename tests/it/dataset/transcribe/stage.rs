@@ -53,8 +53,6 @@ fn recognised_words_reach_the_dataset_and_the_report() {
     assert_eq!(project.answer(&["report"]).code, 0);
     let page = fs::read_to_string(project.work().join("report.html")).unwrap();
     assert!(page.contains(" of 2 words") && page.contains("\nthe"), "{page:.2000}");
-    let plan = project.answer(&["plan"]);
-    assert!(plan.json["stages"]["transcribe"]["bytes"].as_f64().unwrap() > 0.0, "{}", plan.json);
 }
 
 #[test]

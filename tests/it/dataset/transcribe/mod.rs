@@ -1,0 +1,4 @@
+//! Recognition of words: the stage and the verb.
+
+mod stage;
+mod verb;
