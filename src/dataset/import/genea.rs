@@ -43,6 +43,9 @@ pub struct GeneaSpeaker {
     pub interlocutor_id: Option<u32>,
 }
 
+/// Speakers by the names of their takes.
+type SpeakerTable = BTreeMap<String, GeneaSpeaker>;
+
 /// Location of a file in the folders of a challenge.
 struct GeneaLocation {
     split_folder: PathBuf,
@@ -53,7 +56,7 @@ struct GeneaLocation {
 /// Takes and other files of the challenges' folders.
 #[derive(Default)]
 pub struct GeneaFolders {
-    speakers: BTreeMap<PathBuf, Option<(PathBuf, BTreeMap<String, GeneaSpeaker>)>>,
+    speakers: BTreeMap<PathBuf, Option<(PathBuf, SpeakerTable)>>,
 }
 
 fn lower_name(path: &Path) -> String {
@@ -101,7 +104,7 @@ impl GeneaFolders {
 }
 
 /// The table of a split folder with its speakers by the prefix of their files' names; `None`: there is no table.
-fn read_table(folder: &Path) -> Result<Option<(PathBuf, BTreeMap<String, GeneaSpeaker>)>> {
+fn read_table(folder: &Path) -> Result<Option<(PathBuf, SpeakerTable)>> {
     let entries = std::fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.path());
     let Some(path) = entries.filter(|path| is_table(path)).min() else { return Ok(None) };
     let text = input::read_text(&path, input::MAX_TEXT).with_context(|| format!("cannot read {}", path.display()))?;
@@ -114,7 +117,7 @@ fn is_table(path: &Path) -> bool {
 }
 
 /// Parses rows of name, fingers, id (2022, without header), or a table with a header (2023).
-fn parse_table(text: &str) -> Result<BTreeMap<String, GeneaSpeaker>> {
+fn parse_table(text: &str) -> Result<SpeakerTable> {
     let rows = text.trim_start_matches('\u{feff}').lines().enumerate();
     let rows = rows.map(|(n, line)| (n + 1, line.split(',').map(str::trim).collect::<Vec<_>>()));
     let mut rows = rows.filter(|(_, cells)| cells.iter().any(|cell| !cell.is_empty())).peekable();

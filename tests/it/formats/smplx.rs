@@ -21,6 +21,7 @@ use serde_json::Value;
 use std::f64::consts::FRAC_PI_2;
 use std::path::{Path, PathBuf};
 use std::process::Command;
+type NamedArrays = Vec<(&'static str, ArrayD<f64>)>;
 
 const SCRIPT: &str = "fixtures/reference/smplx_reference.py";
 const THIRTY: FrameRate = FrameRate::new(30, 1);
@@ -120,7 +121,7 @@ fn every_layout_gives_the_same_joints() {
     };
     let rows = |first: usize, n: usize| part(first, n, &[5, 3 * n]);
     let smplh = ndarray::concatenate![ndarray::Axis(1), poses.slice(s![.., ..66]), poses.slice(s![.., 75..])];
-    let layouts: [(&str, Vec<(&str, ArrayD<f64>)>); 5] = [
+    let layouts: [(&str, NamedArrays); 5] = [
         ("joints by vectors", vec![("poses", part(0, 55, &[5, 55, 3]))]),
         ("SMPL-H", vec![("poses", smplh.into_dyn()), ("betas", ArrayD::zeros(IxDyn(&[16]))), ("trans", trans())]),
         ("AMASS", vec![("root_orient", rows(0, 1)), ("pose_body", rows(1, 21)), ("pose_hand", rows(25, 30))]),
@@ -180,7 +181,7 @@ fn invalid_files_are_rejected_with_key_and_shape() {
     nan[[2, 70]] = f64::NAN;
     let [root, body, hand] =
         [("root_orient", 3), ("pose_body", 63), ("pose_hand", 90)].map(|(key, n)| (key, zeros(&[4, n])));
-    let cases: Vec<(Vec<(&str, ArrayD<f64>)>, &[&str])> = vec![
+    let cases: Vec<(NamedArrays, &[&str])> = vec![
         (vec![("poses", nan)], &["`poses`, shape [4, 165]: frame 2 has a number that is not finite"]),
         (vec![("poses", zeros(&[660]))], &["`poses` has shape [660], expected [T, 165] or [T, 156]"]),
         (vec![("poses", zeros(&[4, 72]))], &["`poses` has shape [4, 72], expected [T, 165] or [T, 156]"]),

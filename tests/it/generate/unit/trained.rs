@@ -10,7 +10,7 @@ fn contents(dropout: f64) -> Contents {
     let weight = Tensor::ones((2, 64, 3), DType::F32, &Device::Cpu).unwrap();
     Contents {
         facts: serde_json::json!({ "settings": { "dropout": dropout } }),
-        tensors: BTreeMap::from([(format!("generator.enter.0.conv.weight"), weight)]),
+        tensors: BTreeMap::from([("generator.enter.0.conv.weight".to_owned(), weight)]),
     }
 }
 

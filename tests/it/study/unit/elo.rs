@@ -58,7 +58,7 @@ fn expected_votes_of_eight_systems_give_their_elo_within_a_point() {
     let mut table = HEADER.to_owned();
     for ([first, second], share) in pairs() {
         for n in 0..1000 {
-            let wins = (n as f64) < (1000.0 * share).round();
+            let wins = f64::from(n) < (1000.0 * share).round();
             let (shown, step) = match n % 2 {
                 0 => (format!("{first}|{second}"), if wins { -2 } else { 2 }),
                 _ => (format!("{second}|{first}"), if wins { 2 } else { -2 }),
