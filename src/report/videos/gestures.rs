@@ -30,10 +30,11 @@ pub fn gestures(hands: &[PhaseTotals; 2]) -> Vec<Node> {
         return vec![node("p").class("empty").text("No accepted and lifted frames: no gestures to show.")];
     }
     let about = "Strokes, retractions, holds and rests of the wrists relative to the shoulders, found by speed and \
-                 by the place where the hand pauses longest. `orator dataset annotate` writes each of them with its times.";
+                 by the place where the hand pauses longest. The command orator dataset annotate writes each with its times.";
     let columns = ["hand", "strokes", "a minute", "median amplitude", "median duration"];
     let titles = columns.into_iter().chain(PhaseKind::ALL.map(PhaseKind::name));
-    let heads = titles.map(|title| node("th").attr("scope", "col").text(title));
+    let class = |title: &str| if title == columns[0] { "" } else { "num" };
+    let heads = titles.map(|title| node("th").class(class(title)).attr("scope", "col").text(title));
     let rows = hands.iter().zip(HANDS).map(|(hand, (_, name))| {
         let median = hand.median_stroke();
         let shown = |value: Option<f64>, unit: &str, digits: f64| {
