@@ -8,8 +8,11 @@ use std::ffi::OsStr;
 use std::fs;
 use std::path::{Path, PathBuf};
 
+/// Folder of excerpts that an `orator plan` of version 0.1 left if it was killed.
+const FORMER_EXCERPTS: &str = "timing";
+
 /// Paths in the work folder to remove: plans that contain one of the terms, with the folders of their workers; worker
-/// folders of earlier plans that contain one.
+/// folders of earlier plans that contain one; and former excerpts.
 pub fn plans_naming(work: &Path, terms: &[SearchTerm]) -> Result<Vec<PathBuf>> {
     if !work.is_dir() {
         return Ok(Vec::new());
@@ -30,6 +33,11 @@ pub fn plans_naming(work: &Path, terms: &[SearchTerm]) -> Result<Vec<PathBuf>> {
         if found.contains(&plan) || holds_one(path)? {
             found.insert(path.clone());
         }
+    }
+    let excerpts = work.join(FORMER_EXCERPTS);
+    let is_excerpt = |entry: &fs::DirEntry| Path::new(&entry.file_name()).extension().is_some_and(|it| it == "mkv");
+    if fs::read_dir(&excerpts).is_ok_and(|mut entries| entries.all(|entry| entry.is_ok_and(|e| is_excerpt(&e)))) {
+        found.insert(excerpts);
     }
     Ok(found.into_iter().collect())
 }

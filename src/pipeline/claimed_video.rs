@@ -94,16 +94,16 @@ impl Pipeline {
         used.iter().map(hash).chain(recogniser).collect()
     }
 
-    /// Checks that the stages have what they need: models, manifest, weights.
+    /// Checks that the stages have what they need: models, manifest, weights. Returns a note to print.
     ///
     /// # Errors
     /// The missing file, and where to get it.
-    pub fn check(&self) -> Result<()> {
-        if self.all_videos().iter().any(orator_dataset::config::videos::Videos::has_video_files) {
-            stages::check_models(&self.config().settings)?;
-        }
+    pub fn check(&self) -> Result<Option<String>> {
+        let has_videos = self.all_videos().iter().any(orator_dataset::config::videos::Videos::has_video_files);
+        let note = if has_videos { stages::check_models(&self.config().settings)? } else { None };
         let settings = &self.config().settings;
         let names = self.all_videos().iter().flat_map(|videos| settings.stages_of(&videos.speaker));
-        names.collect::<BTreeSet<_>>().into_iter().try_for_each(|name| self.stage(name, &[]).map(drop))
+        names.collect::<BTreeSet<_>>().into_iter().try_for_each(|name| self.stage(name, &[]).map(drop))?;
+        Ok(note)
     }
 }

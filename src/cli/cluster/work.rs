@@ -4,6 +4,7 @@ use super::plan::open;
 use crate::cli::Outcome;
 use crate::cli::ui::Ui;
 use anyhow::Result;
+use orator_base::stage::progress::{Event, Progress as _};
 use orator_base::text::counted;
 use orator_cluster::heartbeat::DEAD_AFTER;
 use orator_cluster::worker::{WorkReport, WorkerOptions, work};
@@ -54,7 +55,7 @@ fn shard(text: &str) -> Result<(usize, usize), String> {
 
 pub(crate) fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     let (plan, pipeline) = open(&args.plan)?;
-    pipeline.check()?;
+    pipeline.check()?.iter().for_each(|line| ui.event(&Event::Advice { line }));
     let cores = || std::thread::available_parallelism().map_or(1, |n| n.get());
     let secs = |secs: f64| Duration::try_from_secs_f64(secs.max(0.1)).unwrap_or(Duration::MAX);
     let options = WorkerOptions {

@@ -10,7 +10,7 @@ use orator_dataset::Dataset;
 use orator_gesture::phases::annotations::{PHASES, annotate};
 use orator_gesture::phases::{HANDS, PhaseKind, PhaseTotals};
 use serde_json::json;
-use std::path::{Path, PathBuf};
+use std::path::{Component, Path, PathBuf};
 
 /// Write gesture phases, words and rejected seconds for ELAN and as a table.
 ///
@@ -69,8 +69,18 @@ fn line(name: &str, hand: &PhaseTotals) -> String {
     format!("{name:5} {} ({rate} a minute); {}", counted(hand.n_strokes(), "stroke"), shares.join(", "))
 }
 
+/// The path without links and `..`; its last folders may not exist yet.
 fn absolute(path: &Path) -> Result<PathBuf> {
-    Ok(path.canonicalize().or_else(|_| std::path::absolute(path))?)
+    let full = std::path::absolute(path)?;
+    let existing = full.ancestors().find(|folder| folder.exists()).unwrap_or(Path::new("/"));
+    let mut found = existing.canonicalize()?;
+    for part in full.strip_prefix(existing)?.components() {
+        match part {
+            Component::ParentDir => drop(found.pop()),
+            part => found.push(part),
+        }
+    }
+    Ok(found)
 }
 
 /// Path of the existing folder `to`, relative to the folder `from`.

@@ -95,7 +95,8 @@ pub struct Args {
 /// Arguments that replace --audio.
 const WITHOUT_AUDIO: [&str; 3] = ["audio_folder", "batch", "export"];
 /// Arguments that are about a sound or its motion.
-const EXCLUDED_BY_EXPORT: [&str; 5] = ["audio", "audio_folder", "batch", "transcript", "words"];
+const EXCLUDED_BY_EXPORT: [&str; 9] =
+    ["audio", "audio_folder", "batch", "transcript", "words", "out", "out_folder", "force", "variants"];
 
 pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     let device = args.device;

@@ -64,7 +64,7 @@ fn lower_name(path: &Path) -> String {
 }
 
 fn locate(file: &Path) -> Option<GeneaLocation> {
-    let file = std::path::absolute(file).ok()?;
+    let file = file.canonicalize().or_else(|_| std::path::absolute(file)).ok()?;
     let mut folder = file.parent()?.parent()?;
     let person = lower_name(folder);
     if person == MAIN_AGENT || person == INTERLOCUTOR {
@@ -119,7 +119,8 @@ fn is_table(path: &Path) -> bool {
 /// Parses rows of name, fingers, id (2022, without header), or a table with a header (2023).
 fn parse_table(text: &str) -> Result<SpeakerTable> {
     let rows = text.trim_start_matches('\u{feff}').lines().enumerate();
-    let rows = rows.map(|(n, line)| (n + 1, line.split(',').map(str::trim).collect::<Vec<_>>()));
+    let rows =
+        rows.map(|(n, line)| (n + 1, line.split(',').map(|cell| cell.trim().trim_matches('"')).collect::<Vec<_>>()));
     let mut rows = rows.filter(|(_, cells)| cells.iter().any(|cell| !cell.is_empty())).peekable();
     let (_, first) = rows.peek().context("the table of speakers is empty")?;
     let (columns, width) = match first.iter().any(|cell| fingers(cell).is_some()) {
@@ -148,7 +149,7 @@ fn parse_table(text: &str) -> Result<SpeakerTable> {
         let Some(has_fingers) = fingers(has_fingers) else {
             bail!("line {line}: the fingers are {has_fingers:?}, expected finger_incl or finger_excl")
         };
-        let interlocutor_id = interlocutor.map(number).transpose()?;
+        let interlocutor_id = interlocutor.filter(|id| !id.is_empty()).map(number).transpose()?;
         let speaker = GeneaSpeaker { id: number(id.unwrap_or_default())?, has_fingers, interlocutor_id };
         ensure!(speakers.insert(name.to_owned(), speaker).is_none(), "line {line}: {name} is listed twice");
     }

@@ -119,7 +119,7 @@ impl ImportedTake {
                 let accepted = to_accepted((&name, speaker), found, &captured, motion, sound)?;
                 let mut accepted = AcceptedTake { sound_note, ..accepted };
                 if let Some(genea) = &found.genea {
-                    accepted.add_genea(genea, limits)?;
+                    accepted.add_genea(genea, limits);
                 }
                 TakeOutcome::Accepted(Box::new(accepted))
             }
@@ -131,7 +131,7 @@ impl ImportedTake {
 
 impl AcceptedTake {
     /// Adds what a challenge states about the take, and the interlocutor's sound at the sample's length.
-    fn add_genea(&mut self, genea: &GeneaTake, limits: &TakeLimits) -> Result<()> {
+    fn add_genea(&mut self, genea: &GeneaTake, limits: &TakeLimits) {
         if let Some(path) = &genea.missing_from {
             self.notes.push(format!("{} does not list this take: its speaker is unknown", file_name(path)));
         }
@@ -140,10 +140,10 @@ impl AcceptedTake {
             let facts = json!({ "speaker_id": id, "has_fingers": has_fingers, "interlocutor_id": interlocutor_id });
             imported.extend(facts.as_object().cloned().unwrap_or_default());
         }
-        let Some(path) = genea.interlocutor.as_ref().filter(|_| !limits.no_sound) else { return Ok(()) };
-        let Some(mut sound) = audio::read_mono_with_note(path, SAMPLE_RATE)?.map(|(sound, _)| sound) else {
-            self.notes.push(format!("{} holds no sound", file_name(path)));
-            return Ok(());
+        let Some(path) = genea.interlocutor.as_ref().filter(|_| !limits.no_sound) else { return };
+        let Ok(Some((mut sound, _))) = audio::read_mono_with_note(path, SAMPLE_RATE) else {
+            self.notes.push(format!("{} holds no readable sound: it is left out", file_name(path)));
+            return;
         };
         let difference_secs = sound.secs() - self.sample.sound.secs();
         if difference_secs.abs() > limits.max_difference_secs {
@@ -154,7 +154,6 @@ impl AcceptedTake {
         sound.samples.resize(self.sample.sound.samples.len(), 0.0);
         self.sample.meta["imported"]["interlocutor"] = file_name(path).into();
         self.sample.interlocutor = Some(sound);
-        Ok(())
     }
 }
 

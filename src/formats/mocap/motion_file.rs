@@ -101,7 +101,7 @@ fn read_in(path: &Path, fps: Option<FrameRate>, units: Option<LengthUnit>) -> Re
             notes.extend(bvh::notes(&captured.facts).into_iter().map(|note| format!("{name}: {note}")));
             let rotated_degrees =
                 captured.facts.get("turned_degrees").and_then(serde_json::Value::as_f64).unwrap_or(0.0);
-            if rotated_degrees.abs() > 0.0 {
+            if rotated_degrees.abs() >= 0.5 {
                 notes.push(format!(
                     "{name} does not face +z: rotated by {rotated_degrees:.0} degrees to face the camera"
                 ));

@@ -13,6 +13,7 @@ use orator_dataset::verify::verify::read_ledgers;
 use orator_dataset::write::assemble::LedgerLine;
 use orator_dataset::{Dataset, Split};
 use orator_formats::eaf::{self, Annotation, AnnotationTier};
+use orator_formats::mocap::motion_file::has_ending;
 use orator_formats::transcript::Word;
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -81,7 +82,10 @@ pub fn annotate(
         annotations.add_rejected(video);
         annotations.add_samples(dataset, &samples, video, &mut totals)?;
         annotations.rows.iter().try_for_each(|row| table.write_record(row))?;
-        let path = media(annotations.sound.as_deref().unwrap_or(&video.file))?;
+        let sound = annotations.sound.as_deref();
+        // The sound of a rejected take is not known.
+        let is_rejected_take = sound.is_none() && has_ending(Path::new(&video.file));
+        let path = if is_rejected_take { video.file.clone() } else { media(sound.unwrap_or(&video.file))? };
         let text = eaf::write(&path, &annotations.in_order());
         workdir::write_file(&out.join(format!("{}.eaf", video.name)), text.as_bytes())?;
         task.advance(1);

@@ -1,4 +1,4 @@
-//! Phases of a hand: its movements, and the pauses between them, which are rests at the place to which the hand returns
+//! Phases of a hand: its movements, and the pauses between them, which are rests at the position to which the hand returns
 //! and holds elsewhere.
 
 use super::movements::{self, MIN_PAUSE_SECS, WristMovement, WristRun, WristThresholds};
@@ -7,12 +7,12 @@ use orator_base::math::order::{self, Ordered};
 use orator_base::math::vec3::{Vec3, norm, sub};
 use orator_formats::transcript::Word;
 
-/// Radius of the place of rest, and depth below it at which a pause is also a rest, metres for a normal arm.
+/// Radius around the rest position, and depth below it at which a pause is also a rest, metres for a normal arm.
 const REST_RADIUS: f64 = 0.12;
 const REST_DEPTH: f64 = 0.03;
-/// Height above the lowest positions at which a pause counts 1/e as much in the search for the place of rest, metres.
+/// Height above the lowest positions at which a pause counts 1/e as much in the search for the rest position, metres.
 const REST_HEIGHT: f64 = 0.2;
-/// Minimum depth of a place of rest below the shoulders, metres.
+/// Minimum depth of a rest position below the shoulders, metres.
 const MIN_REST_DEPTH: f64 = 0.15;
 /// Longest time between the start of a stroke and a word to which it is bound, seconds.
 const WORD_SECS: f64 = 0.2;
@@ -76,13 +76,13 @@ impl GesturePhase {
 }
 
 /// Finds the phases of a hand in the intervals of one recording, each with times from its start, in order and disjoint.
-/// Thresholds and the place of rest are those of the recording. A missing frame ends a phase, and pauses of less than
-/// 0.2 s are none.
+/// Thresholds and the rest position are those of the recording. A missing frame ends a phase, and pauses of less than
+/// 0.2 s are ignored.
 pub fn find_phases(tracks: &[WristTrack]) -> Vec<Vec<GesturePhase>> {
     let (thresholds, runs) = movements::runs(tracks);
     let found = runs.iter().map(|runs| runs.iter().map(|run| RunPhases::new(run, &thresholds)).collect());
     let found: Vec<Vec<RunPhases>> = found.collect();
-    let rest = place_of_rest(found.iter().flatten(), thresholds.metres);
+    let rest = rest_position(found.iter().flatten(), thresholds.metres);
     let phases = tracks
         .iter()
         .zip(&found)
@@ -177,7 +177,7 @@ fn pause_kind(at: Vec3, rest: Option<Vec3>, metres: f64) -> (PhaseKind, f64) {
 
 /// The pause near which the hand pauses longest, with a preference for low ones; `None`: there are no
 /// pauses below the shoulders.
-fn place_of_rest<'r>(runs: impl Iterator<Item = &'r RunPhases<'r>> + Clone, metres: f64) -> Option<Vec3> {
+fn rest_position<'r>(runs: impl Iterator<Item = &'r RunPhases<'r>> + Clone, metres: f64) -> Option<Vec3> {
     let heights = runs.clone().flat_map(|run| run.run.smooth.iter().map(|p| p[1]));
     let lowest = Ordered::new(heights).quantile(0.95)?;
     let pauses: Vec<(f64, f64, Vec3)> = runs.flat_map(|run| run.pauses.iter().flatten().copied()).collect();

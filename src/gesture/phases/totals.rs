@@ -6,7 +6,7 @@ use orator_base::math::order;
 /// Phases of one hand, and the seconds in which they were searched for.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct PhaseTotals {
-    /// Duration of the motion, seconds, with parts that are no phase.
+    /// Duration of the motion, seconds, with the parts outside all phases.
     pub secs: f64,
     strokes: Vec<GesturePhase>,
     /// Seconds by `PhaseKind`.

@@ -31,7 +31,9 @@ const MESSAGE_INTERVAL: Duration = Duration::from_millis(50);
 pub fn serve() -> Result<()> {
     rustix::process::set_parent_process_death_signal(Some(rustix::process::Signal::KILL))?;
     let out = Arc::new(Messages(Mutex::new(std::io::stdout())));
-    match receive(&mut std::io::stdin().lock()).context("this command is used only by `orator run` itself")? {
+    // In a statement of its own, so that the lock is released before `receive_answers` needs it.
+    let request = receive(&mut std::io::stdin().lock()).context("this command is used only by `orator run` itself")?;
+    match request {
         Request::Restrict => {
             out.send(&Message::Restricted(restrict(&FileAccess { reads: Some(Vec::new()), writes: Vec::new() })))
         }

@@ -19,12 +19,13 @@ fn plans_that_hold_a_video_are_found_with_their_folders() {
     write("other.json", &plan("/v/b.mp4"));
     write("other-0123456789ab/workers/w.json", "/v/b.mp4");
     write("stage_times.json", "\"/v/a.mp4\"");
+    write("timing/00.mkv", "an excerpt");
     write("takes-202403051430/a.mp4", "/v/a.mp4");
     write("other-bbbbbbbbbbbb/workers/w.json", "/v/a.mp4");
     write("other-bbbbbbbbbbbb/notes.txt", "a user's own");
     let terms = SearchTerm::name("path", "/v/a.mp4");
     let found = plans_naming(work, &terms).unwrap();
-    let expected = ["plan-0123456789ab", "plan-aaaaaaaaaaaa", "plan.json"].map(|name| work.join(name));
+    let expected = ["plan-0123456789ab", "plan-aaaaaaaaaaaa", "plan.json", "timing"].map(|name| work.join(name));
     assert_eq!(found, expected);
     assert!(plans_naming(&work.join("none"), &terms).unwrap().is_empty());
 }

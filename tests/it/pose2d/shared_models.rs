@@ -1,19 +1,31 @@
 //! Models that several workers share: values in batches, the messages of subprocesses, the settings.
 
 use crate::fixtures::onnx_models::models;
+use orator::load_config;
 use orator_base::stage::progress::Silent;
 use orator_base::stage::{Stage, Unit};
 use orator_base::types::device::DeviceChoice;
 use orator_base::types::image::{Image, PixelArea};
 use orator_base::types::pose2d::{Keypoint, Pose2d};
-use orator_dataset::config::Settings;
+use orator_base::types::time::FrameRate;
+use orator_dataset::config::{Config, Settings};
+use orator_formats::keypoints_npz;
+use orator_media::ffmpeg::write::encode::VideoWriter;
 use orator_media::opencv::png;
 use orator_onnx::{ModelStore, Runtime};
 use orator_pipeline::pose2d::models::{choose, runtime};
 use orator_pipeline::pose2d::{Chain, Pose2dStage};
-use orator_pipeline::process::message::{Message, receive_floats, send, send_floats};
+use orator_pipeline::process::VERB;
+use orator_pipeline::process::message::{Message, Request, UnitRequest, receive_floats, send, send_floats};
 use orator_pipeline::process::stage::follow;
+use std::cell::Cell;
+use std::io::BufReader;
 use std::path::Path;
+use std::process::{Command, Stdio};
+use std::sync::mpsc::{RecvTimeoutError, channel};
+use std::time::Duration;
+
+const PROGRAM: &str = env!("CARGO_BIN_EXE_orator");
 
 /// The three frames of the rendered speaker, complete and without a margin.
 fn pictures() -> Vec<Image> {
@@ -91,6 +103,71 @@ fn a_run_computes_shared_models_for_its_subprocess() {
             assert_eq!((report.unwrap_err().to_string(), answer.len()), ("no model unknown".to_owned(), 0));
         }
     }
+}
+
+/// Project with the pictures as a video, of which the frames are extracted; its configuration and the video's unit.
+fn project(dir: &Path, models: &Path) -> (Config, Unit) {
+    let source = dir.join("videos/clip.mp4");
+    std::fs::create_dir(dir.join("videos")).unwrap();
+    let mut video = VideoWriter::create(&source, 320, 240, FrameRate::new(15, 1), None).unwrap();
+    pictures().iter().step_by(2).flat_map(|picture| [picture; 4]).for_each(|picture| video.push(picture).unwrap());
+    video.finish().unwrap();
+    let file = dir.join("pipeline.toml");
+    let text = format!("[models]\ndir = {models:?}\n[[speaker]]\nname = \"host\"\nvideos = [\"videos\"]\n");
+    std::fs::write(&file, text).unwrap();
+    let run = Command::new(PROGRAM).args(["run", "--to", "extract", "-c"]).arg(&file).output().unwrap();
+    assert!(run.status.success(), "{}", String::from_utf8_lossy(&run.stderr));
+    let mut folders = std::fs::read_dir(dir.join("work/extract/host")).unwrap();
+    let video = folders.next().unwrap().unwrap().file_name().to_string_lossy().into_owned();
+    (load_config(&file, &[]).unwrap(), Unit { speaker: "host".into(), video, source })
+}
+
+#[test]
+fn a_subprocess_detects_keypoints_with_the_models_of_the_run() {
+    let Some((store, runtime)) = models() else { return };
+    let dir = tempfile::tempdir().unwrap();
+    let (Config { mut settings, file, .. }, unit) = project(dir.path(), store.dir());
+    // The CPU answers in place of the GPU.
+    settings.models.provider = DeviceChoice::Cuda(0);
+    settings.models.onnxruntime = runtime.library().to_owned();
+    let inputs = Pose2dStage::new(&settings).unwrap().inputs(&unit).unwrap().into_iter().map(|input| input.path);
+    let reads = inputs.chain([store.dir().to_owned(), runtime.library().to_owned()]).map(Into::into).collect();
+    let out = dir.path().join("out");
+    std::fs::create_dir(&out).unwrap();
+    let request = UnitRequest {
+        stage: "pose2d".to_owned(),
+        speaker: unit.speaker.clone(),
+        video: unit.video.clone(),
+        source: unit.source.clone().into(),
+        part: None,
+        settings,
+        config_file: file,
+        keypoints: None,
+        reads,
+        out: out.clone().into(),
+        memory: 8 << 30,
+    };
+    let mut child = Command::new(PROGRAM).arg(VERB).stdin(Stdio::piped()).stdout(Stdio::piped()).spawn().unwrap();
+    let (mut stdin, stdout, pid) = (child.stdin.take(), child.stdout.take().unwrap(), child.id());
+    send(stdin.as_mut().unwrap(), &Request::Unit(Box::new(request))).unwrap();
+    let (ended, end) = channel::<()>();
+    let watchdog = std::thread::spawn(move || {
+        if end.recv_timeout(Duration::from_secs(120)) == Err(RecvTimeoutError::Timeout) {
+            Command::new("kill").args(["-9", &pid.to_string()]).status().unwrap();
+        }
+    });
+    let (shared, n_runs) = (runtime.in_batches().inference.unwrap(), Cell::new(0));
+    let infer = |id: &str, input: &[f32]| {
+        n_runs.set(n_runs.get() + 1);
+        shared(store.manifest().get(id)?, store.dir(), input)
+    };
+    let report = follow(&mut BufReader::new(stdout), &mut stdin, &Silent, infer).unwrap().unwrap();
+    drop((ended, stdin));
+    watchdog.join().unwrap();
+    child.wait().unwrap();
+    assert!(n_runs.get() >= 12, "{} runs: {}", n_runs.get(), report.line);
+    let keypoints = keypoints_npz::read(&out.join("keypoints.npz")).unwrap();
+    assert_eq!(keypoints.n_frames(), 12);
 }
 
 #[test]
