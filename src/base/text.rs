@@ -85,3 +85,20 @@ pub fn with_unit(value: f64, unit: &str) -> String {
 pub fn percent(part: f64, total: f64) -> String {
     if total > 0.0 { format!("{:.1} %", 100.0 * part / total + 0.0) } else { "\u{2013}".to_owned() }
 }
+
+/// Text with the markup characters of HTML and XML replaced by entities.
+pub fn escape(text: &str) -> String {
+    let mut escaped = String::with_capacity(text.len());
+    for c in text.chars() {
+        match c {
+            '&' => escaped.push_str("&amp;"),
+            '<' => escaped.push_str("&lt;"),
+            '>' => escaped.push_str("&gt;"),
+            '"' => escaped.push_str("&quot;"),
+            '\'' => escaped.push_str("&#39;"),
+            '\0' => escaped.push('\u{fffd}'),
+            c => escaped.push(c),
+        }
+    }
+    escaped
+}

@@ -1,6 +1,7 @@
 //! Writer of ELAN annotation files (EAF 3.0, mpi.nl/tools/elan/EAFv3.0.xsd): tiers of annotations with times. Bytes are
 //! the same for the same annotations, so the date is a constant.
 
+use orator_base::text::escape;
 use std::fmt::Write as _;
 
 /// Annotation from one time to another, seconds.
@@ -41,7 +42,7 @@ pub fn write(media: &str, tiers: &[AnnotationTier]) -> String {
     slots.iter().zip(1..).for_each(|((_, slot), id)| slot_ids[*slot] = id);
     let extension = media.rsplit_once('.').map_or("", |(_, extension)| extension).to_ascii_lowercase();
     let mime = MIME_TYPES.iter().find(|(known, _)| *known == extension).map_or("unknown", |(_, mime)| mime);
-    let media = escape(&if media.starts_with("../") { media.to_owned() } else { format!("./{media}") });
+    let media = encoded(&if media.starts_with("../") { media.to_owned() } else { format!("./{media}") });
     let n_annotations = slots.len() / 2;
     let mut text = HEADER.to_owned();
     let _ = write!(
@@ -56,13 +57,13 @@ pub fn write(media: &str, tiers: &[AnnotationTier]) -> String {
     text.push_str("    </TIME_ORDER>\n");
     let mut n = 0;
     for (tier, spans) in tiers.iter().zip(&spans) {
-        let _ = writeln!(text, "    <TIER LINGUISTIC_TYPE_REF=\"default-lt\" TIER_ID=\"{}\">", escape(&tier.name));
+        let _ = writeln!(text, "    <TIER LINGUISTIC_TYPE_REF=\"default-lt\" TIER_ID=\"{}\">", encoded(&tier.name));
         for (.., value) in spans {
             let [start, end] = [slot_ids[2 * n], slot_ids[2 * n + 1]];
             n += 1;
             let _ = write!(text, "        <ANNOTATION><ALIGNABLE_ANNOTATION ANNOTATION_ID=\"a{n}\" ");
             let _ = write!(text, "TIME_SLOT_REF1=\"ts{start}\" TIME_SLOT_REF2=\"ts{end}\"><ANNOTATION_VALUE>");
-            let _ = writeln!(text, "{}</ANNOTATION_VALUE></ALIGNABLE_ANNOTATION></ANNOTATION>", escape(value));
+            let _ = writeln!(text, "{}</ANNOTATION_VALUE></ALIGNABLE_ANNOTATION></ANNOTATION>", encoded(value));
         }
         text.push_str("    </TIER>\n");
     }
@@ -84,19 +85,9 @@ fn spans(tier: &AnnotationTier) -> Vec<(u64, u64, &str)> {
     spans
 }
 
-/// Text for XML 1.0 elements and attributes.
-fn escape(text: &str) -> String {
-    let mut escaped = String::with_capacity(text.len());
-    for c in text.chars() {
-        match c {
-            '&' => escaped.push_str("&amp;"),
-            '<' => escaped.push_str("&lt;"),
-            '>' => escaped.push_str("&gt;"),
-            '"' => escaped.push_str("&quot;"),
-            '\t' | '\n' | '\r' => escaped.push(' '),
-            '\0'..='\u{1f}' | '\u{fffe}' | '\u{ffff}' => {}
-            c => escaped.push(c),
-        }
-    }
-    escaped
+/// Text for XML 1.0 elements and attributes, without the characters that XML does not allow.
+fn encoded(text: &str) -> String {
+    let blank = |c: char| if matches!(c, '\t' | '\n' | '\r') { ' ' } else { c };
+    let allowed = text.chars().map(blank).filter(|c| !matches!(c, '\0'..='\u{1f}' | '\u{fffe}' | '\u{ffff}'));
+    escape(&allowed.collect::<String>())
 }

@@ -41,7 +41,7 @@ pub fn is_smplx_name(path: &Path) -> bool {
     is(path, "npz") && path.file_stem().is_some_and(|stem| is(Path::new(stem), "smplx"))
 }
 
-/// File name without its ending, of which `.smplx.npz` is one.
+/// File name without its extension; `.smplx.npz` counts as one extension.
 pub fn stem(path: &Path) -> &OsStr {
     let stem = path.file_stem().unwrap_or_default();
     if is_smplx_name(path) { Path::new(stem).file_stem().unwrap_or_default() } else { stem }

@@ -4,6 +4,7 @@
 
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
+use orator_base::text::escape;
 use serde_json::Value;
 use std::fmt::{self, Display, Write as _};
 
@@ -33,23 +34,6 @@ pub fn legend<C: Display, M: Display>(keys: impl IntoIterator<Item = (C, M)>) ->
 pub fn table(name: &str, head: impl IntoIterator<Item = Node>, rows: impl IntoIterator<Item = Node>) -> Node {
     let head = node("thead").child(node("tr").children(head));
     node("table").class(name).child(head).child(node("tbody").children(rows))
-}
-
-/// Text with markup characters replaced by entities.
-pub fn escape(text: &str) -> String {
-    let mut escaped = String::with_capacity(text.len());
-    for c in text.chars() {
-        match c {
-            '&' => escaped.push_str("&amp;"),
-            '<' => escaped.push_str("&lt;"),
-            '>' => escaped.push_str("&gt;"),
-            '"' => escaped.push_str("&quot;"),
-            '\'' => escaped.push_str("&#39;"),
-            '\0' => escaped.push('\u{fffd}'),
-            c => escaped.push(c),
-        }
-    }
-    escaped
 }
 
 impl Node {

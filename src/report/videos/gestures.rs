@@ -30,7 +30,8 @@ pub fn gestures(hands: &[PhaseTotals; 2]) -> Vec<Node> {
         return vec![node("p").class("empty").text("No accepted and lifted frames: no gestures to show.")];
     }
     let about = "Strokes, retractions, holds and rests of the wrists relative to the shoulders, found by speed and \
-                 by the position at which the hand pauses longest. The command orator dataset annotate writes each with its times.";
+                 by the position at which the hand pauses longest. The command orator dataset annotate writes each with \
+                 its times.";
     let columns = ["hand", "strokes", "a minute", "median amplitude", "median duration"];
     let titles = columns.into_iter().chain(PhaseKind::ALL.map(PhaseKind::name));
     let class = |title: &str| if title == columns[0] { "" } else { "num" };

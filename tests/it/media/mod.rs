@@ -12,4 +12,3 @@ pub(crate) mod shots;
 pub(crate) mod sound;
 pub(crate) mod sync;
 mod unit;
-pub(crate) mod warp;
