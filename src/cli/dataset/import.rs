@@ -22,7 +22,7 @@ use std::path::{Path, PathBuf};
 /// Create a dataset from motion capture and its audio.
 ///
 /// Each SOURCE is a file, or a folder that is searched for: text clips of Rebol et al. (2021) with 147 numbers per
-/// line, TED Expressive (.npz with `human_joints`), SMPL-X and SMPL-H (.npz of BEAT2, EMAGE, AMASS or unpacked Seamless
+/// line, TED Expressive (.npz with `human_joints`), SMPL-X and SMPL-H (.npz of BEAT2, EMAGE or AMASS, tar files of Seamless
 /// Interaction), BVH, and WebDataset shards or dataset folders of this program, to merge or re-import them. Audio
 /// (.wav, .flac, ...) and transcript (.tsv, .json, .TextGrid, .srt, .vtt, .txt) have the file name of the motion and
 /// are in its folder or in neighbouring folders (bvh/, wav/, tsv/). Folders of the GENEA challenges of 2020, 2022 and

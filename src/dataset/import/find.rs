@@ -28,6 +28,8 @@ pub struct TakeFiles {
     pub transcripts: Vec<PathBuf>,
     /// Data of a take in the folders of a GENEA challenge.
     pub genea: Option<GeneaTake>,
+    /// Tar file and member that `motion` was unpacked from.
+    pub origin: Option<PathBuf>,
 }
 
 impl TakeFiles {
@@ -79,6 +81,8 @@ pub fn find(sources: &[PathBuf], only: Option<MotionKind>) -> Result<ImportSourc
     for path in files {
         match kind(&path) {
             Ok(None) => found.passed_over.push(path),
+            // Tar files may contain SMPL-X motion.
+            Ok(Some(MotionKind::Shards)) if only == Some(MotionKind::Smplx) => found.tars.push(path),
             Ok(Some(kind)) if only.is_some_and(|only| only != kind) => {}
             Ok(Some(MotionKind::Shards)) => found.tars.push(path),
             Ok(Some(MotionKind::Bvh)) if genea::is_of_interlocutor(&path) => found.passed_over.push(path),
@@ -158,7 +162,7 @@ fn with_companions(kind: MotionKind, motion: PathBuf, named: &mut NamedFiles) ->
     stems.extend(["gt_interval_", "prediction_interval_"].iter().filter_map(|prefix| stem.strip_prefix(prefix)));
     let sound = companions(&motion, &stems, &SOUND_EXTENSIONS, SOUND_FOLDERS, named).into_iter().next();
     let transcripts = companions(&motion, &stems, &transcript::ENDINGS, TRANSCRIPT_FOLDERS, named);
-    TakeFiles { kind, motion, sound, transcripts, genea: None }
+    TakeFiles { kind, motion, sound, transcripts, genea: None, origin: None }
 }
 
 /// Existing files `<stem>.<ending>` in the folder of `motion`, then in its siblings in `folders` (separated by spaces).
@@ -216,6 +220,7 @@ mod tests {
             sound,
             transcripts: transcripts.to_vec(),
             genea: None,
+            origin: None,
         };
         let expected = [
             take(MotionKind::Authors, &clip, Some(clip_sound), &[]),

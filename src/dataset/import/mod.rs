@@ -10,6 +10,7 @@ pub mod genea;
 pub mod shards;
 pub mod source;
 pub mod take;
+pub mod unpack;
 pub mod write;
 
 pub use take::ImportedTake;

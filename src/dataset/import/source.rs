@@ -70,7 +70,8 @@ impl ImportItem {
     /// Name shown to the user.
     pub fn file(&self) -> String {
         match self {
-            Self::Take(TakeFiles { motion: path, .. }) | Self::Unknown(path, _) => path.display().to_string(),
+            Self::Take(TakeFiles { origin: Some(path), .. } | TakeFiles { motion: path, .. })
+            | Self::Unknown(path, _) => path.display().to_string(),
             Self::Part(dir, name) => format!("{} of {}", name, dir.display()),
             Self::ShardVideo(video) => video.name.clone(),
         }

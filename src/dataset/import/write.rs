@@ -4,6 +4,7 @@
 use super::find::{self, TakeFiles};
 use super::genea;
 use super::source::{ImportItem, InspectedItem};
+use super::unpack::unpack_motion;
 use crate::config::{self, SplitUnit};
 use crate::import::take::TakeLimits;
 use crate::info::{About, DatasetInfo};
@@ -21,6 +22,7 @@ use orator_base::text::{counted, first_three};
 use orator_formats::mocap::captured::MotionKind;
 use serde::Serialize;
 use std::collections::{BTreeMap, BTreeSet};
+use std::fs;
 use std::path::{Path, PathBuf};
 
 #[derive(Clone, Debug)]
@@ -48,6 +50,8 @@ const NO_SOUND: &str =
 /// Nothing to import, or nothing kept; files that cannot be written. A failed take is an outcome, not an error.
 pub fn import(plan: &ImportPlan, out: &Path, progress: &dyn Progress) -> Result<Imported> {
     let mut sources = find::find(&plan.sources, plan.kind)?;
+    let unpacked = out.join("unpacked");
+    unpack_motion(&mut sources, plan.kind, &unpacked)?;
     if let Some(id) = plan.speaker_id {
         sources.notes.extend(genea::filter_speaker(&mut sources.takes, id)?);
     }
@@ -106,6 +110,9 @@ pub fn import(plan: &ImportPlan, out: &Path, progress: &dyn Progress) -> Result<
         item.write(inspected, plan, &writer, out).with_context(|| format!("importing {}", item.file()))?;
         lines.push(inspected.line(&item.file()));
         task.advance(1);
+    }
+    if unpacked.exists() {
+        fs::remove_dir_all(&unpacked).with_context(|| format!("cannot remove {}", unpacked.display()))?;
     }
     let (info, stats) = writer.finish()?;
     Ok(Imported { lines, notes: left_out, info, stats })

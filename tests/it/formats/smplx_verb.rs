@@ -2,6 +2,7 @@
 
 use crate::dataset::import::wav;
 use crate::fixtures::figures::swinging;
+use ndarray::{Array2, Ix2};
 use orator_formats::mocap::motion_file;
 use orator_formats::npz::Npz;
 use orator_formats::{joints_npz, npy};
@@ -84,4 +85,68 @@ fn verbs_read_and_write_smplx_files() {
     let known = motion_file::read(&dir.join("takes/talk.smplx.npz"), None).unwrap().motion;
     done(dir, "animate dataset --out back.npz");
     assert_eq!(2 * joints_npz::read(&dir.join("back.npz")).unwrap().n_frames(), known.n_frames());
+}
+
+/// Arrays of Seamless Interaction with the rotations of an SMPL-X file, on every other frame.
+fn write_seamless(from: &Path, to: &Path) {
+    let poses = Npz::open(from).unwrap().numbers("poses", &[None, Some(165)]).unwrap();
+    let poses = poses.into_dimensionality::<Ix2>().unwrap();
+    let part = |joint: usize, n: usize| poses.slice(ndarray::s![.., 3 * joint..3 * (joint + n)]).to_owned();
+    let mut npz = ndarray_npy::NpzWriter::new(std::fs::File::create(to).unwrap());
+    for (key, joint, n) in
+        [("global_orient", 0, 1), ("body_pose", 1, 21), ("left_hand_pose", 25, 15), ("right_hand_pose", 40, 15)]
+    {
+        npz.add_array(format!("smplh:{key}"), &part(joint, n)).unwrap();
+    }
+    npz.add_array("smplh:is_valid", &Array2::from_elem((poses.nrows(), 1), true)).unwrap();
+    npz.finish().unwrap();
+}
+
+#[test]
+fn tar_files_of_seamless_interaction_are_imported() {
+    let folder = tempfile::tempdir().unwrap();
+    let dir = folder.path();
+    let key = "V00_S0001_I00000001_P0000";
+    joints_npz::write(&dir.join("joints.npz"), &swinging(4, 90)).unwrap();
+    done(dir, "animate joints.npz --out a.smplx.npz --fps 30");
+    for name in ["takes", "shards"] {
+        std::fs::create_dir(dir.join(name)).unwrap();
+    }
+    write_seamless(&dir.join("a.smplx.npz"), &dir.join(format!("takes/{key}.npz")));
+    wav(&dir.join(format!("takes/{key}.wav")), 6.0, 1);
+    let transcript = serde_json::json!({ "id": key, "metadata:vad": [{ "start": 0.0, "end": 2.0 }],
+        "metadata:transcript": [{ "start": 0.5, "end": 1.5, "transcript": "hello there",
+            "words": [{ "word": "hello", "start": 0.5, "end": 0.9, "score": 0.9 },
+                      { "word": "there", "start": 1.0, "end": 1.5, "score": 0.8 }] }] });
+    std::fs::write(dir.join(format!("takes/{key}.json")), transcript.to_string()).unwrap();
+    std::fs::write(dir.join(format!("takes/{key}.mp4")), [0u8; 3000]).unwrap();
+    let mut tar = tar::Builder::new(std::fs::File::create(dir.join("shards/0000.tar")).unwrap());
+    for ending in ["json", "mp4", "npz", "wav"] {
+        let name = format!("{key}.{ending}");
+        tar.append_path_with_name(dir.join("takes").join(&name), name).unwrap();
+    }
+    tar.finish().unwrap();
+    drop(tar);
+    std::fs::remove_file(dir.join(format!("takes/{key}.mp4"))).unwrap();
+
+    let options = "--speaker host --validation 0 --test 0";
+    let unpacked = done(dir, &format!("import takes {options} --out unpacked"));
+    let packed = done(dir, &format!("import shards {options} --out packed"));
+    assert_eq!(packed["takes"][0]["file"], format!("shards/0000.tar/{key}.npz"));
+    assert_eq!((&packed["secs"], &packed["imported"]), (&unpacked["secs"], &1.into()));
+    assert_eq!(done(dir, &format!("import shards {options} --kind smplx --out smplx"))["imported"], 1);
+    let shards =
+        ["packed", "unpacked", "smplx"].map(|name| std::fs::read(dir.join(name).join("train-000000.tar")).unwrap());
+    assert!(shards[0] == shards[1] && shards[0] == shards[2], "bytes of the dataset");
+    let names = std::fs::read_dir(dir.join("packed")).unwrap().map(|entry| entry.unwrap().file_name());
+    assert!(!names.into_iter().any(|name| name == "unpacked"), "temporary files are removed");
+    let text = String::from_utf8_lossy(&shards[0]).into_owned();
+    assert!(text.contains("hello") && text.contains("there"), "words of the transcript");
+
+    // A truncated file fails with its name, and the others are imported.
+    let bytes = std::fs::read(dir.join("shards/0000.tar")).unwrap();
+    std::fs::write(dir.join("shards/0001.tar"), &bytes[..bytes.len() - 100_000]).unwrap();
+    let (code, facts, printed) = orator(dir, &format!("import shards {options} --out both"));
+    assert!(code == 2 && facts["imported"] == 1 && facts["failed"] == 1, "{printed}");
+    assert!(printed.contains("0001.tar"), "{printed}");
 }
