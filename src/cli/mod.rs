@@ -20,5 +20,6 @@ pub mod study;
 pub mod train;
 pub mod ui;
 mod verb_groups;
+pub mod view;
 
 pub use program::{Outcome, main, run_program};

@@ -8,7 +8,7 @@ use super::pipeline::{init, report, run, status};
 use super::setup::{completions, doctor, models, words};
 use super::signals;
 use super::ui::Ui;
-use super::{animate, evaluate, generate, study, train, ui, verb_groups};
+use super::{animate, evaluate, generate, study, train, ui, verb_groups, view};
 use anyhow::Result;
 use clap::{ArgMatches, CommandFactory, FromArgMatches, Parser, Subcommand};
 use orator_base::stage::workdir;
@@ -64,6 +64,7 @@ pub(super) enum Verb {
     Generate(generate::Args),
     Animate(animate::Args),
     Study(study::Args),
+    View(view::Args),
     Guide(completions::GuideArgs),
     Completions(completions::Args),
     Man(completions::ManArgs),
@@ -103,6 +104,7 @@ fn run(cli: Cli, ui: &Ui) -> Result<Outcome> {
         Verb::Generate(args) => generate::run(args, ui),
         Verb::Animate(args) => animate::run(args, ui),
         Verb::Study(args) => study::run(args, ui),
+        Verb::View(args) => view::run(args, ui),
         Verb::Guide(args) => completions::run_guide(&args, ui),
         Verb::Completions(args) => completions::run(&args, Cli::command(), ui),
         Verb::Man(args) => completions::run_man(&args, Cli::command(), ui),

@@ -13,6 +13,7 @@ const GROUPS: [(&str, &[&str]); 5] = [
             "run",
             "status",
             "report",
+            "view",
             StageName::Lift.as_str(),
             "import",
             "transcribe",

@@ -31,5 +31,6 @@ mod segment;
 mod source_tree;
 mod study;
 mod train;
+mod view;
 mod vocabulary;
 mod wording;

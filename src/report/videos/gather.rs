@@ -241,17 +241,21 @@ impl VideoSummary {
         video
     }
 
-    /// Adds the words of the first usable one of the files `transcripts`.
-    fn add_words(&mut self, work: &Path, transcripts: &[PathBuf]) {
+    /// Words of the first usable one of the files `transcripts`; `None`: there is no such file.
+    pub fn video_words(&self, work: &Path, transcripts: &[PathBuf]) -> Option<VideoWords> {
         if !transcripts.iter().any(|path| path.is_file()) {
-            return;
+            return None;
         }
         let media = MediaInfo::read(&Artifact::MediaInfo.path(work, &self.unit)).ok();
         let start_secs = media.as_ref().map_or(0.0, |media| media.first_image_secs);
         let audio_secs = media.and_then(|media| media.audio_secs).unwrap_or(self.ledger.duration_secs);
         let end_secs = start_secs + audio_secs;
         let choice = words::choose(transcripts, &self.unit.speaker, end_secs);
-        let words = VideoWords::of(choice, transcripts, end_secs, start_secs);
+        Some(VideoWords::of(choice, transcripts, end_secs, start_secs))
+    }
+
+    fn add_words(&mut self, work: &Path, transcripts: &[PathBuf]) {
+        let Some(words) = self.video_words(work, transcripts) else { return };
         let accepted = self.ledger.accepted.iter().map(|accepted| (accepted.start_secs, accepted.end_secs));
         let rejected = self.ledger.rejected.iter().map(|rejected| (rejected.start_secs, rejected.end_secs));
         let spoken = |(start, end): (f64, f64)| {

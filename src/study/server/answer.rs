@@ -1,10 +1,10 @@
 //! Validation of answers: whether the response fits the design of its trial, whether numbers are in range, and whether
 //! an attention check is passed.
 
-use super::reply::ApiError;
 use crate::plan::{PlannedTask, TaskDesign, Trial, TrialPhase};
 use crate::store::answers::SubmittedAnswer;
 use crate::vote::Response;
+use orator_web::reply::ApiError;
 
 /// Maximum duration that a page may report, seconds: one day.
 const MAX_SECS: f64 = 86_400.0;

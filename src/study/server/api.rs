@@ -2,23 +2,23 @@
 //! of all participants. Films are served in full or in byte ranges.
 
 use super::answer::{check, fails_check, feedback};
-use super::reply::{ApiError, JsonBody, bearer_token, header_text, json_reply, not_found, unauthorized};
 use super::secret::{completion_code, is_attempt, participant_id};
 use super::study_server::{App, ServedStudy};
 use crate::plan::TrialPhase;
 use crate::store::answers::{self, RecordOutcome, SubmittedAnswer, TrialStart, TrialTerms, record};
+use crate::store::database::NotStored;
 use crate::store::participants::{self, BeginOutcome, NewParticipant, PARAMETERS, Participant, Status};
 use crate::vote::Response;
-use axum::body::Body;
-use axum::extract::{FromRequestParts, Path, Request, State};
-use axum::http::request::Parts;
-use axum::http::{HeaderMap, HeaderValue, StatusCode, header};
-use axum::response::{IntoResponse, Response as HttpResponse};
+use orator_web::axum::extract::{FromRequestParts, Path, Request, State};
+use orator_web::axum::http::request::Parts;
+use orator_web::axum::http::{HeaderMap, HeaderValue, StatusCode, header};
+use orator_web::axum::response::{IntoResponse, Response as HttpResponse};
+use orator_web::files::serve_file;
+use orator_web::reply::{ApiError, JsonBody, bearer_token, json_reply, not_found, unauthorized};
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 use std::collections::BTreeMap;
 use std::sync::Arc;
-use tower_http::services::ServeFile;
 
 /// Maximum length of a recruiting site's parameter, bytes.
 const MAX_PARAMETER_BYTES: usize = 128;
@@ -129,7 +129,7 @@ pub async fn begin(State(app): Shared, JsonBody(body): JsonBody<StartRequest>) -
     }
     let id_of = |attempt: &String| Ok(app.secret.id_of_attempt(attempt));
     let named = || anyhow::Ok((body.attempt.as_ref().map_or_else(participant_id, id_of)?, completion_code()?));
-    let (id, code) = named().map_err(|_| ApiError::not_stored())?;
+    let (id, code) = named().map_err(|_| NotStored)?;
     let new_participant = NewParticipant { id, language: body.language, parameters: body.parameters, code };
     if app.study.requires_id && !new_participant.has_id() {
         let sentence = "The participant ID of the recruiting site is missing from the address; open the study with \
@@ -269,42 +269,14 @@ pub async fn operator(State(app): Shared, headers: HeaderMap) -> Result<HttpResp
 }
 
 /// `GET /films/{16 hexadecimal digits}.mp4`, in full or as one byte range.
-pub async fn film(State(app): Shared, Path(name): Path<String>, mut request: Request) -> HttpResponse {
+pub async fn film(State(app): Shared, Path(name): Path<String>, request: Request) -> HttpResponse {
     let Some(film) = name.strip_suffix(".mp4").and_then(|name| app.study.film(name)) else {
         return not_found().await.into_response();
     };
-    if !header_text(request.headers(), header::RANGE).is_some_and(is_one_range) {
-        request.headers_mut().remove(header::RANGE);
-    }
-    let Ok(mut reply) = ServeFile::new(&film.path).try_call(request).await else {
-        return not_found().await.into_response();
-    };
+    let mut reply = serve_file(&film.path, request).await;
     if !reply.status().is_client_error() {
         let forever = HeaderValue::from_static("public, max-age=31536000, immutable");
         reply.headers_mut().insert(header::CACHE_CONTROL, forever);
     }
-    reply.map(Body::new)
-}
-
-/// Whether a `Range` header requests a single byte range such as `bytes=2-5`; others may be ignored (RFC 9110, 14.2).
-fn is_one_range(range: &str) -> bool {
-    let ends = range.strip_prefix("bytes=").and_then(|ends| ends.split_once('-'));
-    let is_number = |digits: &str| digits.bytes().all(|byte| byte.is_ascii_digit());
-    ends.is_some_and(|(first, last)| {
-        let is_ordered = || first.parse::<u64>().ok() <= last.parse::<u64>().ok() || last.is_empty();
-        is_number(first) && is_number(last) && !(first.is_empty() && last.is_empty()) && is_ordered()
-    })
-}
-
-#[cfg(test)]
-mod tests {
-    use super::is_one_range;
-
-    #[test]
-    fn single_ranges_are_recognised() {
-        let one = ["bytes=0-0", "bytes=2-5", "bytes=2-", "bytes=-3", "bytes=-0", "bytes=10-"];
-        assert!(one.into_iter().all(is_one_range));
-        let others = ["5-2", "-", "", "0-1,3-4", "a-b", "+1-2", " 1-2"].map(|ends| format!("bytes={ends}"));
-        assert!(!others.iter().map(String::as_str).chain(["Bytes=1-2", ""]).any(is_one_range));
-    }
+    reply
 }

@@ -3,9 +3,6 @@
 
 pub mod answer;
 pub mod api;
-pub mod host;
 pub mod limits;
-pub mod listen;
-pub mod reply;
 pub mod secret;
 pub mod study_server;

@@ -4,9 +4,9 @@ use anyhow::{Context, Result, ensure};
 use base64::Engine;
 use base64::engine::general_purpose::URL_SAFE_NO_PAD;
 use orator_base::stage::workdir;
+use orator_web::files::{hex, random};
 use serde::{Deserialize, Serialize};
-use std::fs::{self, File, Permissions};
-use std::io::Read;
+use std::fs::{self, Permissions};
 use std::os::unix::fs::PermissionsExt;
 use std::path::Path;
 
@@ -16,14 +16,6 @@ const ID_BYTES: usize = 12;
 const TOKEN_BYTES: usize = 4 + ID_BYTES + blake3::OUT_LEN;
 /// Characters of a completion code, without those that look alike.
 const CODE_LETTERS: &[u8; 32] = b"ABCDEFGHJKLMNPQRSTUVWXYZ23456789";
-
-/// Cryptographically secure random bytes.
-pub fn random<const N: usize>() -> Result<[u8; N]> {
-    let mut bytes = [0; N];
-    let read = File::open("/dev/urandom").and_then(|mut source| source.read_exact(&mut bytes));
-    read.context("cannot read /dev/urandom")?;
-    Ok(bytes)
-}
 
 /// Random completion code of ten characters.
 pub fn completion_code() -> Result<String> {
@@ -109,10 +101,6 @@ impl StudySecret {
     fn sign(&self, bytes: &[u8]) -> blake3::Hash {
         blake3::keyed_hash(&self.key, bytes)
     }
-}
-
-fn hex(bytes: &[u8]) -> String {
-    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
 fn unhex(text: &str) -> Vec<u8> {

@@ -2,11 +2,9 @@
 //! serves. The clock for all times that the server stores and compares: corrections of the wall clock, even across a
 //! restart, neither block participants nor end their sessions.
 
-use super::host::{AllowedHosts, check_host};
+use super::api;
 use super::limits::RateLimits;
-use super::reply::{HEADERS, method_not_allowed, not_found, text_reply};
 use super::secret::StudySecret;
-use super::{api, listen};
 use crate::file::StudyFile;
 use crate::folder::{StudyFolder, read_json};
 use crate::pages::assets::{ASSETS, page_texts};
@@ -15,12 +13,14 @@ use crate::seal::StudySeal;
 use crate::store::database::{self, ResponseStore};
 use crate::store::participants::{self, Quota};
 use anyhow::{Context, Result, ensure};
-use axum::extract::DefaultBodyLimit;
-use axum::http::{HeaderValue, StatusCode, header};
-use axum::routing::{get, post};
-use axum::{Router, middleware};
 use orator_base::stage::fingerprint::hash_file;
 use orator_media::ffmpeg::probe::probe;
+use orator_web::axum::Router;
+use orator_web::axum::extract::DefaultBodyLimit;
+use orator_web::axum::routing::{get, post};
+use orator_web::host::AllowedHosts;
+use orator_web::reply::text_reply;
+use orator_web::server::secured;
 use serde_json::json;
 use std::collections::{BTreeSet, HashMap};
 use std::net::SocketAddr;
@@ -28,15 +28,17 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant, SystemTime};
-use tokio::net::TcpListener;
-use tokio::signal::unix::{SignalKind, signal};
-use tower_http::set_header::SetResponseHeaderLayer;
-use tower_http::timeout::TimeoutLayer;
 
 /// Maximum size of a request body, bytes.
 const MAX_BODY_BYTES: usize = 16 * 1024;
 /// Time limit for a request up to the start of its reply, including reading the body.
 const REQUEST_TIMEOUT: Duration = Duration::from_secs(10);
+
+/// Content security policy: no external resources.
+const POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self'; media-src 'self'; connect-src 'self'; \
+    img-src 'self' data:; base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
+const MISDIRECTED: &str = "Open the address that `orator study serve` printed. To allow another host name, such as that \
+    of a proxy, start the server with --host-name NAME.";
 
 /// State shared by the request handlers.
 pub struct App {
@@ -84,27 +86,10 @@ impl StudyServer {
     /// # Errors
     /// The address cannot be bound, or one of `host_names` is more than a host name.
     pub fn run(self, address: SocketAddr, host_names: &[String], on_listening: impl FnOnce(SocketAddr)) -> Result<()> {
+        let hosts = AllowedHosts::new(address.ip(), host_names, MISDIRECTED)?;
         let is_proxied = !host_names.is_empty();
-        let hosts = AllowedHosts::new(address.ip(), host_names)?;
-        let runtime =
-            tokio::runtime::Builder::new_multi_thread().enable_all().build().context("cannot start threads")?;
-        let router = router(self.app, hosts);
-        runtime.block_on(async {
-            let mut terminated = signal(SignalKind::terminate()).context("cannot install the SIGTERM handler")?;
-            let listener = TcpListener::bind(address).await;
-            let listener = listener.with_context(|| format!("cannot listen on {address}; use another --port"))?;
-            on_listening(listener.local_addr()?);
-            let stop = async {
-                tokio::select! {
-                    _ = tokio::signal::ctrl_c() => {}
-                    _ = terminated.recv() => {}
-                }
-            };
-            listen::serve(listener, router, is_proxied, stop).await;
-            anyhow::Ok(())
-        })?;
-        drop(runtime);
-        // Dropping the runtime dropped the last handle of the store, so its thread ends after the queued work.
+        orator_web::server::run(router(self.app, hosts), address, is_proxied, on_listening)?;
+        // The server dropped the last handle of the store, so its thread ends after the queued work.
         let _ = self.writer.join();
         Ok(())
     }
@@ -123,18 +108,9 @@ fn router(app: App, hosts: AllowedHosts) -> Router {
     for (path, content_type, text) in ASSETS {
         router = router.route(path, get(async move || text_reply(content_type, text)));
     }
-    let no_store = HeaderValue::from_static("no-store");
-    let mut router = router
-        .fallback(not_found)
-        .method_not_allowed_fallback(method_not_allowed)
-        .layer(DefaultBodyLimit::max(MAX_BODY_BYTES))
-        .layer(TimeoutLayer::with_status_code(StatusCode::REQUEST_TIMEOUT, REQUEST_TIMEOUT))
-        .layer(middleware::from_fn_with_state(Arc::new(hosts), check_host))
-        .layer(SetResponseHeaderLayer::if_not_present(header::CACHE_CONTROL, no_store));
-    for (name, value) in HEADERS {
-        router = router.layer(SetResponseHeaderLayer::overriding(name, HeaderValue::from_static(value)));
-    }
-    router.with_state(Arc::new(app))
+    let router = router.with_state(Arc::new(app)).layer(DefaultBodyLimit::max(MAX_BODY_BYTES));
+    let permissions = "camera=(), microphone=(), geolocation=(), display-capture=(), usb=()";
+    secured(router, hosts, [POLICY, permissions], REQUEST_TIMEOUT)
 }
 
 /// Clock that reads the wall clock once at the start and is monotonic afterwards.

@@ -2,6 +2,8 @@
 //! takes all queued work, runs it in one transaction, and acknowledges it after the commit.
 
 use anyhow::{Context, Result, ensure};
+use orator_web::axum::http::StatusCode;
+use orator_web::reply::ApiError;
 use rusqlite::{Connection, OpenFlags, OptionalExtension, TransactionBehavior, params};
 use std::path::Path;
 use std::thread::JoinHandle;
@@ -126,6 +128,13 @@ struct Job {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("the response could not be stored")]
 pub struct NotStored;
+
+impl From<NotStored> for ApiError {
+    fn from(_: NotStored) -> Self {
+        let sentence = "The server cannot store data at the moment; try again.";
+        Self::new(StatusCode::SERVICE_UNAVAILABLE, sentence).retry_after(5)
+    }
+}
 
 /// Handle of the writer thread; clones share it.
 #[derive(Clone, Debug)]

@@ -1,6 +1,6 @@
-//! Unit tests of `orator_study::server::listen`.
+//! Unit tests of `orator_web::listen`.
 
-use orator_study::server::listen::WriteTimeout;
+use orator_web::listen::WriteTimeout;
 use std::future::poll_fn;
 use std::io;
 use std::io::Read;

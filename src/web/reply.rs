@@ -1,6 +1,5 @@
 //! Requests and replies: JSON bodies, bearer tokens, errors as a sentence with a status, the headers of every reply.
 
-use crate::store::database::NotStored;
 use axum::body::Bytes;
 use axum::extract::{FromRequest, Request};
 use axum::http::header::{self, HeaderName};
@@ -10,22 +9,13 @@ use serde::Serialize;
 use serde::de::DeserializeOwned;
 use serde_json::json;
 
-/// Security headers of every reply: no external resources, no embedding in other pages.
-pub const HEADERS: [(HeaderName, &str); 7] = [
-    (
-        header::CONTENT_SECURITY_POLICY,
-        "default-src 'none'; script-src 'self'; style-src 'self'; media-src 'self'; connect-src 'self'; \
-         img-src 'self' data:; base-uri 'none'; form-action 'none'; frame-ancestors 'none'",
-    ),
+/// Security headers of every reply: no embedding in other pages.
+pub(crate) const HEADERS: [(HeaderName, &str); 5] = [
     (header::X_CONTENT_TYPE_OPTIONS, "nosniff"),
     (header::REFERRER_POLICY, "no-referrer"),
     (header::X_FRAME_OPTIONS, "DENY"),
     (HeaderName::from_static("cross-origin-opener-policy"), "same-origin"),
     (HeaderName::from_static("cross-origin-resource-policy"), "same-origin"),
-    (
-        HeaderName::from_static("permissions-policy"),
-        "camera=(), microphone=(), geolocation=(), display-capture=(), usb=()",
-    ),
 ];
 
 #[derive(Clone, Debug, PartialEq)]
@@ -66,17 +56,6 @@ impl ApiError {
     pub fn too_many_requests() -> Self {
         Self::new(StatusCode::TOO_MANY_REQUESTS, "Too many requests; wait a moment.").retry_after(2)
     }
-
-    pub fn not_stored() -> Self {
-        let sentence = "The server cannot store data at the moment; try again.";
-        Self::new(StatusCode::SERVICE_UNAVAILABLE, sentence).retry_after(5)
-    }
-}
-
-impl From<NotStored> for ApiError {
-    fn from(_: NotStored) -> Self {
-        Self::not_stored()
-    }
 }
 
 impl IntoResponse for ApiError {
@@ -111,6 +90,7 @@ pub fn text_reply(content_type: &'static str, text: &'static str) -> HttpRespons
     ([(header::CONTENT_TYPE, content_type), (header::CACHE_CONTROL, "no-cache")], text).into_response()
 }
 
+/// Reply for an address that does not exist.
 pub async fn not_found() -> ApiError {
     ApiError::new(StatusCode::NOT_FOUND, "This address does not exist.")
 }

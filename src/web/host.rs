@@ -1,5 +1,5 @@
 //! Allowed hosts of requests. Without this check another site could point its own name at this server's address (DNS
-//! rebinding) and read the study from a visitor's browser.
+//! rebinding) and read its data from a visitor's browser.
 
 use super::reply::header_text;
 use anyhow::{Result, ensure};
@@ -11,23 +11,22 @@ use axum::response::{IntoResponse, Response as HttpResponse};
 use std::net::IpAddr;
 use std::sync::Arc;
 
-const MISDIRECTED: &str = "This server does not accept the host name of this request.\n\
-    Open the address that `orator study serve` printed. To allow another host name, such as that of a proxy, start the \
-    server with --host-name NAME.\n";
-
-/// Hosts under which the study is served: the listening address and any public names.
+/// Hosts under which a server is reached: the listening address and any public names.
 #[derive(Debug)]
 pub struct AllowedHosts {
     listened: IpAddr,
     names: Vec<String>,
+    /// Advice for requests that name another host.
+    advice: &'static str,
 }
 
 impl AllowedHosts {
-    /// Hosts of a server that listens on `listened` and is known by `names`.
+    /// Hosts of a server that listens on `listened` and is known by `names`. Requests for others are answered with
+    /// `advice`.
     ///
     /// # Errors
     /// A name has a scheme, port or path, or non-ASCII characters.
-    pub fn new(listened: IpAddr, names: &[String]) -> Result<Self> {
+    pub fn new(listened: IpAddr, names: &[String], advice: &'static str) -> Result<Self> {
         for name in names {
             let hint = "use its punycode form (xn--...), as browsers send it";
             ensure!(name.is_ascii(), "--host-name {name:?}: the name contains non-ASCII characters; {hint}");
@@ -35,7 +34,7 @@ impl AllowedHosts {
             ensure!(is_host, "--host-name {name:?}: expected a host name only, such as study.example.org");
         }
         let names = names.iter().map(|name| without_dot(name).to_owned()).collect();
-        Ok(Self { listened, names })
+        Ok(Self { listened, names, advice })
     }
 
     /// Whether `authority`, a host with or without a port, names this server. The port is ignored, because tunnels and
@@ -60,14 +59,15 @@ fn without_dot(host: &str) -> &str {
 
 /// Middleware that answers 421 to requests that name another host, or none. A request of HTTP/1.0 may name none, as
 /// health checks of proxies do: browsers always name one.
-pub async fn check_host(State(hosts): State<Arc<AllowedHosts>>, request: Request, next: Next) -> HttpResponse {
+pub(crate) async fn check_host(State(hosts): State<Arc<AllowedHosts>>, request: Request, next: Next) -> HttpResponse {
     let in_target = request.uri().authority().map(Authority::as_str);
     let named = in_target.or_else(|| header_text(request.headers(), header::HOST));
     let is_old = request.version() == Version::HTTP_10 && !request.headers().contains_key(header::HOST);
     if named.map_or(is_old, |host| hosts.allow(host)) {
         next.run(request).await
     } else {
-        (StatusCode::MISDIRECTED_REQUEST, MISDIRECTED).into_response()
+        let sentence = format!("This server does not accept the host name of this request.\n{}\n", hosts.advice);
+        (StatusCode::MISDIRECTED_REQUEST, sentence).into_response()
     }
 }
 
@@ -79,7 +79,7 @@ mod tests {
     fn the_listened_address_and_the_given_names_are_allowed() {
         let allowed = |listened: &str, host: &str| {
             let names = ["study.example.org", "tunnel.example."].map(str::to_owned);
-            AllowedHosts::new(listened.parse().unwrap(), &names).unwrap().allow(host)
+            AllowedHosts::new(listened.parse().unwrap(), &names, "").unwrap().allow(host)
         };
         let local = "127.0.0.1:8080 127.0.0.1 LocalHost:9000 Study.Example.Org study.example.org:8443 \
             study.example.org.:8443 tunnel.example localhost.";
@@ -104,7 +104,7 @@ mod tests {
         }
         let error_of = |name: &str| {
             let names = ["study.example.org", name].map(str::to_owned);
-            AllowedHosts::new([127, 0, 0, 1].into(), &names).unwrap_err().to_string()
+            AllowedHosts::new([127, 0, 0, 1].into(), &names, "").unwrap_err().to_string()
         };
         for name in ["https://study.example.org", "study.example.org:443", "study.example.org/", "a b", ""] {
             let error = error_of(name);

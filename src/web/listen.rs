@@ -1,6 +1,6 @@
 //! Connections: limits their number and duration, disconnects clients that stop reading, and shuts all down at the end.
 
-use super::limits::PeerLimit;
+use super::peers::PeerLimit;
 use axum::Router;
 use hyper::server::conn::http1;
 use hyper_util::rt::{TokioIo, TokioTimer};
@@ -37,7 +37,7 @@ const GRACE_PERIOD: Duration = Duration::from_secs(5);
 
 /// Serves `router` until `stop`, then lets replies in progress finish. Each peer gets at most a quarter of the
 /// connections; behind a proxy (`is_proxied`) loopback and private addresses have no limit.
-pub async fn serve(listener: TcpListener, router: Router, is_proxied: bool, stop: impl Future<Output = ()>) {
+pub(crate) async fn serve(listener: TcpListener, router: Router, is_proxied: bool, stop: impl Future<Output = ()>) {
     let n_permits = max_connections();
     let peers = PeerLimit::new((n_permits / 4).max(MIN_PER_PEER), is_proxied);
     let permits = Arc::new(Semaphore::new(n_permits));

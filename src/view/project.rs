@@ -1,0 +1,116 @@
+//! Project of a viewer: its videos with their ledgers, and the state of every stage.
+
+use crate::video::VideoView;
+use anyhow::Result;
+use orator_base::stage::Unit;
+use orator_base::stage::artifacts::StageName;
+use orator_base::stage::rejection::Rejection;
+use orator_dataset::config::Config;
+use orator_pipeline::{Pipeline, UnitState};
+use orator_report::videos::gather::VideoSummary;
+use serde_json::{Value, json};
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+/// Opened configuration; the work folder is read anew for every request.
+pub struct Project {
+    pipeline: Pipeline,
+}
+
+impl Project {
+    /// # Errors
+    /// Those of [`Pipeline::open`].
+    pub fn open(config: Config) -> Result<Self> {
+        Ok(Self { pipeline: Pipeline::open(config)? })
+    }
+
+    pub fn config(&self) -> &Config {
+        self.pipeline.config()
+    }
+
+    /// Work folder.
+    pub fn work(&self) -> &Path {
+        &self.config().settings.work.dir
+    }
+
+    /// Facts that do not change while the server runs.
+    pub fn facts(&self) -> Value {
+        let config = self.config();
+        let speakers: Vec<&str> = config.settings.speaker.iter().map(|speaker| speaker.name.as_str()).collect();
+        let folder = config.file.parent().and_then(Path::file_name).unwrap_or_default().to_string_lossy();
+        json!({ "title": folder, "config": config.file.display().to_string(), "speakers": speakers })
+    }
+
+    /// All videos with accepted and rejected seconds.
+    ///
+    /// # Errors
+    /// Decisions that cannot be read.
+    pub fn videos(&self) -> Result<Value> {
+        let mut rows = Vec::new();
+        for of_speaker in self.pipeline.videos(&[])? {
+            for unit in &of_speaker.units {
+                let video = VideoSummary::read(&self.config().settings, unit);
+                let is_waiting = video.ledger.accepted.is_empty() && video.ledger.rejected.is_empty();
+                let state = match (video.has_failed, is_waiting) {
+                    (true, _) => "failed",
+                    (false, true) => "waiting",
+                    (false, false) => "done",
+                };
+                let mut rejected_secs: BTreeMap<&str, f64> = BTreeMap::new();
+                for (reason, secs) in video.ledger.rejected_secs() {
+                    *rejected_secs.entry(Rejection::label(&reason)).or_default() += secs;
+                }
+                rows.push(json!({
+                    "id": id(unit), "speaker": unit.speaker, "name": unit.video, "file": video.file, "state": state,
+                    "message": video.notes.join(" "), "duration_secs": video.ledger.duration_secs,
+                    "accepted_secs": video.ledger.accepted_secs().abs(), "rejected_secs": rejected_secs,
+                    "n_decisions": 0,
+                }));
+            }
+        }
+        Ok(json!({ "videos": rows }))
+    }
+
+    /// The video `SPEAKER/NAME`; `None` if the configuration has no such video.
+    ///
+    /// # Errors
+    /// The videos cannot be listed.
+    pub fn video(&self, speaker: &str, name: &str) -> Result<Option<VideoView>> {
+        for mut of_speaker in self.pipeline.videos(&[])?.into_iter().filter(|of| of.speaker == speaker) {
+            if let Some(unit) = of_speaker.units.iter().find(|unit| unit.video == name) {
+                let transcripts: Vec<PathBuf> = of_speaker.transcripts.remove(name).unwrap_or_default();
+                return Ok(Some(VideoView::new(unit.clone(), &self.config().settings, transcripts)));
+            }
+        }
+        Ok(None)
+    }
+
+    /// Number of videos by state at every stage, and the failures.
+    ///
+    /// # Errors
+    /// A video that is being deleted.
+    pub fn stages(&self) -> Result<Value> {
+        let status = self.pipeline.status(&[])?;
+        let count = |stage: StageName, states: &[UnitState]| {
+            status.units.iter().filter(|unit| unit.stage == stage && states.contains(&unit.state)).count()
+        };
+        let stages = StageName::ALL.map(|stage| {
+            json!({
+                "name": stage,
+                "done": count(stage, &[UnitState::UpToDate]),
+                "stale": count(stage, &[UnitState::Stale, UnitState::NeverDone]),
+                "failed": count(stage, &[UnitState::Failed, UnitState::NoVideo]),
+                "waiting": count(stage, &[UnitState::Waits]),
+            })
+        });
+        let has_failed = |state: UnitState| matches!(state, UnitState::Failed | UnitState::NoVideo);
+        let failures = status.units.iter().filter(|unit| has_failed(unit.state));
+        let failures = failures.map(|unit| json!({ "video": unit.unit, "stage": unit.stage, "message": unit.reason }));
+        Ok(json!({ "stages": stages, "failures": failures.collect::<Vec<_>>() }))
+    }
+}
+
+/// Identifier of a video on the page: `SPEAKER/NAME`.
+pub fn id(unit: &Unit) -> String {
+    format!("{}/{}", unit.speaker, unit.video)
+}

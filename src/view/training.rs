@@ -1,0 +1,133 @@
+//! Trainings below a work folder: their state, curves and alarms from `metrics.jsonl`.
+
+use anyhow::{Result, ensure};
+use orator_base::stage::artifacts::StageName;
+use orator_formats::checkpoint;
+use orator_gesture::generate::model::{BEST, checkpoint_file};
+use orator_gesture::train::log;
+use serde_json::{Value, json};
+use std::fs::File;
+use std::path::{Path, PathBuf};
+
+/// Folders of the two kinds of trainings in the work folder.
+const KINDS: [&str; 2] = ["gan", "seq2seq"];
+
+/// Names such as `gan/host` of the folders below `work` that contain a log of a training, sorted.
+fn names(work: &Path) -> Vec<String> {
+    let mut names = Vec::new();
+    for kind in KINDS {
+        for entry in std::fs::read_dir(work.join(kind)).into_iter().flatten().flatten() {
+            let name = entry.file_name().to_string_lossy().into_owned();
+            if !name.starts_with('.') && entry.path().join(log::FILE).is_file() {
+                names.push(format!("{kind}/{name}"));
+            }
+        }
+    }
+    names.sort();
+    names
+}
+
+/// Folder of the training `name`.
+///
+/// # Errors
+/// There is no such training.
+pub fn folder(work: &Path, name: &str) -> Result<PathBuf> {
+    ensure!(names(work).iter().any(|known| known == name), "there is no training {name:?}");
+    Ok(work.join(name))
+}
+
+/// All trainings with their state.
+///
+/// # Errors
+/// An unreadable log.
+pub fn trainings(work: &Path) -> Result<Value> {
+    let rows: Result<Vec<Value>> = names(work).iter().map(|name| state(&work.join(name), name)).collect();
+    Ok(json!({ "trainings": rows? }))
+}
+
+fn state(folder: &Path, name: &str) -> Result<Value> {
+    let lines = log::read(folder)?;
+    let score = |line: &Value| line["validation"]["score"].as_f64();
+    let best = lines.iter().filter(|line| score(line).is_some());
+    let best = best.min_by(|a, b| score(a).unwrap_or(f64::MAX).total_cmp(&score(b).unwrap_or(f64::MAX)));
+    let newest = checkpoint_file(folder).ok().and_then(|file| checkpoint::facts(&file).ok());
+    Ok(json!({
+        "name": name,
+        "state": if is_running(folder) { "running" } else { "ended" },
+        "step": lines.last().map_or(&Value::Null, |line| &line["step"]),
+        "steps": newest.as_ref().map_or(&Value::Null, |facts| &facts["settings"]["steps"]),
+        "best_step": best.map_or(&Value::Null, |line| &line["step"]),
+        "best_score": best.and_then(score),
+        "alarms": alarms(&lines),
+    }))
+}
+
+/// Whether a training writes into the folder: it holds the lock of the folder.
+fn is_running(folder: &Path) -> bool {
+    File::open(folder.join(".lock")).is_ok_and(|file| file.try_lock_shared().is_err())
+}
+
+/// Alarms of the last validation that has any.
+fn alarms(lines: &[Value]) -> Vec<&str> {
+    let last = lines.iter().rev().find(|line| line["validation"].is_object());
+    last.and_then(|line| line["validation"]["alarm"].as_str()).into_iter().collect()
+}
+
+/// Curves of a training after step `after`.
+///
+/// # Errors
+/// There is no such training, or its log cannot be read.
+pub fn curves(work: &Path, name: &str, after: u64) -> Result<Value> {
+    let lines = log::read(&folder(work, name)?)?;
+    let (mut train, mut validations) = (Vec::new(), Vec::new());
+    for line in lines.iter().filter(|line| line["step"].as_u64() > Some(after)) {
+        let validation = &line["validation"];
+        if validation.is_object() {
+            let own = &validation["generator"];
+            validations.push(json!({
+                "step": line["step"], "l1": own["l1"], "mean_pose_l1": validation["mean_pose"]["l1"],
+                "pck": own["pck"], "frechet": own["frechet"], "energy": own["energy"], "score": validation["score"],
+            }));
+        } else {
+            train.push(json!({
+                "step": line["step"], "l1": line["l1"], "adv": line["adversarial"], "d": line["discriminator"],
+            }));
+        }
+    }
+    Ok(json!({ "train": train, "validations": validations, "alarms": alarms(&lines) }))
+}
+
+/// Trainings with a checkpoint.
+///
+/// # Errors
+/// Never; unreadable checkpoints are left out.
+pub fn checkpoints(work: &Path) -> Value {
+    let row = |name: String| {
+        let facts = checkpoint::facts(&checkpoint_file(&work.join(&name)).ok()?).ok()?;
+        Some(json!({ "name": name, "step": facts["step"] }))
+    };
+    json!({ "checkpoints": names(work).into_iter().filter_map(row).collect::<Vec<_>>() })
+}
+
+/// Newest checkpoint of a training: the last `step-*.safetensors`, else the best.
+///
+/// # Errors
+/// There is no such training or no checkpoint.
+pub fn newest_checkpoint(work: &Path, name: &str) -> Result<PathBuf> {
+    let folder = folder(work, name)?;
+    let last = checkpoint::list(&folder)?.pop().map(|(_, file)| file);
+    let newest = last.unwrap_or_else(|| folder.join(BEST));
+    ensure!(newest.is_file(), "{name} has no checkpoint yet");
+    Ok(newest)
+}
+
+/// Dataset of the speaker of a training.
+///
+/// # Errors
+/// The dataset does not exist.
+pub fn dataset(work: &Path, name: &str) -> Result<PathBuf> {
+    let speaker = name.rsplit('/').next().unwrap_or(name);
+    let dataset = work.join(StageName::Dataset.as_str()).join(speaker);
+    ensure!(dataset.is_dir(), "the dataset of {name} does not exist: expected {}", dataset.display());
+    Ok(dataset)
+}

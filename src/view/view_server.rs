@@ -1,0 +1,261 @@
+//! Server of the viewer and its routes. All of them are below `/TOKEN/`, a random word in the URL that the program
+//! prints, so that other users and pages of other origins reach none.
+
+use crate::assets::{ASSETS, asset};
+use crate::file::ViewedFile;
+use crate::project::Project;
+use crate::results::Results;
+use crate::training;
+use crate::video::VideoView;
+use anyhow::{Result, ensure};
+use orator_web::axum::Router;
+use orator_web::axum::extract::{Path, Query, Request, State};
+use orator_web::axum::http::{StatusCode, header};
+use orator_web::axum::response::{IntoResponse, Response as HttpResponse};
+use orator_web::axum::routing::{get, post};
+use orator_web::files::{hex, random, serve_file};
+use orator_web::host::AllowedHosts;
+use orator_web::reply::{ApiError, json_reply};
+use orator_web::server::secured;
+use serde::Deserialize;
+use serde_json::{Value, json};
+use std::net::SocketAddr;
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::time::Duration;
+
+/// Content security policy: everything from this server; `blob:` for files that the user drops on the page.
+const POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self'; media-src 'self' blob:; \
+    connect-src 'self' blob: data:; img-src 'self' data: blob:; base-uri 'none'; form-action 'none'; \
+    frame-ancestors 'none'";
+const PERMISSIONS: &str = "camera=(), microphone=(self), geolocation=(), display-capture=(), usb=()";
+const MISDIRECTED: &str = "Open the address that `orator view` printed.";
+/// Time limit for a request up to the start of its reply, including reading an uploaded sound.
+const REQUEST_TIMEOUT: Duration = Duration::from_secs(120);
+
+/// What the page shows and allows.
+pub struct ViewRequest {
+    pub project: Option<Project>,
+    pub file: Option<ViewedFile>,
+    /// Author of decisions; `None`: the page is read-only.
+    pub author: Option<String>,
+    /// This program.
+    pub program: PathBuf,
+}
+
+/// State shared by the request handlers.
+struct Viewer {
+    request: ViewRequest,
+    results: Results,
+}
+
+type Shared = State<Arc<Viewer>>;
+type Reply = Result<HttpResponse, ApiError>;
+
+/// Serves the page on `address`, a loopback address, until SIGINT or SIGTERM. `on_listening` is called with the URL.
+///
+/// # Errors
+/// The address is not a loopback address or cannot be bound.
+pub fn run(request: ViewRequest, address: SocketAddr, on_listening: impl FnOnce(&str)) -> Result<()> {
+    ensure!(address.ip().is_loopback(), "{} is not a loopback address", address.ip());
+    let token = hex(&random::<16>()?);
+    let hosts = AllowedHosts::new(address.ip(), &[], MISDIRECTED)?;
+    let results = Results::start(request.program.clone())?;
+    let router = router(Viewer { request, results }, &token);
+    let router = secured(router, hosts, [POLICY, PERMISSIONS], REQUEST_TIMEOUT);
+    orator_web::server::run(router, address, false, |address| on_listening(&format!("http://{address}/{token}/")))
+}
+
+fn router(viewer: Viewer, token: &str) -> Router {
+    let mut pages = Router::new()
+        .route("/api/project", get(project))
+        .route("/api/videos", get(videos))
+        .route("/api/videos/{speaker}/{name}", get(video))
+        .route("/api/videos/{speaker}/{name}/wave", get(wave))
+        .route("/api/videos/{speaker}/{name}/keypoints", get(keypoints))
+        .route("/api/videos/{speaker}/{name}/avatar.glb", get(avatar))
+        .route("/media/{speaker}/{name}", get(media))
+        .route("/api/stages", get(stages))
+        .route("/api/trainings", get(trainings))
+        .route("/api/training", get(curves))
+        .route("/api/pair", post(pair))
+        .route("/api/checkpoints", get(checkpoints))
+        .route("/api/results", get(results).post(generate))
+        .route("/api/results/{id}/video", post(film))
+        .route("/results/{id}/{file}", get(result_file))
+        .route("/file", get(file))
+        .route("/file-audio", get(file_audio));
+    for (path, _, _) in ASSETS {
+        pages = pages.route(path, get(async move || asset(path)));
+    }
+    Router::new().nest(&format!("/{token}"), pages).with_state(Arc::new(viewer))
+}
+
+/// Runs `work` on a thread that may block; its errors are shown to the user.
+async fn blocking<T: Send + 'static>(work: impl FnOnce() -> Result<T> + Send + 'static) -> Result<T, ApiError> {
+    let failed = |error: String| ApiError::new(StatusCode::INTERNAL_SERVER_ERROR, error);
+    match tokio::task::spawn_blocking(work).await {
+        Ok(done) => done.map_err(|error| failed(format!("{error:#}"))),
+        Err(_) => Err(failed("The request failed; see the terminal.".to_owned())),
+    }
+}
+
+/// JSON that `work` reads from the project.
+async fn of_project(viewer: Arc<Viewer>, work: impl FnOnce(&Project) -> Result<Value> + Send + 'static) -> Reply {
+    let value = blocking(move || viewer.request.project.as_ref().map(work).transpose()).await?;
+    value.map(|value| json_reply(&value)).ok_or_else(unknown)
+}
+
+fn unknown() -> ApiError {
+    ApiError::new(StatusCode::NOT_FOUND, "The project has no such item.")
+}
+
+async fn project(State(viewer): Shared) -> HttpResponse {
+    let ViewRequest { project, file, author, .. } = &viewer.request;
+    let mut facts = project.as_ref().map_or_else(|| json!({ "speakers": [] }), Project::facts);
+    facts["file"] = file.as_ref().map_or(Value::Null, ViewedFile::facts);
+    facts["editable"] = (project.is_some() && author.is_some()).into();
+    facts["author"] = json!(author);
+    json_reply(&facts)
+}
+
+async fn videos(State(viewer): Shared) -> Reply {
+    of_project(viewer, Project::videos).await
+}
+
+async fn stages(State(viewer): Shared) -> Reply {
+    of_project(viewer, Project::stages).await
+}
+
+async fn trainings(State(viewer): Shared) -> Reply {
+    of_project(viewer, |project| training::trainings(project.work())).await
+}
+
+async fn checkpoints(State(viewer): Shared) -> Reply {
+    of_project(viewer, |project| Ok(training::checkpoints(project.work()))).await
+}
+
+/// What `work` reads from a video.
+async fn of_video<T: Send + 'static>(
+    viewer: Arc<Viewer>,
+    Path((speaker, name)): Path<(String, String)>,
+    work: impl FnOnce(&VideoView) -> Result<T> + Send + 'static,
+) -> Result<T, ApiError> {
+    let found = blocking(move || {
+        let Some(project) = &viewer.request.project else { return Ok(None) };
+        project.video(&speaker, &name)?.as_ref().map(work).transpose()
+    });
+    found.await?.ok_or_else(unknown)
+}
+
+type VideoPath = Path<(String, String)>;
+
+async fn video(State(viewer): Shared, path: VideoPath) -> Reply {
+    Ok(json_reply(&of_video(viewer, path, |video| Ok(video.facts())).await?))
+}
+
+async fn wave(State(viewer): Shared, path: VideoPath) -> Reply {
+    Ok(bytes(of_video(viewer, path, VideoView::wave).await?))
+}
+
+#[derive(Deserialize)]
+struct FrameRange {
+    start: usize,
+    n: usize,
+}
+
+async fn keypoints(State(viewer): Shared, path: VideoPath, Query(range): Query<FrameRange>) -> Reply {
+    Ok(bytes(of_video(viewer, path, move |video| video.keypoints(range.start, range.n)).await?))
+}
+
+#[derive(Deserialize)]
+struct SecondRange {
+    start_secs: f64,
+    end_secs: f64,
+}
+
+async fn avatar(State(viewer): Shared, path: VideoPath, Query(range): Query<SecondRange>) -> Reply {
+    let SecondRange { start_secs, end_secs } = range;
+    Ok(bytes(of_video(viewer, path, move |video| video.avatar(start_secs, end_secs)).await?))
+}
+
+fn bytes(bytes: Vec<u8>) -> HttpResponse {
+    ([(header::CONTENT_TYPE, "application/octet-stream"), (header::CACHE_CONTROL, "no-store")], bytes).into_response()
+}
+
+async fn media(State(viewer): Shared, path: VideoPath, request: Request) -> Reply {
+    let source = of_video(viewer, path, |video| Ok(video.unit().source.clone())).await?;
+    Ok(serve_file(&source, request).await)
+}
+
+#[derive(Deserialize)]
+struct TrainingQuery {
+    name: String,
+    #[serde(default)]
+    after: u64,
+}
+
+async fn curves(State(viewer): Shared, Query(query): Query<TrainingQuery>) -> Reply {
+    of_project(viewer, move |project| training::curves(project.work(), &query.name, query.after)).await
+}
+
+/// Generated and true motion of a clip of the speaker's dataset, by the newest checkpoint.
+async fn pair(State(viewer): Shared, Query(query): Query<TrainingQuery>) -> Reply {
+    let results = viewer.results.clone();
+    of_project(viewer, move |project| {
+        let checkpoint = training::newest_checkpoint(project.work(), &query.name)?;
+        let dataset = training::dataset(project.work(), &query.name)?;
+        let (id, _) = results.add(&query.name, checkpoint, 0, "speech.wav")?;
+        results.pair(&id, dataset);
+        Ok(json!({ "id": id }))
+    })
+    .await
+}
+
+#[derive(Deserialize)]
+struct GenerateQuery {
+    checkpoint: String,
+    #[serde(default)]
+    seed: u64,
+    name: String,
+}
+
+/// Generates motion for the sound in the body.
+async fn generate(State(viewer): Shared, Query(query): Query<GenerateQuery>, request: Request) -> Reply {
+    let results = viewer.results.clone();
+    let added = blocking(move || {
+        let Some(project) = &viewer.request.project else { return Ok(None) };
+        let checkpoint = training::folder(project.work(), &query.checkpoint)?;
+        viewer.results.add(&query.checkpoint, checkpoint, query.seed, &query.name).map(Some)
+    });
+    let (id, path) = added.await?.ok_or_else(unknown)?;
+    if let Err(error) = orator_web::files::save_body(request, &path).await {
+        results.remove(&id);
+        return Err(error);
+    }
+    results.generate(&id);
+    Ok(json_reply(&json!({ "id": id })))
+}
+
+async fn results(State(viewer): Shared) -> HttpResponse {
+    json_reply(&viewer.results.facts())
+}
+
+async fn film(State(viewer): Shared, Path(id): Path<String>) -> Reply {
+    if viewer.results.film(&id) { Ok(json_reply(&json!({ "queued": true }))) } else { Err(unknown()) }
+}
+
+async fn result_file(State(viewer): Shared, Path((id, file)): Path<(String, String)>, request: Request) -> Reply {
+    let path = viewer.results.file(&id, &file).ok_or_else(unknown)?;
+    Ok(serve_file(&path, request).await)
+}
+
+async fn file(State(viewer): Shared, request: Request) -> Reply {
+    let file = viewer.request.file.as_ref().ok_or_else(unknown)?;
+    Ok(serve_file(&file.path, request).await)
+}
+
+async fn file_audio(State(viewer): Shared, request: Request) -> Reply {
+    let sound = viewer.request.file.as_ref().and_then(|file| file.sound.as_ref()).ok_or_else(unknown)?;
+    Ok(serve_file(sound, request).await)
+}

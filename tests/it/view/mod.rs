@@ -1,0 +1,3 @@
+//! The local page of `orator view`.
+
+mod server;
