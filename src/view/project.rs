@@ -56,9 +56,9 @@ impl Project {
                     (false, true) => "waiting",
                     (false, false) => "done",
                 };
-                let mut rejected_secs: BTreeMap<&str, f64> = BTreeMap::new();
+                let mut rejected_secs: BTreeMap<String, f64> = BTreeMap::new();
                 for (reason, secs) in video.ledger.rejected_secs() {
-                    *rejected_secs.entry(Rejection::label(&reason)).or_default() += secs;
+                    *rejected_secs.entry(Rejection::label(&reason).to_owned()).or_default() += secs;
                 }
                 rows.push(json!({
                     "id": id(unit), "speaker": unit.speaker, "name": unit.video, "file": video.file, "state": state,

@@ -8,7 +8,6 @@ use super::sections::auto_section;
 use orator_base::types::posture::PostureChannel;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
-use std::ops::Range;
 
 auto_section! {
     /// Keys of `[gan]`; `N` and `C` are the types of the numbers and counts that a recipe may choose.
@@ -27,7 +26,6 @@ auto_section! {
         warmup_steps: C = count => (0.0, 1e9, "steps"),
         #[serde(alias = "fade_to")]
         final_lr_ratio: N = number => (0.0, 1.0, ""),
-        decay_share: N = number => (0.0, 1.0, ""),
         adversarial: AdversarialLoss = AdversarialLoss::Auto,
         lambda_l1: f64 = 1.0 => (0.0, 1e4, ""),
         lambda_speed: N = number => (0.0, 1e4, ""),
@@ -98,16 +96,14 @@ impl GanConfig {
 
 impl GanSettings {
     /// Learning rate after `step` completed steps: linear warm-up, then cosine decay to `final_lr_ratio` times
-    /// `learning_rate` over the steps of `decay`. While that is `None`, the decay is the one that ends with `steps`: it
-    /// starts after the warm-up if `decay_share` is 0, else it lasts that share of the steps before it.
-    pub fn rate(&self, step: usize, decay: Option<&Range<usize>>) -> f64 {
-        let Self { learning_rate, warmup_steps, final_lr_ratio, decay_share, steps, .. } = self;
+    /// `learning_rate`.
+    pub fn rate(&self, step: usize) -> f64 {
+        let Self { learning_rate, warmup_steps, final_lr_ratio, steps, .. } = self;
         if step < *warmup_steps {
             return learning_rate * (step + 1) as f64 / (*warmup_steps + 1) as f64;
         }
-        let latest = if *decay_share > 0.0 { (*steps as f64 / (1.0 + decay_share)) as usize } else { 0 };
-        let Range { start, end } = decay.cloned().unwrap_or(latest.max(*warmup_steps)..*steps);
-        let progress = (step.saturating_sub(start) as f64 / end.saturating_sub(start).max(1) as f64).min(1.0);
+        let n_decay_steps = steps.saturating_sub(*warmup_steps).max(1);
+        let progress = ((step - warmup_steps) as f64 / n_decay_steps as f64).min(1.0);
         let cosine = 0.5 * (1.0 + (std::f64::consts::PI * progress).cos());
         learning_rate * (final_lr_ratio + (1.0 - final_lr_ratio) * cosine)
     }
@@ -131,17 +127,10 @@ mod tests {
     fn the_rate_has_a_linear_warm_up_and_a_cosine_decay() {
         let base = GanSettings { learning_rate: 1.0, ..GanSettings::default() };
         let decaying = GanSettings { warmup_steps: 9, final_lr_ratio: 0.1, steps: 109, ..base.clone() };
-        assert_eq!((decaying.rate(0, None), decaying.rate(4, None), decaying.rate(9, None)), (0.1, 0.5, 1.0));
-        assert!((decaying.rate(59, None) - 0.55).abs() < 1e-12 && (decaying.rate(109, None) - 0.1).abs() < 1e-12);
-        assert!((decaying.rate(500, None) - 0.1).abs() < 1e-12, "a training that goes on after its last step");
-        assert_eq!((base.rate(0, None), base.rate(70_000, None)), (1.0, 1.0));
-        // With a share, the decay is the last fifth of the steps, or where the scores have put it.
-        let late = GanSettings { decay_share: 0.25, ..decaying };
-        assert_eq!([9, 87, 500].map(|step| late.rate(step, None)), [1.0, 1.0, 0.1]);
-        assert!((late.rate(98, None) - 0.55).abs() < 1e-12);
-        let (start, middle, end) =
-            (late.rate(40, Some(&(40..60))), late.rate(50, Some(&(40..60))), late.rate(60, Some(&(40..60))));
-        assert!((start, end) == (1.0, 0.1) && (middle - 0.55).abs() < 1e-12);
+        assert_eq!((decaying.rate(0), decaying.rate(4), decaying.rate(9)), (0.1, 0.5, 1.0));
+        assert!((decaying.rate(59) - 0.55).abs() < 1e-12 && (decaying.rate(109) - 0.1).abs() < 1e-12);
+        assert!((decaying.rate(500) - 0.1).abs() < 1e-12, "a training that goes on after its last step");
+        assert_eq!((base.rate(0), base.rate(70_000)), (1.0, 1.0));
     }
 
     #[test]

@@ -9,7 +9,6 @@ use orator_base::stage::progress::Progress;
 use orator_formats::checkpoint;
 use serde::Serialize;
 use serde_json::{Value, json};
-use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 /// Steps between two lines of `metrics.jsonl`.
@@ -21,36 +20,8 @@ pub struct EpochSchedule {
     pub steps: usize,
     pub epoch_steps: usize,
     pub checkpoint_every: usize,
-    /// Epochs without a better score after which the training ends, with a decay of the learning rate; 0: never.
+    /// Early stopping: epochs without a better score after which the training ends; 0: never.
     pub patience: usize,
-    /// Steps of that decay as a share of the steps before it; 0: the training ends at once.
-    pub decay_share: f64,
-}
-
-impl EpochSchedule {
-    /// Whether the score has not improved for `patience` epochs.
-    fn is_plateau(&self, done: usize, best: Option<(usize, f32)>) -> bool {
-        let n_since_best = done - best.map_or(done, |(step, _)| step.min(done));
-        self.patience > 0 && n_since_best >= self.patience * self.epoch_steps
-    }
-
-    /// Decay of the learning rate if it begins after the validation of step `done`, which depends only on the scores so
-    /// far. It ends with a validation. The decay that ends with `steps` is not replaced once it has begun.
-    pub fn decay(&self, done: usize, best: Option<(usize, f32)>) -> Option<Range<usize>> {
-        let n_steps = done as f64 * self.decay_share;
-        let n_epochs = (n_steps / self.epoch_steps as f64).ceil() as usize;
-        let is_next = n_steps > 0.0 && done as f64 + n_steps < self.steps as f64 && self.is_plateau(done, best);
-        is_next.then(|| done..(done + n_epochs * self.epoch_steps).min(self.steps))
-    }
-
-    /// Last step of the training as known after `done` steps.
-    pub fn end(&self, done: usize, best: Option<(usize, f32)>, decay: Option<&Range<usize>>) -> usize {
-        match decay {
-            Some(decay) => decay.end.min(self.steps),
-            None if self.decay_share == 0.0 && self.is_plateau(done, best) => done.min(self.steps),
-            None => self.steps,
-        }
-    }
 }
 
 /// Result of a step: its line of the log, and a short summary of the losses for the progress display.
@@ -74,12 +45,6 @@ pub trait ValidatedTraining {
     fn n_done(&self) -> usize;
     /// Step and score of the best validation so far.
     fn best(&mut self) -> &mut Option<(usize, f32)>;
-    /// Steps of the decay of the learning rate that ends the training, once it has begun.
-    fn decay(&self) -> Option<&Range<usize>> {
-        None
-    }
-    /// Begins that decay; called only if the schedule has a `decay_share`.
-    fn set_decay(&mut self, _decay: Range<usize>) {}
     /// Runs one optimiser step.
     ///
     /// # Errors
@@ -135,8 +100,7 @@ pub fn run<T: ValidatedTraining>(
     progress: &dyn Progress,
     validated: &mut dyn FnMut(ValidatedStep),
 ) -> Result<TrainingOutcome<T::Validation>> {
-    let schedule = training.schedule();
-    let EpochSchedule { steps, epoch_steps, checkpoint_every, .. } = schedule;
+    let EpochSchedule { steps, epoch_steps, checkpoint_every, .. } = training.schedule();
     let section = training.names().1;
     let began_at = training.n_done();
     let mut log = MetricsLog::open(folder, began_at)?;
@@ -152,7 +116,7 @@ pub fn run<T: ValidatedTraining>(
         *training.best() = Some((0, score));
         training.save_best(folder, &validation)?;
     }
-    while training.n_done() < end(training) {
+    while training.n_done() < steps && !is_over(training) {
         if progress.is_to_stop() {
             if training.n_done() > saved_at {
                 training.save(folder)?;
@@ -169,7 +133,7 @@ pub fn run<T: ValidatedTraining>(
         if let Some(line) = progress_log.line(step, &report.summary) {
             task.milestone(&line);
         }
-        let is_last = step == end(training);
+        let is_last = step == steps;
         let is_validated = step.is_multiple_of(epoch_steps) || is_last;
         if is_validated {
             let validation = training.validate()?;
@@ -189,13 +153,6 @@ pub fn run<T: ValidatedTraining>(
             if previous_best.is_none_or(|(_, best)| score < best) {
                 *training.best() = Some((step, score));
                 training.save_best(folder, &validation)?;
-            }
-            if training.decay().is_none()
-                && let Some(decay) = schedule.decay(step, *training.best())
-            {
-                let Range { start, end } = decay;
-                progress.say(&format!("step {start}: no better score, the learning rate decays until step {end}"));
-                training.set_decay(decay);
             }
             last = Some(validation);
         }
@@ -239,10 +196,12 @@ fn stopped(training: &mut impl ValidatedTraining, folder: &Path) -> Result<Stopp
     Ok(StoppedTraining { step: training.n_done(), steps: training.schedule().steps, newest, best })
 }
 
-/// Last step of the training as known now.
-fn end(training: &mut impl ValidatedTraining) -> usize {
-    let (schedule, done, best) = (training.schedule(), training.n_done(), *training.best());
-    schedule.end(done, best, training.decay())
+/// Whether early stopping ends the training: no better score for `patience` epochs.
+fn is_over(training: &mut impl ValidatedTraining) -> bool {
+    let EpochSchedule { patience, epoch_steps, .. } = training.schedule();
+    let done = training.n_done();
+    let n_since_best = done - training.best().map_or(done, |(step, _)| step.min(done));
+    patience > 0 && n_since_best >= patience * epoch_steps
 }
 
 /// Error of a training that was stopped on request before its last step. Started again, it resumes after `step`.
@@ -261,41 +220,5 @@ impl StoppedTraining {
     fn checkpoint(&self) -> String {
         let Some(newest) = &self.newest else { return ", before the first checkpoint".to_owned() };
         format!("; the same command resumes from {}", newest.display())
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// Runs the schedule on a score per epoch of 10 steps; returns the decay and the last step.
-    fn schedule(schedule: EpochSchedule, scores: &[f32]) -> (Option<Range<usize>>, usize) {
-        let (mut best, mut decay, mut done) = (None::<(usize, f32)>, None, 0);
-        for score in scores {
-            if done >= schedule.end(done, best, decay.as_ref()) {
-                break;
-            }
-            done += 10;
-            if best.is_none_or(|(_, lowest)| *score < lowest) {
-                best = Some((done, *score));
-            }
-            decay = decay.or_else(|| schedule.decay(done, best));
-        }
-        (decay, done)
-    }
-
-    #[test]
-    fn the_decay_begins_when_the_score_stops_improving() {
-        let base = EpochSchedule { steps: 120, epoch_steps: 10, checkpoint_every: 10, patience: 2, decay_share: 0.25 };
-        let falling: Vec<f32> = (0..20).map(|epoch| -epoch as f32).collect();
-        let rising = [3.0, 2.0, 1.0, 1.5, 1.2, 0.9, 0.8, 0.7, 0.6, 0.5, 0.4, 0.3, 0.2];
-        // The fifth score is the second without an improvement: a quarter of 50 steps, in epochs, follows.
-        assert_eq!(schedule(base, &rising), (Some(50..70), 70));
-        assert_eq!(schedule(EpochSchedule { steps: 65, ..base }, &rising), (Some(50..65), 70));
-        assert_eq!(schedule(EpochSchedule { steps: 60, ..base }, &rising), (None, 60));
-        assert_eq!(schedule(EpochSchedule { patience: 3, ..base }, &rising), (None, 120));
-        assert_eq!(schedule(base, &falling), (None, 120));
-        assert_eq!(schedule(EpochSchedule { decay_share: 0.0, ..base }, &rising), (None, 50));
-        assert_eq!(schedule(EpochSchedule { decay_share: 0.0, patience: 0, ..base }, &rising), (None, 120));
     }
 }

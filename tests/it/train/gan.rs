@@ -14,7 +14,6 @@ use orator_dataset::{Dataset, Split};
 use orator_gesture::generate::GestureGenerator;
 use orator_gesture::generate::model::BEST;
 use orator_gesture::train::gan::train::train;
-use orator_nn::weights::Contents;
 use std::panic::AssertUnwindSafe;
 use std::path::Path;
 
@@ -138,32 +137,6 @@ fn patience_ends_a_training_whose_score_does_not_fall() {
     assert_eq!(outcome.steps, outcome.best_step + 3);
     let again = train(&dataset, &settings, &out, &Silent).unwrap();
     assert!(again.stopped_early && again.began_at == outcome.steps);
-
-    // The steps of a decay of the learning rate follow; it affects the biases, which are 0 at first.
-    let settings = GanConfig { decay_share: 0.7.into(), final_lr_ratio: 0.01.into(), checkpoint_every: 1, ..settings };
-    let folders = ["decayed", "stopped", "constant"].map(|name| folder.path().join(name));
-    let stop = Stop::at(u64::MAX);
-    let decayed = train(&dataset, &settings, &folders[0], &Shared(stop.clone())).unwrap();
-    let start = decayed.best_step + 3;
-    assert!(decayed.stopped_early && decayed.best_step == outcome.best_step, "{decayed:?}");
-    let message = format!("the learning rate decays until step {}", decayed.steps);
-    assert!(decayed.steps == start + (0.7 * start as f64).ceil() as usize, "{decayed:?}");
-    assert!(stop.said.lock().unwrap().iter().any(|line| line.contains(&message)), "{message}");
-    let in_decay = Shared(Stop::at(start as u64 + 2));
-    let stopped = AssertUnwindSafe(|| train(&dataset, &settings, &folders[1], &in_decay));
-    assert!(std::panic::catch_unwind(stopped).is_err());
-    train(&dataset, &settings, &folders[1], &Silent).unwrap();
-    let [without_stop, resumed] = [&folders[0], &folders[1]].map(|folder| bytes(folder));
-    assert!(without_stop == resumed, "resumed in the decay");
-    let constant =
-        GanConfig { steps: decayed.steps.into(), patience: 0.into(), final_lr_ratio: 1.0.into(), ..settings };
-    train(&dataset, &constant, &folders[2], &Silent).unwrap();
-    let biases = |folder: &Path| {
-        let contents = Contents::read(&orator_formats::checkpoint::path(folder, decayed.steps)).unwrap();
-        let biases = contents.tensors.into_iter().filter(|(name, _)| name.ends_with(".bias"));
-        biases.map(|(_, tensor)| tensor.to_vec1::<f32>().unwrap()).collect::<Vec<_>>()
-    };
-    assert!(biases(&folders[0]) != biases(&folders[2]), "the learning rate has no effect");
 }
 
 /// Windows of 60 frames, 4 s, are padded inside the network; all losses of `rebol2021` are computed on 60 frames.

@@ -67,7 +67,7 @@ const MINUTES: [f64; 4] = [2.0, 10.0, 30.0, 120.0];
 /// weight averaging, augmentation and decoupled weight decay (Loshchilov & Hutter 2019) prevent overfitting. The errors
 /// may rise before the words are learned, hence the patience.
 #[rustfmt::skip]
-const RECIPES: [RecipeRow; 25] = [
+const RECIPES: [RecipeRow; 24] = [
     //   key                  rebol     new layer  auto: 2, 10, 30, 120 minutes
     row("steps",              90_000.0, 200.0,     [450.0, 2_000.0, 3_000.0, 4_500.0]),
     row("epoch_steps",        300.0,    25.0,      [50.0, 100.0, 100.0, 100.0]),
@@ -77,7 +77,6 @@ const RECIPES: [RecipeRow; 25] = [
     row("shared_rate",        1.0,      0.006,     [1.0; 4]),
     row("warmup_steps",       0.0,      50.0,      [50.0; 4]),
     row("final_lr_ratio",     1.0,      0.02,      [0.02; 4]),
-    row("decay_share",        0.0,      0.0,       [0.0; 4]),
     row("lambda_speed",       0.0,      0.3,       [0.3; 4]),
     row("lambda_energy",      0.0,      0.0,       [0.1, 0.1, 0.1, 0.2]),
     row("lambda_gan",         1.0,      0.05,      [0.05, 0.15, 0.15, 0.15]),
@@ -115,7 +114,7 @@ pub enum ValueSource {
 }
 
 /// Source of each value that the recipe `rebol2021` sets. `lambda_bone` lies in the range that the paper gives, (0, 1).
-pub const REBOL2021: [(&str, ValueSource); 29] = [
+pub const REBOL2021: [(&str, ValueSource); 28] = [
     ("preset", ValueSource::Speech2gesture("2-D convolutions over mel spectrogram and time")),
     ("representation", ValueSource::Paper("eq. 1: 3-D positions of the joints")),
     ("adversarial", ValueSource::Paper("eq. 3")),
@@ -128,7 +127,6 @@ pub const REBOL2021: [(&str, ValueSource); 29] = [
     ("shared_rate", ValueSource::Speech2gesture("one model per speaker")),
     ("warmup_steps", ValueSource::Speech2gesture("constant learning rate")),
     ("final_lr_ratio", ValueSource::Speech2gesture("constant learning rate")),
-    ("decay_share", ValueSource::Speech2gesture("constant learning rate")),
     ("lambda_speed", ValueSource::Paper("eq. 4 has no such term")),
     ("lambda_energy", ValueSource::Paper("eq. 4 has no such term")),
     ("lambda_gan", ValueSource::Paper("eq. 4: weight 1")),
@@ -228,10 +226,9 @@ pub fn lines(of: &GanSettings, material: &TrainingMaterial, secs_a_step: Option<
     let (train, held_out) = (length(material.train_secs), length(material.validation_secs));
     let whose = if material.n_speakers > 1 { format!(" of {} speakers", material.n_speakers) } else { String::new() };
     let time = secs_a_step.map(|secs| format!(", about {}", length(secs * of.steps as f64))).unwrap_or_default();
-    let decay = if of.decay_share > 0.0 { ", with a decay of the learning rate," } else { "" };
     let end = match of.patience {
         0 => String::new(),
-        epochs => format!("; stops early{decay} after {} without a better score", counted(epochs, "validation")),
+        epochs => format!("; stops early after {} without a better score", counted(epochs, "validation")),
     };
     let numbers = RECIPES[4..].iter().filter_map(|row| Some((row.key, values[row.key].as_f64()?)));
     let numbers = numbers.map(|(key, value)| {
@@ -308,7 +305,7 @@ pub(super) mod tests {
         for minutes in [0.5, 3.0, 5.0, 17.0, 60.0, 90.0] {
             let of = of(minutes);
             assert_eq!(of.steps % of.epoch_steps, 0, "{minutes} minutes end with a validation");
-            assert!((of.rate(of.steps, None) - of.learning_rate * of.final_lr_ratio).abs() < 1e-12);
+            assert!((of.rate(of.steps) - of.learning_rate * of.final_lr_ratio).abs() < 1e-12);
         }
     }
 
@@ -336,7 +333,7 @@ pub(super) mod tests {
             ..GanSettings::default()
         };
         assert_eq!(rebol, expected);
-        assert_eq!((rebol.rate(0, None), rebol.rate(70_000, None)), (1e-4, 1e-4));
+        assert_eq!((rebol.rate(0), rebol.rate(70_000)), (1e-4, 1e-4));
         // The table of sources names each key that the recipe sets, and no other.
         let mut keys: Vec<&str> = CHOICES.iter().map(|row| row.0).chain(RECIPES.iter().map(|row| row.key)).collect();
         let mut sourced: Vec<&str> = REBOL2021.iter().map(|row| row.0).collect();

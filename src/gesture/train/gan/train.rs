@@ -29,7 +29,6 @@ use orator_formats::word_vectors::WordVectors;
 use orator_nn::cpu::spin_pool::with_spinning_workers;
 use orator_nn::gan::generator::FRAMES_MULTIPLE;
 use orator_nn::weights::Contents;
-use std::ops::Range;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
@@ -252,8 +251,8 @@ impl ValidatedTraining for GanTraining<'_, '_, '_> {
     }
 
     fn schedule(&self) -> EpochSchedule {
-        let GanSettings { steps, epoch_steps, checkpoint_every, patience, decay_share, .. } = self.trainer.settings;
-        EpochSchedule { steps, epoch_steps, checkpoint_every, patience, decay_share }
+        let GanSettings { steps, epoch_steps, checkpoint_every, patience, .. } = self.trainer.settings;
+        EpochSchedule { steps, epoch_steps, checkpoint_every, patience }
     }
 
     fn is_pretrained(&self) -> bool {
@@ -266,14 +265,6 @@ impl ValidatedTraining for GanTraining<'_, '_, '_> {
 
     fn best(&mut self) -> &mut Option<(usize, f32)> {
         &mut self.trainer.best
-    }
-
-    fn decay(&self) -> Option<&Range<usize>> {
-        self.trainer.decay.as_ref()
-    }
-
-    fn set_decay(&mut self, decay: Range<usize>) {
-        self.trainer.decay = Some(decay);
     }
 
     fn step(&mut self) -> Result<StepReport> {

@@ -233,7 +233,7 @@ impl ValidatedTraining for SequenceTraining<'_> {
 
     fn schedule(&self) -> EpochSchedule {
         let Seq2seqSettings { steps, epoch_steps, checkpoint_every, patience, .. } = self.trainer.settings;
-        EpochSchedule { steps, epoch_steps, checkpoint_every, patience, decay_share: 0.0 }
+        EpochSchedule { steps, epoch_steps, checkpoint_every, patience }
     }
 
     fn n_done(&self) -> usize {

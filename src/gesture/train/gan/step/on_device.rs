@@ -26,8 +26,7 @@ impl GanTrainer {
     /// Runs one step of the discriminator, then one of the generator, on the same windows.
     pub(super) fn advance_on_device(&mut self, batch: &StepBatch) -> Result<()> {
         let settings = &self.settings;
-        let (lambda_gan, learning_rate) =
-            (settings.adversarial_weight(self.step), settings.rate(self.step, self.decay.as_ref()));
+        let (lambda_gan, learning_rate) = (settings.adversarial_weight(self.step), settings.rate(self.step));
         let [of_real, of_generated, of_generator] = terms(settings.adversarial);
         let StepBatch { windows, noise, .. } = batch;
         let (truth, mask) = (&windows.poses, &windows.mask);

@@ -23,7 +23,6 @@ use orator_nn::params::Params;
 use orator_nn::weights::Contents;
 use serde_json::Value;
 use std::collections::BTreeMap;
-use std::ops::Range;
 use std::path::Path;
 
 /// Prefix of the generator without averaging, if the generator of the checkpoint is the average over the steps (EMA).
@@ -47,9 +46,6 @@ pub struct TrainerState {
     pub step: usize,
     /// Step and score of the best validation so far.
     pub best: Option<(usize, f32)>,
-    /// Steps of the last decay of the learning rate, once it has begun.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub decay: Option<Range<usize>>,
 }
 
 /// Networks and optimisers of a training, with its step count.
@@ -70,8 +66,6 @@ pub struct GanTrainer {
     pub step: usize,
     /// Step and score of the best validation so far.
     pub best: Option<(usize, f32)>,
-    /// Steps of the last decay of the learning rate, once it has begun.
-    pub decay: Option<Range<usize>>,
 }
 
 impl GanTrainer {
@@ -108,7 +102,6 @@ impl GanTrainer {
             settings,
             step: 0,
             best: None,
-            decay: None,
         })
     }
 
@@ -151,8 +144,7 @@ impl GanTrainer {
             None => Ok(motion),
         };
         let GanSettings { lambda_l1, lambda_speed, lambda_energy, lambda_velocity, lambda_bone, .. } = self.settings;
-        let lambda_gan = self.settings.adversarial_weight(self.step);
-        let learning_rate = self.settings.rate(self.step, self.decay.as_ref());
+        let (lambda_gan, learning_rate) = (self.settings.adversarial_weight(self.step), self.settings.rate(self.step));
         let raw = self.predict(drawn)?;
         let generated = self.speakers.poses(&raw, &batch.speakers)?;
         // Differences are masked where either frame is, so that missing joints look the same in real and generated
@@ -272,8 +264,7 @@ impl GanTrainer {
         let mut speakers = self.speakers.all().iter().cloned();
         let speaker = speakers.next().context("no speaker to train")?;
         let other_speakers = speakers.collect();
-        let (step, best, decay) = (self.step, self.best, self.decay.clone());
-        let state = TrainerState { speaker, other_speakers, settings, step, best, decay };
+        let state = TrainerState { speaker, other_speakers, settings, step: self.step, best: self.best };
         let mut facts = serde_json::to_value(&state)?;
         facts["settings"] = to_stored("gan", &self.settings)?;
         if let Some(stored) = facts["settings"].as_object_mut() {
@@ -282,7 +273,6 @@ impl GanTrainer {
                 ("channels", self.settings.channels == defaults.channels),
                 ("bone_loss", self.settings.bone_loss == defaults.bone_loss),
                 ("words", self.settings.words == defaults.words),
-                ("decay_share", self.settings.decay_share == defaults.decay_share),
             ];
             is_default.iter().filter(|(_, is_default)| *is_default).for_each(|(key, _)| {
                 stored.shift_remove(*key);
@@ -337,7 +327,7 @@ impl GanTrainer {
         self.discriminator_params.load(&contents.part(DISCRIMINATOR))?;
         self.adam_g.load(ADAM_G, &contents.tensors)?;
         self.adam_d.load(ADAM_D, &contents.tensors)?;
-        (self.step, self.best, self.decay) = (stored.step, stored.best, stored.decay.clone());
+        (self.step, self.best) = (stored.step, stored.best);
         Ok(())
     }
 }
