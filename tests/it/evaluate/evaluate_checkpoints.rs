@@ -179,6 +179,7 @@ fn imported(dir: &Path, name: &str) -> Sample {
         sound,
         transcripts: transcript.into_iter().collect(),
         genea: None,
+        origin: None,
     };
     let limits = TakeLimits { fps: FPS, min_frames: 30, max_difference_secs: 0.5, no_sound: false, units: None };
     match ImportedTake::read(&files, &limits, "host").unwrap().outcome {
