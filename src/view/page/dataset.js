@@ -91,7 +91,7 @@ export class DatasetView {
       button("Show all", () => this.timeline.showAll()), button("Range starts here", () => this.timeline.setRangeEnd(0)),
       button("Range ends here", () => this.timeline.setRangeEnd(1)), this.rangeText,
     );
-    const keys = el("p", { class: "keys note", id: "timeline-keys" }, ...KEYS.flatMap(([key, what]) => [el("kbd", {}, key), ` ${what}  `]));
+    const keys = el("p", { class: "keys note", id: "timeline-keys" }, ...KEYS.flatMap(([key, what]) => [el("span", {}, el("kbd", {}, key), ` ${what}`), "   "]));
     const legends = el("div", {});
     this.drawLegend = () => legends.replaceChildren(legend(intervals));
     this.drawLegend();

@@ -12,7 +12,7 @@ const NEAR_WORDS = 12;
 const numberInput = (attributes) => el("input", { type: "number", step: "any", min: "0", ...attributes });
 
 export class DecisionPanel {
-  #word = -1;
+  #word = null;
   #firstWord = -1;
 
   // `view` has the timeline and the clip of the video; `onchange()` loads the video again.

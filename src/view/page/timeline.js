@@ -184,20 +184,15 @@ export class Timeline {
     requestAnimationFrame(() => this.#drawBase());
   }
 
-  // Draws the parts of a sorted list that are in view, each at least one px wide.
-  #parts(list, draw, bounds = ([start, end]) => [start, end]) {
+  // Draws the parts of a sorted list that are in view, each at least one px wide; of several within a px, the first one.
+  #parts(list, draw, startOf = ([start]) => start, endOf = ([, end]) => end) {
     const [from, to] = this.#view;
-    let at = Math.max(0, lastBefore(list, from, (part) => bounds(part)[0]));
-    let drawn = -Infinity;
-    for (; at < list.length; at += 1) {
-      const [start, end] = bounds(list[at]);
-      if (start > to) return;
-      const left = Math.max(this.#x(start), GUTTER);
-      const right = Math.min(this.#x(end), this.#width);
-      if (right < left || right < drawn) continue;
-      draw(list[at], left, Math.max(right - left, 1));
-      // Several parts within half a px look the same as one.
-      drawn = Math.floor(left * 2 + 1) / 2;
+    let at = Math.max(0, lastBefore(list, from, startOf));
+    while (at < list.length && startOf(list[at]) <= to) {
+      const left = Math.max(this.#x(startOf(list[at])), GUTTER);
+      const right = Math.min(this.#x(endOf(list[at])), this.#width);
+      if (right >= left) draw(list[at], left, Math.max(right - left, 1));
+      at = Math.max(at + 1, lastBefore(list, this.#secs(left + 1), startOf));
     }
   }
 
@@ -245,13 +240,13 @@ export class Timeline {
       // Rejected intervals are lower than accepted ones: their state does not depend on the colour alone.
       const inset = reason === null ? 0 : 6;
       pen.fillRect(x, state.top + inset, width, state.height - inset);
-    }, ({ start, end }) => [start, end]);
+    }, ({ start }) => start, ({ end }) => end);
     pen.fillStyle = this.#colours.soft;
     this.#parts(this.video.resting, (_, x, width) => pen.fillRect(x, resting.top + 2, width, resting.height - 4));
     pen.fillStyle = this.#colours.accent;
     const decisions = [...this.video.decisions].sort((a, b) => a.start_secs - b.start_secs);
     this.#parts(decisions, (_, x, width) => pen.fillRect(x, edits.top + 2, Math.max(width, 3), edits.height - 4),
-      ({ start_secs: start, end_secs: end }) => [start, end]);
+      ({ start_secs: start }) => start, ({ end_secs: end }) => end);
   }
 
   #drawWave(pen) {
@@ -297,7 +292,7 @@ export class Timeline {
       this.#parts(this.strokes[hand], ([, phase], x, width) => {
         const tall = { stroke: height, hold: height / 2, rest: 2 }[phase] ?? height;
         pen.fillRect(x, top + (height - tall) / 2, width, tall);
-      }, ([, , start, end]) => [start, end]);
+      }, ([, , start]) => start, ([, , , end]) => end);
     }
   }
 
