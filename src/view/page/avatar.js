@@ -47,11 +47,22 @@ export class AvatarView {
     this.message = el("p", { class: "over" });
     this.element = el("div", { class: "avatar" }, this.canvas, this.message);
     this.duration = 0;
+  }
+
+  // Shows a message over the avatar, or none for an empty text.
+  say(text) {
+    this.message.textContent = text;
+    this.message.hidden = !text;
+  }
+
+  // Starts the renderer when it is first needed: a graphics context is expensive.
+  #start() {
+    if (this.#renderer) return true;
     try {
       this.#renderer = new WebGLRenderer({ canvas: this.canvas, alpha: true, antialias: true });
     } catch {
       this.say("This browser has no WebGL, which the avatar requires.");
-      return;
+      return false;
     }
     this.#scene.add(new HemisphereLight(0xffffff, 0x8d8a85, 2.4));
     const sun = new DirectionalLight(0xffffff, 1.8);
@@ -65,17 +76,12 @@ export class AvatarView {
     this.#controls.enableZoom = false;
     this.sizes = new ResizeObserver(() => this.#resize());
     this.sizes.observe(this.element);
-  }
-
-  // Shows a message over the avatar, or none for an empty text.
-  say(text) {
-    this.message.textContent = text;
-    this.message.hidden = !text;
+    return true;
   }
 
   // Shows a GLB or VRM file; `motion` is a VRMA file that drives a VRM avatar.
   async load(bytes, motion = null) {
-    if (!this.#renderer) return;
+    if (!this.#start()) return;
     const file = await parse(bytes);
     const vrm = file.userData.vrm ?? null;
     let [clip] = file.animations;

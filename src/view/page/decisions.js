@@ -8,6 +8,7 @@ const ACTIONS = {
 };
 // Number of words around the playhead that can be chosen.
 const NEAR_WORDS = 12;
+const REST_MS = 200;
 
 const numberInput = (attributes) => el("input", { type: "number", step: "any", min: "0", ...attributes });
 
@@ -66,11 +67,14 @@ export class DecisionPanel {
     for (const action of this.actions) action.disabled = !range || range[0] === range[1];
   }
 
-  // Offers the words around the playhead.
+  // Offers the words around the playhead once it rests.
   follow(secs) {
-    const at = this.view.timeline.wordAt(secs);
-    if (this.view.clip.isPlaying || document.activeElement === this.words || document.activeElement === this.text) return;
-    if (at !== this.#word) this.showWord(Math.max(at, 0));
+    clearTimeout(this.timer);
+    const offer = () => {
+      const at = Math.max(this.view.timeline.wordAt(secs), 0);
+      if (at !== this.#word && ![this.words, this.text].includes(document.activeElement)) this.showWord(at);
+    };
+    if (!this.view.clip.isPlaying) this.timer = setTimeout(offer, REST_MS);
   }
 
   showWord(index) {

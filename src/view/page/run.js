@@ -65,7 +65,8 @@ export class RunView {
   constructor(panel) {
     this.panel = panel;
     const part = () => el("div", {});
-    [this.stages, this.progress, this.alarms, this.tables, this.pair] = [part(), part(), part(), part(), part()];
+    [this.stages, this.progress, this.tables, this.pair] = [part(), part(), part(), part()];
+    this.alarms = el("div", { role: "alert" });
     this.select = el("select", { onchange: () => this.#choose(this.select.value) });
     this.canvases = CURVES.map(() => el("canvas", { "aria-hidden": "true" }));
     this.values = CURVES.map(() => el("span", {}));
@@ -127,7 +128,7 @@ export class RunView {
     if (this.state && this.state !== state && state === "ended") announce(`The training ${name} has ended.`);
     this.state = state;
     const { alarms } = reply;
-    this.#replace(this.alarms, alarms, () => (alarms.length ? [el("ul", { class: "alarms", role: "alert" }, ...alarms.map((one) => el("li", {}, one)))] : []));
+    this.#replace(this.alarms, alarms, () => (alarms.length ? [el("ul", { class: "alarms" }, ...alarms.map((one) => el("li", {}, one)))] : []));
     this.#draw();
   }
 

@@ -31,9 +31,8 @@ await visit("result", async ({ page }) => {
   await page.waitForSelector(".player");
   await press("Play");
   await page.waitForFunction(() => Number(document.querySelector(".player input[type=range]").value) > 1);
+  await page.$$eval(".player .main", ([node]) => node.textContent === "Pause" && node.click());
   const drawn = await drawnShare(page, ".player .avatar canvas");
-  const apart = await page.evaluate(() => Math.abs(document.querySelector(".player input[type=range]").value - document.querySelector(".player input[type=range]").max));
-  await press("Pause");
   await page.$eval("input[type=number]", (node) => (node.value = "2"));
   await generate();
   const made = (await items()) - before;
@@ -58,5 +57,5 @@ await visit("result", async ({ page }) => {
   await press("Stop recording");
   await waitForStatus(page, "is chosen");
   const recorded = await page.$eval(".drop .note", (node) => node.textContent);
-  return { before, made, links, drawn, apart, ownAvatar, recorded, findings, findingsOfTwo };
+  return { before, made, links, drawn, ownAvatar, recorded, findings, findingsOfTwo };
 });

@@ -23,6 +23,7 @@ await visit("run", async ({ page }) => {
   const captions = await page.$$eval(".player .caption", (nodes) => nodes.map((node) => node.textContent));
   await page.$eval(".player .main", (node) => node.click());
   await page.waitForFunction(() => Number(document.querySelector(".player input[type=range]").value) > 1);
+  await page.$$eval(".player .main", ([node]) => node.textContent === "Pause" && node.click());
   const drawn = await drawnShare(page, ".player .avatar canvas");
   return { openedMs, atFirst, atEnd, longTasks, rows, alarms, findings, captions, drawn, findingsOfPair: await audit(page) };
 });

@@ -66,17 +66,17 @@ export const statusText = (page) => page.$eval("#status", (node) => node.textCon
 export const waitForStatus = (page, part) =>
   page.waitForFunction((wanted) => document.querySelector("#status").textContent.includes(wanted), { timeout: 60_000 }, part);
 
-// Whether a 3D canvas shows something: the share of its pixels that are drawn.
-export const drawnShare = (page, selector) =>
-  page.$eval(selector, (canvas) =>
-    new Promise((resolve) => {
-      requestAnimationFrame(() => {
-        const copy = document.createElement("canvas");
-        [copy.width, copy.height] = [64, 64];
-        const pen = copy.getContext("2d");
-        pen.drawImage(canvas, 0, 0, 64, 64);
-        const { data } = pen.getImageData(0, 0, 64, 64);
-        resolve(data.filter((value, k) => k % 4 === 3 && value > 0).length / 4096);
-      });
-    }),
-  );
+// Share of the pixels of an element that differ clearly from its corner: 0 for an empty 3D canvas.
+export async function drawnShare(page, selector) {
+  const element = await page.waitForSelector(selector);
+  const picture = await element.screenshot({ encoding: "base64" });
+  return page.evaluate(async (base64) => {
+    const bitmap = await createImageBitmap(new Blob([Uint8Array.from(atob(base64), (c) => c.charCodeAt(0))]));
+    const canvas = new OffscreenCanvas(64, 64);
+    const pen = canvas.getContext("2d");
+    pen.drawImage(bitmap, 0, 0, 64, 64);
+    const { data } = pen.getImageData(0, 0, 64, 64);
+    const isDrawn = (at) => [0, 1, 2].some((k) => Math.abs(data[4 * at + k] - data[4 * 63 + k]) > 60);
+    return Array.from({ length: 4096 }, (_, at) => isDrawn(at)).filter(Boolean).length / 4096;
+  }, picture);
+}
