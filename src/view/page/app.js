@@ -6,17 +6,11 @@ import { FileView } from "./player.js";
 import { ResultView } from "./result.js";
 import { RunView } from "./run.js";
 
-const VIEWS = [
-  ["dataset", "Dataset", DatasetView],
-  ["run", "Run", RunView],
-  ["result", "Result", ResultView],
-];
+const VIEWS = [["dataset", "Dataset", DatasetView], ["run", "Run", RunView], ["result", "Result", ResultView]];
 const panels = new Map();
 let project = null;
 
-function shownViews() {
-  return project.file ? [["file", "File", FileView]] : VIEWS;
-}
+function shownViews() { return project.file ? [["file", "File", FileView]] : VIEWS; }
 
 // Shows the view of the fragment; a view is created when it is first shown.
 function showView() {

@@ -1,15 +1,13 @@
 // An avatar in 3D: a GLB with its animation, or a VRM avatar driven by a VRM animation. It is drawn only when something
 // has changed.
 
-import {
-  AnimationMixer, Box3, DirectionalLight, GLTFLoader, GridHelper, HemisphereLight, LoopOnce, OrbitControls,
-  PerspectiveCamera, Scene, Vector3, VRMAnimationLoaderPlugin, VRMLoaderPlugin, VRMLookAtQuaternionProxy, VRMUtils,
-  WebGLRenderer, createVRMAnimationClip,
-} from "./three.js";
+import { AnimationMixer, Box3, DirectionalLight, GLTFLoader, GridHelper, HemisphereLight, LoopOnce, OrbitControls } from "./three.js";
+import { PerspectiveCamera, Scene, Vector3, VRMAnimationLoaderPlugin, VRMLoaderPlugin, VRMLookAtQuaternionProxy } from "./three.js";
+import { VRMUtils, WebGLRenderer, createVRMAnimationClip } from "./three.js";
 import { el } from "./dom.js";
 
 const TURN = Math.PI / 24;
-const ZOOM = 1.12;
+const ZOOM = 0.9;
 // Longest time step of swinging hair and clothes, in seconds.
 const MAX_STEP = 0.1;
 
@@ -29,15 +27,8 @@ async function parse(bytes) {
 export class AvatarView {
   #renderer = null;
   #scene = new Scene();
-  #camera = new PerspectiveCamera(30, 1, 0.05, 50);
-  #controls = null;
-  #root = null;
-  #vrm = null;
-  #mixer = null;
-  #action = null;
-  #time = 0;
-  #isWaiting = false;
-  #isFramed = false;
+  #camera = new PerspectiveCamera(30, 1, 0.05, 50); #controls = null; #root = null; #vrm = null; #mixer = null; #action = null;
+  #time = 0; #isWaiting = false; #isFramed = false;
 
   // `label` names the avatar for screen readers.
   constructor(label) {
@@ -126,10 +117,6 @@ export class AvatarView {
     this.#draw();
   }
 
-  get isEmpty() {
-    return !this.#root;
-  }
-
   // Time within the motion in seconds.
   set time(secs) {
     const step = secs - this.#time;
@@ -165,24 +152,17 @@ export class AvatarView {
   }
 
   #key(event) {
-    if (!this.#controls || event.ctrlKey || event.metaKey || event.altKey) return;
-    const turns = { ArrowLeft: [-TURN, 0], ArrowRight: [TURN, 0], ArrowUp: [0, -TURN], ArrowDown: [0, TURN] };
-    const zooms = { "+": 1 / ZOOM, "=": 1 / ZOOM, "-": ZOOM };
-    const { target } = this.#controls;
-    const arm = this.#camera.position.clone().sub(target);
-    if (turns[event.key]) {
-      const [around, down] = turns[event.key];
-      const length = arm.length();
-      const angle = Math.atan2(arm.x, arm.z) + around;
-      const polar = Math.min(Math.max(Math.acos(arm.y / length) + down, 0.05), Math.PI - 0.05);
-      arm.set(Math.sin(polar) * Math.sin(angle), Math.cos(polar), Math.sin(polar) * Math.cos(angle)).multiplyScalar(length);
-    } else if (zooms[event.key]) arm.multiplyScalar(zooms[event.key]);
-    else if (event.key !== "0") return;
+    const controls = this.#controls;
+    if (!controls || event.ctrlKey || event.metaKey || event.altKey) return;
+    const actions = {
+      ArrowLeft: () => controls.rotateLeft(TURN), ArrowRight: () => controls.rotateLeft(-TURN),
+      ArrowUp: () => controls.rotateUp(TURN), ArrowDown: () => controls.rotateUp(-TURN),
+      "+": () => controls.dollyIn(ZOOM), "=": () => controls.dollyIn(ZOOM), "-": () => controls.dollyOut(ZOOM),
+      0: () => this.#frame(),
+    };
+    if (!actions[event.key]) return;
     event.preventDefault();
-    event.stopPropagation();
-    if (event.key === "0") return this.#frame();
-    this.#camera.position.copy(target).add(arm);
-    this.#controls.update();
+    actions[event.key]();
   }
 
   #resize() {

@@ -13,10 +13,7 @@ const SETTLE_MS = 200;
 
 export class Clip {
   #chunks = new Map();
-  #motion = { start: 0, end: 0, isLoaded: false };
-  #abort = null;
-  #timer = null;
-  #isPicking = null;
+  #motion = { start: 0, end: 0, isLoaded: false }; #abort = null; #timer = null; #isPicking = null;
 
   // `ontime(secs)` follows the position.
   constructor(video, ontime) {
@@ -50,13 +47,8 @@ export class Clip {
     this.#follow();
   }
 
-  get time() {
-    return this.film.currentTime;
-  }
-
-  get isPlaying() {
-    return !this.film.paused;
-  }
+  get time() { return this.film.currentTime; }
+  get isPlaying() { return !this.film.paused; }
 
   toggle() {
     if (this.isPlaying) this.film.pause();
@@ -104,10 +96,6 @@ export class Clip {
 
   // Follows the frames that the browser shows while the film plays.
   #follow() {
-    if (!this.film.requestVideoFrameCallback) {
-      this.film.addEventListener("timeupdate", () => this.#update(this.time));
-      return;
-    }
     const shown = (_now, { mediaTime }) => {
       if (this.isPlaying) this.#update(mediaTime);
       this.film.requestVideoFrameCallback(shown);
@@ -122,9 +110,7 @@ export class Clip {
     this.ontime(secs);
   }
 
-  redraw() {
-    this.#update(this.time);
-  }
+  redraw() { this.#update(this.time); }
 
   #pick(event) {
     if (!this.#isPicking) return;

@@ -12,9 +12,7 @@ const KEYS = [
 ];
 
 export class DatasetView {
-  #parts = [];
-  #second = null;
-  #chosen = null;
+  #parts = []; #second = null; #chosen = null;
 
   constructor(panel, project) {
     Object.assign(this, { panel, project, videos: [] });
@@ -22,7 +20,7 @@ export class DatasetView {
     this.detail = el("div", { class: "detail" });
     panel.classList.add("dataset");
     panel.append(this.list, this.detail);
-    onScheme(() => this.drawLegend?.());
+    onScheme(() => this.onscheme?.());
   }
 
   async enter(id) {
@@ -93,8 +91,12 @@ export class DatasetView {
     );
     const keys = el("p", { class: "keys note", id: "timeline-keys" }, ...KEYS.flatMap(([key, what]) => [el("span", {}, el("kbd", {}, key), ` ${what}`), "   "]));
     const legends = el("div", {});
-    this.drawLegend = () => legends.replaceChildren(legend(intervals));
-    this.drawLegend();
+    this.onscheme = () => {
+      legends.replaceChildren(legend(intervals));
+      this.timeline.refresh();
+      table.draw();
+    };
+    this.onscheme();
     this.besides = el("div", { class: "beside" }, this.clip.element);
     this.detail.replaceChildren(
       row(el("h2", {}, video.file), this.#beside(id)), this.besides, this.state, this.timeline.element, keys, zooms, legends,

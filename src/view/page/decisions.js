@@ -3,9 +3,7 @@
 
 import { announce, attempt, button, clock, el, labelled, options, row, send, sendJson, table } from "./dom.js";
 
-const ACTIONS = {
-  reject: "Reject", accept: "Accept", "swap-hands": "Swap hands", speaker: "Choose the speaker", word: "Correct a word",
-};
+const ACTIONS = { reject: "Reject", accept: "Accept", "swap-hands": "Swap hands", speaker: "Choose the speaker", word: "Correct a word" };
 // Number of words around the playhead that can be chosen.
 const NEAR_WORDS = 12;
 const REST_MS = 200;
@@ -13,8 +11,7 @@ const REST_MS = 200;
 const numberInput = (attributes) => el("input", { type: "number", step: "any", min: "0", ...attributes });
 
 export class DecisionPanel {
-  #word = null;
-  #firstWord = -1;
+  #word = null; #firstWord = -1;
 
   // `view` has the timeline and the clip of the video; `onchange()` loads the video again.
   constructor(video, view, onchange) {

@@ -22,8 +22,7 @@ export const row = (...children) => el("div", { class: "row" }, ...children);
 // A control with its visible label before it.
 export const labelled = (label, control) => el("label", { class: "field" }, el("span", {}, label), control);
 
-export const options = (values, label = (value) => value) =>
-  values.map((value) => el("option", { value: String(value) }, label(value)));
+export const options = (values, label = (value) => value) => values.map((value) => el("option", { value: String(value) }, label(value)));
 
 // A table in a region that scrolls sideways; cells are strings or nodes.
 export const table = (label, heads, rows) =>

@@ -2,15 +2,13 @@
 
 import { clock, el, labelled, options } from "./dom.js";
 
-// Words of the ledger whose label differs.
+// Labels of the words of the ledger; the order selects colour and pattern.
 const LABELS = {
-  "no sound": "no audio", quiet: "too quiet", "voice of another": "off-screen speaker", still: "static picture",
-  "too small": "person too small", face: "face not visible", turned: "turned away", arms: "arms not visible",
-  "other hand": "duplicate hand", hands: "hand not visible", cut: "close to a cut", "other person": "change of person",
-  crowd: "too many persons", bones: "bone length", open: "missing joints",
+  hands: "hand not visible", "no person": "no person", cut: "close to a cut", "voice of another": "off-screen speaker", quiet: "too quiet",
+  turned: "turned away", jump: "jump", crowd: "too many persons", "no sound": "no audio", "no speech": "no speech", still: "static picture",
+  "too small": "person too small", face: "face not visible", arms: "arms not visible", "other hand": "duplicate hand",
+  "other person": "change of person", "too short": "too short", bones: "bone length", open: "missing joints", duplicate: "duplicate",
 };
-const ORDER = ["hands", "no person", "cut", "voice of another", "quiet", "turned", "jump", "crowd", "no sound", "no speech",
-  "still", "too small", "face", "arms", "other hand", "other person", "too short", "bones", "open", "duplicate"];
 const COLOURS = {
   light: { accepted: "#2f9c8f", reasons: ["#d9713f", "#8a6fc0", "#c25a86", "#b08a1e", "#7d8894", "#c94c4c", "#5b7fc4", "#98633c"] },
   dark: { accepted: "#2f8f84", reasons: ["#d87b4c", "#9a82cf", "#cc6d95", "#bb9936", "#8893a0", "#d66363", "#6f91d1", "#ac7a54"] },
@@ -31,10 +29,10 @@ export const scheme = () => (darkScheme.matches ? "dark" : "light");
 export const onScheme = (action) => darkScheme.addEventListener("change", action);
 export const label = (reason) => (reason === null ? "accepted" : (LABELS[reason] ?? reason));
 
-// Number of a reason, which selects its colour and pattern.
+// Number of a reason; an unknown reason is its own label.
 function index(reason) {
-  if (!ORDER.includes(reason)) ORDER.push(reason);
-  return ORDER.indexOf(reason);
+  LABELS[reason] ??= reason;
+  return Object.keys(LABELS).indexOf(reason);
 }
 
 export const colour = (reason) => {
@@ -99,9 +97,7 @@ export function legend(intervals) {
 
 // Table of intervals with the keyboard of a grid: arrows, Page Up and Down, Home and End move between rows, Enter chooses.
 export class IntervalTable {
-  #shown = [];
-  #pool = [];
-  #at = 0;
+  #shown = []; #at = 0;
 
   constructor(intervals, onchoose) {
     this.intervals = intervals;
@@ -116,21 +112,19 @@ export class IntervalTable {
     this.body = el("div", { class: "rows", role: "rowgroup" });
     this.grid = el("div", { role: "grid", class: "intervals", tabindex: "0", "aria-label": "Intervals" },
       el("div", { role: "rowgroup", class: "heads" }, head), this.body);
-    this.grid.addEventListener("scroll", () => this.#draw(), { passive: true });
+    this.grid.addEventListener("scroll", () => this.draw(), { passive: true });
     this.grid.addEventListener("keydown", (event) => this.#key(event));
     this.body.addEventListener("click", (event) => {
       const node = event.target.closest("[data-at]");
       if (node) this.#move(Number(node.dataset.at), true);
     });
     this.element = el("div", {}, el("div", { class: "row" }, labelled("Show", this.select), this.count), this.grid);
-    this.sizes = new ResizeObserver(() => this.#draw());
+    this.sizes = new ResizeObserver(() => this.draw());
     this.sizes.observe(this.grid);
     this.#filter();
   }
 
-  close() {
-    this.sizes.disconnect();
-  }
+  close() { this.sizes.disconnect(); }
 
   #filter() {
     const choice = this.select.value;
@@ -142,42 +136,30 @@ export class IntervalTable {
     this.grid.setAttribute("aria-rowcount", `${this.#shown.length + 1}`);
     this.body.style.height = `${ROW_PX * this.#shown.length}px`;
     this.grid.scrollTop = 0;
-    this.#draw();
+    this.draw();
   }
 
-  // Fills the pool of rows with the intervals at the scroll position.
-  #draw() {
-    const height = this.grid.clientHeight || 320;
-    const n = Math.ceil(height / ROW_PX) + 4;
+  // Creates the rows at the scroll position, unless they are there.
+  draw() {
     const first = Math.max(0, Math.floor(this.grid.scrollTop / ROW_PX) - 2);
-    while (this.#pool.length < n) {
-      const cells = Array.from({ length: 5 }, () => el("span", { role: "gridcell" }));
-      const node = el("div", { role: "row", class: "interval", id: `interval-${this.#pool.length}` }, ...cells);
-      this.#pool.push(node);
-      this.body.append(node);
-    }
-    let active = null;
-    this.#pool.forEach((node, k) => {
-      // A row keeps its node while it is visible: the node of interval `at` is `at` modulo the size of the pool.
-      const size = this.#pool.length;
-      const at = first + ((((k - first) % size) + size) % size);
-      const interval = this.#shown[at];
-      node.hidden = !interval;
-      if (!interval) return;
-      if (at === this.#at) active = node;
-      node.setAttribute("aria-selected", `${at === this.#at}`);
-      if (node.dataset.at === `${at}` && node.interval === interval) return;
-      node.interval = interval;
-      node.dataset.at = `${at}`;
-      node.setAttribute("aria-rowindex", `${at + 2}`);
-      node.style.transform = `translateY(${ROW_PX * at}px)`;
-      const { start, end, reason, message } = interval;
+    const last = Math.min(this.#shown.length, first + Math.ceil((this.grid.clientHeight || 320) / ROW_PX) + 4);
+    const key = `${first} ${last} ${this.#at} ${this.select.value} ${scheme()}`;
+    if (key === this.drawn) return;
+    this.drawn = key;
+    const row = (at) => {
+      const { start, end, reason, message } = this.#shown[at];
       const texts = [clock(start), clock(end), `${(end - start).toFixed(1)} s`, label(reason), message];
-      texts.forEach((text, cell) => (node.children[cell].textContent = text));
-      node.children[3].style.setProperty("--reason", colour(reason));
-    });
-    if (active) this.grid.setAttribute("aria-activedescendant", active.id);
-    else this.grid.removeAttribute("aria-activedescendant");
+      const cells = texts.map((text) => el("span", { role: "gridcell" }, text));
+      cells[3].style.setProperty("--reason", colour(reason));
+      const isAt = at === this.#at;
+      const attributes = { role: "row", class: "interval", id: `interval-${at}`, "data-at": `${at}`, "aria-rowindex": `${at + 2}`, "aria-selected": `${isAt}` };
+      const node = el("div", attributes, ...cells);
+      node.style.top = `${ROW_PX * at}px`;
+      return node;
+    };
+    this.body.replaceChildren(...Array.from({ length: last - first }, (_, k) => row(first + k)));
+    const isVisible = first <= this.#at && this.#at < last;
+    this.grid.setAttribute("aria-activedescendant", isVisible ? `interval-${this.#at}` : "");
   }
 
   #key(event) {
@@ -197,7 +179,7 @@ export class IntervalTable {
     const [top, room] = [ROW_PX * at, this.grid.clientHeight - 2 * ROW_PX];
     if (top < this.grid.scrollTop) this.grid.scrollTop = top;
     if (top > this.grid.scrollTop + room) this.grid.scrollTop = top - room;
-    this.#draw();
+    this.draw();
     if (isChosen) this.onchoose(this.#shown[at]);
   }
 }

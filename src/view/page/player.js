@@ -5,8 +5,7 @@ import { attempt, button, clock, el, getBytes, labelled, options, row } from "./
 
 export class Player {
   // Time of a motion without sound, and the clock that moves it.
-  #secs = 0;
-  #before = null;
+  #secs = 0; #before = null;
 
   // `views`: avatars; `sound`: URL of a sound file, or null.
   constructor(views, sound) {
@@ -31,17 +30,9 @@ export class Player {
   }
 
   // The sound is the clock until it ends or if it can be played.
-  get #hasSoundClock() {
-    return this.sound && !this.sound.error;
-  }
-
-  get time() {
-    return this.#hasSoundClock ? this.sound.currentTime : this.#secs;
-  }
-
-  get isPlaying() {
-    return this.#before !== null;
-  }
+  get #hasSoundClock() { return this.sound && !this.sound.error; }
+  get time() { return this.#hasSoundClock ? this.sound.currentTime : this.#secs; }
+  get isPlaying() { return this.#before !== null; }
 
   toggle() {
     if (this.isPlaying) return this.pause();
@@ -114,9 +105,7 @@ export async function openPlayer(items, sound) {
 }
 
 export class FileView {
-  constructor(panel, { file }) {
-    Object.assign(this, { panel, file });
-  }
+  constructor(panel, { file }) { Object.assign(this, { panel, file }); }
 
   async enter() {
     this.player ??= await attempt(() => openPlayer([[this.file.name, "./file"]], this.file.audio ? "./file-audio" : null));
@@ -126,7 +115,5 @@ export class FileView {
     this.panel.replaceChildren(this.player.element);
   }
 
-  leave() {
-    this.player?.pause();
-  }
+  leave() { this.player?.pause(); }
 }

@@ -8,10 +8,7 @@ const MAX_BYTES = 200e6;
 const DOWNLOADS = [["motion.bvh", "BVH"], ["motion.glb", "GLB"], ["motion.vrma", "VRMA"], ["motion.mp4", "MP4"]];
 
 export class ResultView {
-  #visit = 0;
-  #compared = [];
-  #recorder = null;
-  #open = [];
+  #visit = 0; #compared = []; #recorder = null; #open = [];
 
   constructor(panel) {
     this.checkpoint = el("select", { required: true });

@@ -58,8 +58,7 @@ function drawCurve(canvas, points) {
 }
 
 export class RunView {
-  #shown = 0;
-  #name = null;
+  #shown = 0; #name = null;
   #rows = { train: new Map(), validations: new Map() };
 
   constructor(panel) {

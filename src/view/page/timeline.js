@@ -2,7 +2,7 @@
 // them the playhead and the selected range.
 
 import { clock, el } from "./dom.js";
-import { colour, fill, label, lastBefore, onScheme } from "./intervals.js";
+import { colour, fill, label, lastBefore } from "./intervals.js";
 
 const GUTTER = 50;
 const MIN_SPAN = 1;
@@ -20,14 +20,7 @@ const BANDS = Object.fromEntries(
 const HEIGHT = BANDS.right.top + BANDS.right.height + 2;
 
 export class Timeline {
-  #base;
-  #top;
-  #view;
-  #time = 0;
-  #range = null;
-  #isStale = false;
-  #spokenAt = 0;
-  #width = 0;
+  #base; #top; #view; #time = 0; #range = null; #isStale = false; #spokenAt = 0; #width = 0;
   #colours = {};
 
   // `on`: functions seek(secs), play(), step(frames), range([start, end] or null), word(index).
@@ -46,12 +39,9 @@ export class Timeline {
     this.#top.addEventListener("wheel", (event) => this.#wheel(event), { passive: false });
     this.sizes = new ResizeObserver(() => this.#resize());
     this.sizes.observe(this.element);
-    onScheme(() => this.#refresh());
   }
 
-  close() {
-    this.sizes.disconnect();
-  }
+  close() { this.sizes.disconnect(); }
 
   // Interval at a time, or undefined.
   intervalAt(secs) {
@@ -59,13 +49,8 @@ export class Timeline {
     return interval && secs < interval.end ? interval : undefined;
   }
 
-  wordAt(secs) {
-    return lastBefore(this.video.words, secs, ([start]) => start);
-  }
-
-  get range() {
-    return this.#range;
-  }
+  wordAt(secs) { return lastBefore(this.video.words, secs, ([start]) => start); }
+  get range() { return this.#range; }
 
   set range(range) {
     const clamp = (secs) => Math.min(Math.max(secs, 0), this.video.duration_secs);
@@ -95,14 +80,12 @@ export class Timeline {
     this.#show(around - ((around - from) * span) / (to - from), span);
   }
 
-  showAll() {
-    this.#show(0, this.video.duration_secs);
-  }
+  showAll() { this.#show(0, this.video.duration_secs); }
 
   #show(from, span) {
     const start = Math.min(Math.max(from, 0), Math.max(0, this.video.duration_secs - span));
     this.#view = [start, start + span];
-    this.#refresh();
+    this.refresh();
   }
 
   #x(secs) {
@@ -178,7 +161,7 @@ export class Timeline {
     this.#drawBase();
   }
 
-  #refresh() {
+  refresh() {
     if (this.#isStale) return;
     this.#isStale = true;
     requestAnimationFrame(() => this.#drawBase());
@@ -201,9 +184,7 @@ export class Timeline {
     if (!this.#width) return;
     const pen = this.#base.getContext("2d");
     const style = getComputedStyle(this.element);
-    for (const name of ["ink", "soft", "rule", "shade", "left", "right", "accent"]) {
-      this.#colours[name] = style.getPropertyValue(`--${name}`);
-    }
+    for (const name of ["ink", "soft", "rule", "shade", "left", "right", "accent"]) this.#colours[name] = style.getPropertyValue(`--${name}`);
     pen.clearRect(0, 0, this.#width, HEIGHT);
     pen.font = "11px system-ui, sans-serif";
     pen.textBaseline = "middle";
