@@ -1,7 +1,7 @@
 // One video of the dataset: the film with its keypoints, the avatar in sync beside it, and the transport.
 
 import { AvatarView } from "./avatar.js";
-import { attempt, button, clock, el, getBytes, labelled, options, row } from "./dom.js";
+import { button, clock, el, getBytes, rateSelect, row } from "./dom.js";
 import { lastBefore } from "./intervals.js";
 
 const CHUNK_FRAMES = 300;
@@ -12,7 +12,7 @@ const MOTION_SECS = 60;
 const SETTLE_MS = 200;
 
 export class Clip {
-  #chunks = new Map();
+  #chunks = new Map(); #secs = 0; #pointsTimer = null;
   #motion = { start: 0, end: 0, isLoaded: false }; #abort = null; #timer = null; #isPicking = null;
 
   // `ontime(secs)` follows the position.
@@ -24,22 +24,20 @@ export class Clip {
     this.overlay.height = video.height || 360;
     this.problem = el("p", { class: "over", hidden: true });
     const frame = el("div", { class: "film" }, this.film, this.overlay, this.problem);
-    frame.style.aspectRatio = `${this.overlay.width} / ${this.overlay.height}`;
+    frame.style.setProperty("--ratio", this.overlay.width / this.overlay.height);
     frame.addEventListener("click", (event) => this.#pick(event));
     this.frame = frame;
     this.avatar = new AvatarView(`Avatar of ${video.file}`);
     if (!video.has_motion) this.avatar.say("No lifted motion for this video.");
     this.playButton = button("Play", () => this.toggle(), { class: "main" });
     this.place = el("span", { class: "clock" });
-    const rates = el("select", { onchange: () => (this.film.playbackRate = Number(rates.value)) }, ...options([0.25, 0.5, 1, 1.5, 2], (rate) => `${rate} ×`));
-    rates.value = "1";
     const points = el("input", { type: "checkbox", checked: true, onchange: () => (this.overlay.hidden = !points.checked) });
     const step = (frames, label, name) => button(label, () => this.step(frames), { "aria-label": name });
     const transport = row(this.playButton, step(-1, "−1", "One frame back"), step(1, "+1", "One frame forward"), this.place,
-      labelled("Speed", rates), el("label", { class: "field" }, points, el("span", {}, "Keypoints")));
+      rateSelect((rate) => (this.film.playbackRate = rate)), el("label", { class: "field" }, points, el("span", {}, "Keypoints")));
     this.element = el("div", { class: "clip" }, el("div", { class: "pictures" }, frame, this.avatar.element), transport);
-    for (const name of ["play", "pause", "ended"]) this.film.addEventListener(name, () => this.#changed());
-    for (const name of ["seeked", "loadeddata"]) this.film.addEventListener(name, () => this.#update(this.film.currentTime));
+    for (const name of ["play", "pause"]) this.film.addEventListener(name, () => this.#changed());
+    for (const name of ["seeked", "ended"]) this.film.addEventListener(name, () => this.#update(this.film.currentTime));
     this.film.addEventListener("error", () => this.#fail());
     // A file with sound only in a codec that the browser reads has no picture size.
     this.film.addEventListener("loadedmetadata", () => this.film.videoWidth || this.#fail());
@@ -47,7 +45,8 @@ export class Clip {
     this.#follow();
   }
 
-  get time() { return this.film.currentTime; }
+  // Position in seconds, also of a film that the browser cannot play.
+  get time() { return this.#secs; }
   get isPlaying() { return !this.film.paused; }
 
   toggle() {
@@ -76,7 +75,7 @@ export class Clip {
 
   close() {
     this.#abort?.abort();
-    clearTimeout(this.#timer);
+    for (const timer of [this.#timer, this.#pointsTimer]) clearTimeout(timer);
     this.film.pause();
     this.film.removeAttribute("src");
     this.film.load();
@@ -91,7 +90,7 @@ export class Clip {
 
   #changed() {
     this.playButton.textContent = this.isPlaying ? "Pause" : "Play";
-    this.#update(this.time);
+    this.#update(this.film.currentTime);
   }
 
   // Follows the frames that the browser shows while the film plays.
@@ -104,6 +103,7 @@ export class Clip {
   }
 
   #update(secs) {
+    this.#secs = secs;
     this.place.textContent = `${clock(secs, 2)} / ${clock(this.video.duration_secs, 0)}`;
     this.#drawPoints(Math.min(Math.floor(secs * this.video.fps + 1e-3), this.video.n_frames - 1));
     this.#moveAvatar(secs);
@@ -121,22 +121,24 @@ export class Clip {
     this.pick(null);
   }
 
-  // Keypoints of a chunk of frames, or null while they are loading.
+  // Keypoints of a chunk of frames, or undefined before they are loaded: at once while playing, else when the position rests.
   #chunk(at) {
-    if (at * CHUNK_FRAMES >= this.video.n_frames) return null;
-    if (!this.#chunks.has(at)) {
-      this.#chunks.set(at, null);
-      if (this.#chunks.size > MAX_CHUNKS) this.#chunks.delete(this.#chunks.keys().next().value);
-      getBytes(`./api/videos/${this.video.id}/keypoints?start=${at * CHUNK_FRAMES}&n=${CHUNK_FRAMES}`).then(
-        (bytes) => {
-          this.#chunks.set(at, new Float32Array(bytes));
-          this.redraw();
-        },
-        // Videos without keypoints have none to draw.
-        () => {},
-      );
+    if (!this.#chunks.has(at) && at * CHUNK_FRAMES < this.video.n_frames) {
+      clearTimeout(this.#pointsTimer);
+      this.#pointsTimer = setTimeout(() => this.#loadChunk(at), this.isPlaying ? 0 : SETTLE_MS);
     }
     return this.#chunks.get(at);
+  }
+
+  async #loadChunk(at) {
+    this.#chunks.set(at, undefined);
+    if (this.#chunks.size > MAX_CHUNKS) this.#chunks.delete(this.#chunks.keys().next().value);
+    const url = `./api/videos/${this.video.id}/keypoints?start=${at * CHUNK_FRAMES}&n=${CHUNK_FRAMES}`;
+    // Videos without keypoints have none to draw.
+    const bytes = await getBytes(url).catch(() => null);
+    if (!bytes) return;
+    this.#chunks.set(at, new Float32Array(bytes));
+    this.redraw();
   }
 
   #drawPoints(frame) {

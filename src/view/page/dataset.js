@@ -130,9 +130,10 @@ export class DatasetView {
     const video = id && (await attempt(() => getJson(`./api/videos/${id}`)));
     if (!video) return;
     this.#second = new Clip(video, () => {});
+    this.#second.film.muted = true;
     this.besides.append(this.#second.element);
     this.#second.redraw();
-    announce(`${video.file} is beside; space on the timeline plays both.`);
+    announce(`${video.file} is beside, without its sound; space on the timeline plays both.`);
   }
 
   #play() {

@@ -1,5 +1,8 @@
 // Helpers that create DOM elements, and the client of the viewer's server. Strings are never parsed as HTML.
 
+// Time for which the status is shown; errors stay.
+const STATUS_MS = 12_000;
+
 // Creates an element with attributes. Function values such as `onclick` become listeners; `true` sets an attribute
 // without a value.
 export function el(tag, attributes = {}, ...children) {
@@ -17,6 +20,13 @@ export const byId = (id) => document.getElementById(id);
 
 export const button = (label, onclick, attributes = {}) => el("button", { type: "button", onclick, ...attributes }, label);
 
+// A select of playback rates.
+export function rateSelect(onrate) {
+  const select = el("select", { onchange: () => onrate(Number(select.value)) }, ...options([0.25, 0.5, 1, 1.5, 2], (rate) => `${rate} ×`));
+  select.value = "1";
+  return labelled("Speed", select);
+}
+
 export const row = (...children) => el("div", { class: "row" }, ...children);
 
 // A control with its visible label before it.
@@ -26,21 +36,17 @@ export const options = (values, label = (value) => value) => values.map((value) 
 
 // A table in a region that scrolls sideways; cells are strings or nodes.
 export const table = (label, heads, rows) =>
-  el(
-    "div",
-    { class: "wide", role: "region", "aria-label": label, tabindex: "0" },
-    el(
-      "table",
-      {},
-      el("thead", {}, el("tr", {}, ...heads.map((head) => el("th", { scope: "col" }, head)))),
-      el("tbody", {}, ...rows.map((cells) => el("tr", {}, ...cells.map((cell) => el("td", {}, cell ?? "–"))))),
-    ),
-  );
+  el("div", { class: "wide", role: "region", "aria-label": label, tabindex: "0" }, el("table", {},
+    el("thead", {}, el("tr", {}, ...heads.map((head) => el("th", { scope: "col" }, head)))),
+    el("tbody", {}, ...rows.map((cells) => el("tr", {}, ...cells.map((cell) => el("td", {}, cell ?? "–")))))));
 
 // Shows a status message, which screen readers announce.
 export function announce(sentence, isWrong = false) {
-  byId("status").textContent = sentence;
-  byId("status").classList.toggle("wrong", isWrong);
+  const status = byId("status");
+  status.textContent = sentence;
+  status.classList.toggle("wrong", isWrong);
+  const clear = () => status.textContent === sentence && !isWrong && (status.textContent = "");
+  setTimeout(clear, STATUS_MS);
 }
 
 // Runs an action that may fail; shows its error as the status.

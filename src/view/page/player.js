@@ -1,7 +1,7 @@
 // Playback of a sound with one avatar or two in sync, and the view of a single file.
 
 import { AvatarView } from "./avatar.js";
-import { attempt, button, clock, el, getBytes, labelled, options, row } from "./dom.js";
+import { attempt, button, clock, el, getBytes, rateSelect, row } from "./dom.js";
 
 export class Player {
   // Time of a motion without sound, and the clock that moves it.
@@ -14,22 +14,20 @@ export class Player {
     this.playButton = button("Play", () => this.toggle(), { class: "main" });
     this.slider = el("input", { type: "range", min: "0", step: "0.01", value: "0", "aria-label": "Position", oninput: () => this.seek(Number(this.slider.value)) });
     this.place = el("span", { class: "clock" });
-    const rates = el("select", { onchange: () => this.#setRate(Number(rates.value)) }, ...options([0.25, 0.5, 1, 1.5, 2], (rate) => `${rate} ×`));
-    rates.value = "1";
     this.rate = 1;
     this.element = el("div", { class: "player" }, el("div", { class: "pictures" }, ...views.map((view) => view.element)),
-      row(this.playButton, this.slider, this.place, labelled("Speed", rates)));
+      row(this.playButton, this.slider, this.place, rateSelect((rate) => this.#setRate(rate))));
     this.sound?.addEventListener("loadedmetadata", () => this.draw());
     this.sound?.addEventListener("error", () => (this.place.textContent = "This browser cannot play the sound."));
     this.draw();
   }
 
   get duration() {
-    const sound = Number.isFinite(this.sound?.duration) ? this.sound.duration : 0;
-    return Math.max(sound, ...this.views.map((view) => view.duration));
+    if (this.#hasSoundClock && Number.isFinite(this.sound.duration)) return this.sound.duration;
+    return Math.max(...this.views.map((view) => view.duration));
   }
 
-  // The sound is the clock until it ends or if it can be played.
+  // The sound is the clock if it can be played.
   get #hasSoundClock() { return this.sound && !this.sound.error; }
   get time() { return this.#hasSoundClock ? this.sound.currentTime : this.#secs; }
   get isPlaying() { return this.#before !== null; }

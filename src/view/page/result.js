@@ -27,11 +27,11 @@ export class ResultView {
     this.generateButton = button("Generate", () => this.#generate(), { class: "main" });
     this.progress = el("progress", { hidden: true, "aria-label": "Generating" });
     this.avatar = el("input", { type: "file", accept: ".vrm", onchange: () => attempt(() => this.#loadOwn()) });
-    this.own = row(labelled("Own VRM avatar (stays on this computer)", this.avatar));
+    const own = row(labelled("Own VRM avatar (stays on this computer)", this.avatar));
     this.stage = el("div", {});
     this.list = el("div", {});
     panel.append(el("h2", {}, "Speech to motion"), row(labelled("Checkpoint", this.checkpoint), labelled("Seed", this.seed)), drop,
-      row(this.generateButton, this.progress), this.stage, el("h2", {}, "Results"), this.list, this.own);
+      row(this.generateButton, this.progress), this.stage, own, el("h2", {}, "Results"), this.list);
   }
 
   async enter() {

@@ -151,8 +151,8 @@ export class RunView {
     const cells = (list, keys) => list.map((one) => keys.map((key) => number(one[key])));
     const keys = ["step", "l1", "adv", "d"];
     this.#replace(this.tables, [train.at(-1), lists[1].at(-1)], () => [
-      table("Validations", ["Step", "Score", "L1", "L1 of the mean pose", "PCK", "Fréchet distance", "Energy distance"], cells(lists[1], VALIDATION_KEYS)),
-      table("Training losses", ["Step", "L1", "Adversarial", "Discriminator"], cells(train, keys))]);
+      el("h3", {}, "Validations"), table("Validations", ["Step", "Score", "L1", "L1 of the mean pose", "PCK", "Fréchet distance", "Energy distance"], cells(lists[1], VALIDATION_KEYS)),
+      el("h3", {}, "Training losses"), table("Training losses", ["Step", "L1", "Adversarial", "Discriminator"], cells(train, keys))]);
   }
 
   async #showPair() {

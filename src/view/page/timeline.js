@@ -9,24 +9,18 @@ const MIN_SPAN = 1;
 const WAVE_HZ = 20;
 const ZOOM = 1.5;
 const TICKS = [0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 30, 60, 120, 300, 600, 1200, 1800, 3600, 7200];
-// Name, top and height of each band in px.
-const BANDS = Object.fromEntries(
-  [["time", 18], ["edits", 10], ["state", 32], ["resting", 10], ["sound", 44], ["words", 22], ["left", 14], ["right", 14]]
-    .reduce((bands, [name, height]) => {
-      const before = bands.at(-1);
-      return [...bands, [name, before ? before[1] + before[2] + 4 : 0, height]];
-    }, []).map(([name, top, height]) => [name, { top, height }]),
-);
-const HEIGHT = BANDS.right.top + BANDS.right.height + 2;
+// Top and height of each band in px.
+const BANDS = { time: [0, 18], edits: [22, 10], state: [36, 32], resting: [72, 10], sound: [86, 44], words: [134, 22], left: [160, 14], right: [178, 14] };
+const HEIGHT = 194;
 
 export class Timeline {
-  #base; #top; #view; #time = 0; #range = null; #isStale = false; #spokenAt = 0; #width = 0;
-  #colours = {};
+  #base; #top; #view; #time = 0; #range = null; #isStale = false; #width = 0; #colours = {};
 
   // `on`: functions seek(secs), play(), step(frames), range([start, end] or null), word(index).
   constructor(video, intervals, wave, on) {
     Object.assign(this, { video, intervals, wave, on });
     this.#view = [0, video.duration_secs];
+    this.strokes = Object.groupBy(video.strokes, ([hand]) => hand);
     this.#base = el("canvas", { "aria-hidden": "true" });
     this.#top = el("canvas", {
       class: "top", role: "slider", tabindex: "0", "aria-label": "Position in the video", "aria-valuemin": "0",
@@ -63,13 +57,9 @@ export class Timeline {
     this.#time = secs;
     const [from, to] = this.#view;
     if (secs < from || secs > to) this.#show(secs - 0.1 * (to - from), to - from);
-    const now = performance.now();
-    if (now - this.#spokenAt > 250) {
-      this.#spokenAt = now;
-      const { reason } = this.intervalAt(secs) ?? {};
-      this.#top.setAttribute("aria-valuenow", secs.toFixed(2));
-      this.#top.setAttribute("aria-valuetext", reason === undefined ? clock(secs) : `${clock(secs)}, ${label(reason)}`);
-    }
+    const { reason } = this.intervalAt(secs) ?? {};
+    this.#top.setAttribute("aria-valuenow", secs.toFixed(2));
+    this.#top.setAttribute("aria-valuetext", reason === undefined ? clock(secs) : `${clock(secs)}, ${label(reason)}`);
     this.#drawTop();
   }
 
@@ -104,9 +94,7 @@ export class Timeline {
     const box = this.#top.getBoundingClientRect();
     const at = (moved) => this.#secs(moved.clientX - box.left);
     const start = at(event);
-    const y = event.clientY - box.top;
-    const { top, height } = BANDS.words;
-    if (y >= top && y < top + height) this.on.word(this.wordAt(start));
+    if (event.clientY - box.top >= BANDS.words[0] && event.clientY - box.top < BANDS.left[0]) this.on.word(this.wordAt(start));
     const move = event.shiftKey ? (moved) => (this.range = [start, at(moved)]) : (moved) => this.on.seek(at(moved));
     if (!event.shiftKey) move(event);
     this.#top.setPointerCapture(event.pointerId);
@@ -125,7 +113,8 @@ export class Timeline {
   }
 
   #key(event) {
-    if (event.ctrlKey || event.metaKey || event.altKey) return;
+    // Brackets need AltGr on some keyboards, which some systems report as Ctrl and Alt.
+    if ((event.ctrlKey || event.metaKey || event.altKey) && !event.getModifierState("AltGraph")) return;
     const { duration_secs: duration } = this.video;
     const step = (sign) => () => (event.shiftKey ? this.on.seek(this.#time + sign) : this.on.step(sign));
     const actions = {
@@ -188,7 +177,7 @@ export class Timeline {
     pen.clearRect(0, 0, this.#width, HEIGHT);
     pen.font = "11px system-ui, sans-serif";
     pen.textBaseline = "middle";
-    for (const [name, { top, height }] of Object.entries(BANDS)) {
+    for (const [name, [top, height]] of Object.entries(BANDS)) {
       pen.fillStyle = this.#colours.shade;
       if (name !== "time") pen.fillRect(GUTTER, top, this.#width - GUTTER, height);
       pen.fillStyle = this.#colours.soft;
@@ -215,23 +204,27 @@ export class Timeline {
   }
 
   #drawStates(pen) {
-    const { state, resting, edits } = BANDS;
+    // Rejected intervals are lower than accepted ones: their state does not depend on the colour alone.
     this.#parts(this.intervals, ({ reason }, x, width) => {
       pen.fillStyle = width < 3 ? colour(reason) : fill(pen, reason);
-      // Rejected intervals are lower than accepted ones: their state does not depend on the colour alone.
-      const inset = reason === null ? 0 : 6;
-      pen.fillRect(x, state.top + inset, width, state.height - inset);
+      this.#fillBand(pen, "state", x, width, reason === null ? 0 : 6, 0);
     }, ({ start }) => start, ({ end }) => end);
     pen.fillStyle = this.#colours.soft;
-    this.#parts(this.video.resting, (_, x, width) => pen.fillRect(x, resting.top + 2, width, resting.height - 4));
+    this.#parts(this.video.resting, (_, x, width) => this.#fillBand(pen, "resting", x, width, 2, 2));
     pen.fillStyle = this.#colours.accent;
     const decisions = [...this.video.decisions].sort((a, b) => a.start_secs - b.start_secs);
-    this.#parts(decisions, (_, x, width) => pen.fillRect(x, edits.top + 2, Math.max(width, 3), edits.height - 4),
-      ({ start_secs: start }) => start, ({ end_secs: end }) => end);
+    const draw = (_, x, width) => this.#fillBand(pen, "edits", x, Math.max(width, 3), 2, 2);
+    this.#parts(decisions, draw, ({ start_secs: start }) => start, ({ end_secs: end }) => end);
+  }
+
+  // Fills a part of a band, inset at its top and bottom.
+  #fillBand(pen, band, x, width, above, below) {
+    const [top, height] = BANDS[band];
+    pen.fillRect(x, top + above, width, height - above - below);
   }
 
   #drawWave(pen) {
-    const { top, height } = BANDS.sound;
+    const [top, height] = BANDS.sound;
     const [from, to] = this.#view;
     const perPx = ((to - from) / (this.#width - GUTTER)) * WAVE_HZ;
     pen.fillStyle = this.#colours.soft;
@@ -246,7 +239,7 @@ export class Timeline {
   }
 
   #drawWords(pen) {
-    const { top, height } = BANDS.words;
+    const [top, height] = BANDS.words;
     this.#parts(this.video.words, ([, , text], x, width) => {
       pen.fillStyle = this.#colours.rule;
       pen.fillRect(x, top, width, height);
@@ -264,16 +257,12 @@ export class Timeline {
   // Strokes are full, holds half as high, and rests thin.
   #drawStrokes(pen) {
     for (const hand of ["left", "right"]) {
-      const { top, height } = BANDS[hand];
       pen.fillStyle = this.#colours[hand];
-      this.strokes ??= {
-        left: this.video.strokes.filter(([side]) => side === "left"),
-        right: this.video.strokes.filter(([side]) => side === "right"),
+      const draw = ([, phase], x, width) => {
+        const inset = { stroke: 0, hold: 3.5, rest: 6 }[phase] ?? 0;
+        this.#fillBand(pen, hand, x, width, inset, inset);
       };
-      this.#parts(this.strokes[hand], ([, phase], x, width) => {
-        const tall = { stroke: height, hold: height / 2, rest: 2 }[phase] ?? height;
-        pen.fillRect(x, top + (height - tall) / 2, width, tall);
-      }, ([, , start]) => start, ([, , , end]) => end);
+      this.#parts(this.strokes[hand] ?? [], draw, ([, , start]) => start, ([, , , end]) => end);
     }
   }
 
@@ -285,9 +274,9 @@ export class Timeline {
       const [left, right] = this.#range.map((secs) => Math.min(Math.max(this.#x(secs), GUTTER), this.#width));
       pen.fillStyle = this.#colours.accent;
       pen.globalAlpha = 0.18;
-      pen.fillRect(left, BANDS.time.height, right - left, HEIGHT);
+      pen.fillRect(left, BANDS.time[1], right - left, HEIGHT);
       pen.globalAlpha = 1;
-      for (const x of [left, right]) pen.fillRect(x - 1, BANDS.time.height, 2, HEIGHT);
+      for (const x of [left, right]) pen.fillRect(x - 1, BANDS.time[1], 2, HEIGHT);
     }
     const x = this.#x(this.#time);
     if (x < GUTTER) return;
