@@ -9,11 +9,12 @@ const puppeteer = packages("puppeteer-core");
 
 const TIMEOUT_MS = 180_000;
 
-export const launch = () =>
+// `flags`: further switches of the browser.
+export const launch = (flags = []) =>
   puppeteer.launch({
     executablePath: process.env.CHROMIUM ?? "/usr/bin/chromium",
     protocolTimeout: 4 * TIMEOUT_MS,
-    args: ["--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage", "--no-first-run", "--mute-audio"],
+    args: ["--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage", "--no-first-run", "--mute-audio", ...flags],
   });
 
 // Blocks the storage of the page and drops the first reply to a request to begin.
@@ -51,7 +52,7 @@ export async function open(browser, url, { width = 1280, height = 800, touch = f
   const origin = new URL(url).origin;
   page.on("request", (request) => {
     const address = request.url();
-    if (!address.startsWith(origin) && !address.startsWith("data:")) problems.push(`request to another origin: ${address}`);
+    if (![origin, "data:", `blob:${origin}`].some((start) => address.startsWith(start))) problems.push(`request to another origin: ${address}`);
   });
   await page.goto(url);
   // Hides the page for some time: focus emulation is off, and another page is in front.

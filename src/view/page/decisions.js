@@ -1,0 +1,117 @@
+// Decisions on the chosen video: overrides of a range, the speaker among several persons, the text of a word. The server
+// saves them; the next run applies them.
+
+import { announce, attempt, button, clock, el, labelled, options, row, send, sendJson, table } from "./dom.js";
+
+const ACTIONS = { reject: "Reject", accept: "Accept", "swap-hands": "Swap hands", speaker: "Choose the speaker", word: "Correct a word" };
+// Number of words around the playhead that can be chosen.
+const NEAR_WORDS = 12;
+const REST_MS = 200;
+
+const numberInput = (attributes) => el("input", { type: "number", step: "any", min: "0", ...attributes });
+
+export class DecisionPanel {
+  #word = null; #firstWord = -1;
+
+  // `view` has the timeline and the clip of the video; `onchange()` loads the video again.
+  constructor(video, view, onchange) {
+    Object.assign(this, { video, view, onchange });
+    const setRange = () => (view.timeline.range = [this.from.valueAsNumber || 0, this.to.valueAsNumber || video.duration_secs]);
+    this.from = numberInput({ onchange: setRange });
+    this.to = numberInput({ onchange: setRange });
+    const act = (action) => button(ACTIONS[action], () => this.#decide(action, {}));
+    this.actions = ["reject", "accept", "swap-hands"].map(act);
+    this.x = numberInput({ max: video.width, onchange: () => this.#mark() });
+    this.y = numberInput({ max: video.height, onchange: () => this.#mark() });
+    const pick = button("Choose the speaker on the video", () => {
+      announce("Press the speaker on the video, or enter x and y.");
+      view.clip.pick((x, y) => {
+        [this.x.value, this.y.value] = [x, y];
+        this.#mark();
+        announce(`Speaker at ${x}, ${y} px. "Set the speaker" saves it.`);
+      });
+    });
+    const set = button("Set the speaker", () => {
+      if (!this.x.value || !this.y.value) return announce("Choose the position of the speaker first: press the video or enter x and y.", true);
+      return this.#decide("speaker", { x: this.x.valueAsNumber, y: this.y.valueAsNumber });
+    });
+    this.words = el("select", { onchange: () => this.showWord(Number(this.words.value)) });
+    this.text = el("input", { type: "text", autocomplete: "off" });
+    const correct = button("Correct the word", () => this.#correct());
+    const note = "Decisions are saved beside the configuration. The next `orator run` applies them; the dataset is unchanged until then.";
+    this.element = el("section", { class: "decisions", "aria-label": "Decisions" },
+      el("h2", {}, "Decisions"), el("p", { class: "note" }, note),
+      row(labelled("From, s", this.from), labelled("To, s", this.to), ...this.actions),
+      row(pick, labelled("x, px", this.x), labelled("y, px", this.y), set),
+      video.words.length ? row(labelled("Word", this.words), labelled("Correct text", this.text), correct) : null,
+      this.#list());
+  }
+
+  #list() {
+    const { decisions } = this.video;
+    if (!decisions.length) return el("p", { class: "note" }, "No decisions on this video.");
+    const cells = ({ id, action, start_secs: start, end_secs: end, x, y, text, author, time }) => {
+      const name = `${ACTIONS[action] ?? action}, ${clock(start)} to ${clock(end)}`;
+      const detail = text ?? (action === "speaker" ? `at ${x}, ${y} px` : "");
+      return [ACTIONS[action] ?? action, `${clock(start)} to ${clock(end)}`, detail, author, new Date(time).toLocaleString(),
+        button("Undo", () => this.#undo(id, name), { "aria-label": `Undo: ${name}` })];
+    };
+    return table("Decisions on this video", ["Decision", "Range", "Detail", "Author", "Time", "Undo"], decisions.map(cells));
+  }
+
+  showRange(range) {
+    [this.from.value, this.to.value] = range ? range.map((secs) => secs.toFixed(2)) : ["", ""];
+    for (const action of this.actions) action.disabled = !range || range[0] === range[1];
+  }
+
+  // Offers the words around the playhead once it rests.
+  follow(secs) {
+    clearTimeout(this.timer);
+    const offer = () => {
+      const at = Math.max(this.view.timeline.wordAt(secs), 0);
+      if (at !== this.#word && ![this.words, this.text].includes(document.activeElement)) this.showWord(at);
+    };
+    if (!this.view.clip.isPlaying) this.timer = setTimeout(offer, REST_MS);
+  }
+
+  showWord(index) {
+    const { words } = this.video;
+    if (!words[index]) return;
+    this.#word = index;
+    const first = Math.max(0, index - NEAR_WORDS);
+    const near = words.slice(first, index + NEAR_WORDS + 1);
+    if (first !== this.#firstWord || !this.words.children.length) {
+      this.#firstWord = first;
+      this.words.replaceChildren(...options(near.map((_, k) => first + k), (at) => `${clock(words[at][0])} ${words[at][2]}`));
+    }
+    this.words.value = `${index}`;
+    this.text.value = words[index][2];
+  }
+
+  #mark() {
+    const { x, y } = this;
+    this.view.clip.marker = x.value && y.value ? [x.valueAsNumber, y.valueAsNumber] : null;
+    this.view.clip.redraw();
+  }
+
+  #correct() {
+    const word = this.video.words[this.#word];
+    const text = this.text.value.trim();
+    if (!word || !text || text === word[2]) return announce("Choose a word and enter another text.", true);
+    return this.#decide("word", { text }, [word[0], word[1]]);
+  }
+
+  async #decide(action, detail, range = this.view.timeline.range ?? [0, this.video.duration_secs]) {
+    const [start, end] = range;
+    const decision = { video: this.video.id, action, start_secs: start, end_secs: end, ...detail };
+    if (!(await attempt(() => sendJson("./api/decisions", decision)))) return;
+    await this.onchange();
+    announce(`Saved: ${ACTIONS[action]}, ${clock(start)} to ${clock(end)}. The next run applies it.`);
+  }
+
+  async #undo(id, name) {
+    if (!(await attempt(() => send("DELETE", `./api/decisions/${encodeURIComponent(id)}`)))) return;
+    await this.onchange();
+    announce(`Undone: ${name}.`);
+  }
+}
