@@ -1,15 +1,25 @@
 //! Files of the page by path below the token, with their content types.
 
-use orator_web::axum::http::header;
-use orator_web::axum::response::{IntoResponse, Response as HttpResponse};
+use orator_web::reply::text_reply;
 
 const SCRIPT: &str = "text/javascript; charset=utf-8";
+const PAGE: &str = "text/html; charset=utf-8";
 
 /// Path, content type and content of every file.
-pub const ASSETS: [(&str, &str, &str); 1] = [("/", "text/html; charset=utf-8", "")];
-
-/// Reply with the file at `path`, revalidated each time it is opened.
-pub fn asset(path: &str) -> HttpResponse {
-    let (_, content_type, text) = ASSETS.iter().find(|(known, ..)| *known == path).unwrap_or(&ASSETS[0]);
-    ([(header::CONTENT_TYPE, *content_type), (header::CACHE_CONTROL, "no-cache")], *text).into_response()
-}
+pub const ASSETS: [(&str, &str, &str); 15] = [
+    ("/", PAGE, include_str!("page/page.html")),
+    ("/page.css", "text/css; charset=utf-8", include_str!("page/page.css")),
+    ("/app.js", SCRIPT, include_str!("page/app.js")),
+    ("/avatar.js", SCRIPT, include_str!("page/avatar.js")),
+    ("/clip.js", SCRIPT, include_str!("page/clip.js")),
+    ("/dataset.js", SCRIPT, include_str!("page/dataset.js")),
+    ("/decisions.js", SCRIPT, include_str!("page/decisions.js")),
+    ("/dom.js", SCRIPT, include_str!("page/dom.js")),
+    ("/intervals.js", SCRIPT, include_str!("page/intervals.js")),
+    ("/player.js", SCRIPT, include_str!("page/player.js")),
+    ("/result.js", SCRIPT, include_str!("page/result.js")),
+    ("/run.js", SCRIPT, include_str!("page/run.js")),
+    ("/three.js", SCRIPT, include_str!("page/three.js")),
+    ("/timeline.js", SCRIPT, include_str!("page/timeline.js")),
+    ("/three.LICENSES.txt", "text/plain; charset=utf-8", include_str!("page/three.LICENSES.txt")),
+];

@@ -1,7 +1,7 @@
 //! Server of the viewer and its routes. All of them are below `/TOKEN/`, a random word in the URL that the program
 //! prints, so that other users and pages of other origins reach none.
 
-use crate::assets::{ASSETS, asset};
+use crate::assets::ASSETS;
 use crate::file::ViewedFile;
 use crate::project::Project;
 use crate::results::Results;
@@ -85,8 +85,8 @@ fn router(viewer: Viewer, token: &str) -> Router {
         .route("/results/{id}/{file}", get(result_file))
         .route("/file", get(file))
         .route("/file-audio", get(file_audio));
-    for (path, _, _) in ASSETS {
-        pages = pages.route(path, get(async move || asset(path)));
+    for (path, content_type, text) in ASSETS {
+        pages = pages.route(path, get(async move || text_reply(content_type, text)));
     }
     Router::new().nest(&format!("/{token}"), pages).with_state(Arc::new(viewer))
 }
