@@ -112,7 +112,10 @@ impl Decision {
     /// The invalid key, with what was expected.
     pub(super) fn check_assigned(&self) -> Result<()> {
         let is_hex = |c: u8| c.is_ascii_digit() || (b'a'..=b'f').contains(&c);
-        ensure!(self.id.len() == 8 && self.id.bytes().all(is_hex), "invalid `id`: expected 8 hex digits, such as 1a2b3c4d");
+        ensure!(
+            self.id.len() == 8 && self.id.bytes().all(is_hex),
+            "invalid `id`: expected 8 hex digits, such as 1a2b3c4d"
+        );
         let is_time = |(c, pattern): (u8, u8)| if pattern == b'0' { c.is_ascii_digit() } else { c == pattern };
         let pattern = b"0000-00-00T00:00:00Z";
         ensure!(

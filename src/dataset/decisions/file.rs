@@ -1,7 +1,9 @@
 //! `decisions.toml`, a list of `[[decision]]` tables beside the configuration. It is replaced as a whole under a lock,
 //! so that two programs cannot lose a decision; comments in it are not retained.
 
+use super::decision::DecisionAction;
 use super::decision::{self, Decision};
+use crate::config::Config;
 use crate::config::videos::Videos;
 use anyhow::{Context, Result, bail, ensure};
 use orator_base::input;
@@ -53,7 +55,11 @@ fn parse(text: &str) -> Result<Vec<Decision>> {
         Some(_) => bail!("`decision` is not a list: expected [[decision]] tables"),
         None => Vec::new(),
     };
-    ensure!(table.is_empty(), "unknown key `{}`: expected [[decision]] tables", table.keys().next().map_or("", |key| key));
+    ensure!(
+        table.is_empty(),
+        "unknown key `{}`: expected [[decision]] tables",
+        table.keys().next().map_or("", |key| key)
+    );
     let mut ids = BTreeSet::new();
     let mut decisions = Vec::with_capacity(entries.len());
     for (entry, nth) in entries.into_iter().zip(1..) {
@@ -112,22 +118,36 @@ fn change(config: &Path, work: impl FnOnce(&mut Vec<Decision>) -> Result<Decisio
     Ok(changed)
 }
 
-/// Adds the decisions beside `config` to the videos of their speakers. Decisions about unknown speakers or videos are
-/// listed in `missing`.
+/// Adds the decisions beside `config` to its videos, `all`. Those without effect are listed in `missing`: no such
+/// speaker or video, a word of a speaker without transcripts, or a choice among the persons of a keypoint file.
 ///
 /// # Errors
 /// Those of `read`.
-pub fn attach(config: &Path, all: &mut [Videos]) -> Result<()> {
-    for decision in read(config)? {
+pub fn attach(config: &Config, all: &mut [Videos]) -> Result<()> {
+    for decision in read(&config.file)? {
         let Decision { id, speaker, video, .. } = &decision;
-        let advice = "correct or remove the entry";
-        if let Some(videos) = all.iter_mut().find(|videos| videos.speaker == *speaker) {
-            if !videos.units.iter().any(|unit| unit.video == *video) {
-                videos.missing.push(format!("{FILE_NAME}, decision {id}: no video has the name {video}: {advice}"));
+        let mut configured = config.settings.speaker.iter().filter(|configured| configured.name == *speaker);
+        let has_words = configured.any(|configured| !configured.transcripts.is_empty());
+        let at = all.iter().position(|videos| videos.speaker == *speaker);
+        let problem = match at.map(|at| &all[at]) {
+            None => Some(format!("no speaker has the name {speaker}")),
+            Some(videos) if videos.units.iter().all(|unit| unit.video != *video) => {
+                Some(format!("no video of {speaker} has the name {video}"))
             }
-            videos.decisions.push(decision);
-        } else if let Some(first) = all.first_mut() {
-            first.missing.push(format!("{FILE_NAME}, decision {id}: no speaker has the name {speaker}: {advice}"));
+            Some(_) if decision.action == DecisionAction::Word && !has_words => {
+                Some(format!("{speaker} has no `transcripts`"))
+            }
+            Some(videos) if decision.action == DecisionAction::Speaker && videos.keypoints.contains_key(video) => {
+                Some(format!("{video} consists of keypoints of one person"))
+            }
+            Some(_) => None,
+        };
+        let Some(videos) = all.get_mut(at.unwrap_or(0)) else { return Ok(()) };
+        match problem {
+            Some(problem) => {
+                videos.missing.push(format!("{FILE_NAME}, decision {id}: {problem}: correct or remove the entry"));
+            }
+            None => videos.decisions.push(decision),
         }
     }
     Ok(())

@@ -39,7 +39,8 @@ pub fn swapped(keypoints: &Keypoints, swaps: &[&Decision]) -> Vec<Range<usize>> 
 fn swap_hands(keypoints: &mut Keypoints, frames: Range<usize>) {
     let Keypoints { body, left_hand, right_hand, hand_depth, .. } = keypoints;
     for t in frames.clone() {
-        for (left, right) in left_hand.index_axis_mut(Axis(0), t).iter_mut().zip(right_hand.index_axis_mut(Axis(0), t)) {
+        for (left, right) in left_hand.index_axis_mut(Axis(0), t).iter_mut().zip(right_hand.index_axis_mut(Axis(0), t))
+        {
             std::mem::swap(left, right);
         }
         if let Some(depth) = hand_depth {

@@ -7,4 +7,4 @@ pub mod hands;
 
 pub use decision::{Decision, DecisionAction, counts, of_unit, record};
 pub use file::{FILE_NAME, add, attach, path, read, remove};
-pub use hands::read_keypoints;
+pub use hands::{read_keypoints, swapped};

@@ -7,6 +7,7 @@
 pub mod appearance;
 pub mod body;
 pub mod chain;
+pub mod chosen_person;
 pub mod decode;
 pub mod detector;
 pub mod face;

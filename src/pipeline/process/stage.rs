@@ -13,6 +13,7 @@ use orator_base::types::device::DeviceChoice;
 use orator_base::types::time::FrameRate;
 use orator_dataset::config::videos::Videos;
 use orator_dataset::config::{Config, KeypointSource};
+use orator_dataset::decisions::Decision;
 use orator_formats::media_json::MediaInfo;
 use orator_media::sandbox::Restriction;
 use orator_onnx::{ModelStore, find_library};
@@ -93,6 +94,12 @@ impl SubprocessStage<'_> {
         of_speaker.and_then(|videos| videos.keypoints.get(&unit.video))
     }
 
+    fn decisions(&self, unit: &Unit) -> Vec<Decision> {
+        let of_speaker = self.videos.iter().find(|videos| videos.speaker == unit.speaker);
+        let all = of_speaker.map_or(&[][..], |videos| &videos.decisions);
+        all.iter().filter(|decision| decision.video == unit.video).cloned().collect()
+    }
+
     fn request(&self, unit: &Unit, part: Option<usize>, out: &Path, memory: u64) -> Result<UnitRequest> {
         let mut settings = self.config.settings.clone();
         settings.speaker.retain(|speaker| speaker.name == unit.speaker);
@@ -112,6 +119,7 @@ impl SubprocessStage<'_> {
             settings,
             config_file: self.config.file.clone(),
             keypoints: self.keypoints(unit).cloned(),
+            decisions: self.decisions(unit),
             reads,
             out: out.into(),
             memory,
