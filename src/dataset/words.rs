@@ -70,9 +70,9 @@ impl VideoWords {
     #[must_use]
     pub fn corrected(mut self, decisions: &[&Decision]) -> Self {
         for decision in decisions.iter().filter(|decision| decision.action == DecisionAction::Word) {
-            let (replaced, mut words): (Vec<Word>, Vec<Word>) =
-                self.words.into_iter().partition(|word| decision.contains(midpoint_secs(word)));
             let (start, end) = (decision.start_secs, decision.end_secs);
+            let is_replaced = |word: &Word| (start..end).contains(&midpoint_secs(word));
+            let (replaced, mut words): (Vec<Word>, Vec<Word>) = self.words.into_iter().partition(is_replaced);
             let first = replaced.iter().map(|word| word.start_secs).min_by(f64::total_cmp).unwrap_or(start);
             let last = replaced.iter().map(|word| word.end_secs).max_by(f64::total_cmp).unwrap_or(end);
             if let Some(word) = decision.text.clone().filter(|text| !text.is_empty()) {

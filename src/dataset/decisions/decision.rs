@@ -1,16 +1,17 @@
 //! A decision of a user about a range of a video. Its times are on the clock of the ledger: 0 is the start of frame 0.
 
-use anyhow::{Context, Result, ensure};
+use anyhow::{Result, ensure};
 use orator_base::stage::Unit;
 use orator_base::types::time::FrameRate;
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
-use std::fmt;
 use std::ops::Range;
 
 /// Longest author and word, characters.
 const MAX_CHARS: usize = 80;
+/// Latest end of a range, seconds.
+const MAX_SECS: f64 = 1e9;
 /// Share of a frame that a range may overlap without affecting the frame, so that rounded times are harmless.
 const ROUNDING_FRAMES: f64 = 0.05;
 
@@ -35,7 +36,6 @@ pub enum DecisionAction {
 #[serde(deny_unknown_fields)]
 pub struct Decision {
     /// 8 hex digits, unique in the file; assigned by `add`.
-    #[serde(default)]
     pub id: String,
     pub speaker: String,
     /// Work name of the video (`Unit::video`).
@@ -57,69 +57,43 @@ pub struct Decision {
     #[serde(default)]
     pub author: String,
     /// RFC 3339 time in UTC, `2026-11-28T15:20:00Z`; assigned by `add`.
-    #[serde(default)]
     pub time: String,
 }
 
-impl fmt::Display for DecisionAction {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(match self {
-            Self::Accept => "accept",
-            Self::Reject => "reject",
-            Self::SwapHands => "swap-hands",
-            Self::Speaker => "speaker",
-            Self::Word => "word",
-        })
-    }
-}
-
 impl Decision {
-    /// Checks everything but `id` and `time`.
+    /// Checks the decision; `id` and `time` only if they are not empty, as they are before `add`.
     ///
     /// # Errors
     /// The first invalid key, with what was expected.
     pub fn check(&self) -> Result<()> {
-        let Self { start_secs: start, end_secs: end, .. } = *self;
+        let Self { start_secs, end_secs, action, x, y, text, .. } = self;
+        let is_short = |text: &str| text.chars().count() <= MAX_CHARS && !text.contains(char::is_control);
+        let is_word = |text: &String| is_short(text) && !text.contains(char::is_whitespace);
+        let matches = |text: &str, pattern: &[u8], class: fn(&u8) -> bool| {
+            let is_allowed = |(c, p): (u8, &u8)| if *p == b'0' { class(&c) } else { c == *p };
+            text.is_empty() || (text.len() == pattern.len() && text.bytes().zip(pattern).all(is_allowed))
+        };
+        let (is_speaker, is_on_word) = (*action == DecisionAction::Speaker, *action == DecisionAction::Word);
         ensure!(!self.speaker.is_empty(), "`speaker` is empty: expected a speaker of the configuration");
         ensure!(!self.video.is_empty(), "`video` is empty: expected the name of a video in the work folder");
         ensure!(
-            start.is_finite() && end.is_finite() && start >= 0.0 && end > start,
-            "invalid range {start} to {end} s: expected 0 <= start_secs < end_secs"
-        );
-        let is_speaker = self.action == DecisionAction::Speaker;
-        for (key, px) in [("x", self.x), ("y", self.y)] {
-            ensure!(is_speaker == px.is_some(), "`{key}`: expected for `speaker`, and for no other action");
-            ensure!(px.is_none_or(|px| (0.0..=1e6).contains(&px)), "invalid `{key}`: expected 0 to 1000000 px");
-        }
-        let is_word = self.action == DecisionAction::Word;
-        ensure!(is_word == self.text.is_some(), "`text`: expected for `word`, and for no other action");
-        let is_invalid = |c: char| c.is_whitespace() || c.is_control();
-        let is_short = |text: &str| text.chars().count() <= MAX_CHARS;
-        ensure!(
-            self.text.as_deref().is_none_or(|text| !text.contains(is_invalid) && is_short(text)),
-            "invalid `text`: expected one word of at most {MAX_CHARS} characters, or an empty text to remove words"
+            *start_secs >= 0.0 && end_secs > start_secs && *end_secs <= MAX_SECS,
+            "invalid range {start_secs} to {end_secs} s: expected 0 <= start_secs < end_secs <= {MAX_SECS}"
         );
         ensure!(
-            !self.author.contains(char::is_control) && is_short(&self.author),
-            "invalid `author`: expected at most {MAX_CHARS} characters on one line"
+            [x, y].iter().all(|px| px.map_or(!is_speaker, |px| is_speaker && (0.0..=1e6).contains(&px))),
+            "invalid `x` and `y`: expected a pixel for the action speaker, and nothing for other actions"
         );
-        Ok(())
-    }
-
-    /// Checks `id` and `time`, which `add` assigns.
-    ///
-    /// # Errors
-    /// The invalid key, with what was expected.
-    pub(super) fn check_assigned(&self) -> Result<()> {
-        let is_hex = |c: u8| c.is_ascii_digit() || (b'a'..=b'f').contains(&c);
         ensure!(
-            self.id.len() == 8 && self.id.bytes().all(is_hex),
-            "invalid `id`: expected 8 hex digits, such as 1a2b3c4d"
+            text.as_ref().map_or(!is_on_word, |text| is_on_word && is_word(text)),
+            "invalid `text`: expected one word of at most {MAX_CHARS} characters, or \"\" to remove words, for the action \
+             word, and nothing for other actions"
         );
-        let is_time = |(c, pattern): (u8, u8)| if pattern == b'0' { c.is_ascii_digit() } else { c == pattern };
-        let pattern = b"0000-00-00T00:00:00Z";
+        ensure!(is_short(&self.author), "invalid `author`: expected at most {MAX_CHARS} characters on one line");
+        let is_hex = |c: &u8| matches!(c, b'0'..=b'9' | b'a'..=b'f');
+        ensure!(matches(&self.id, b"00000000", is_hex), "invalid `id`: expected 8 hex digits, such as 1a2b3c4d");
         ensure!(
-            self.time.len() == pattern.len() && self.time.bytes().zip(*pattern).all(is_time),
+            matches(&self.time, b"0000-00-00T00:00:00Z", u8::is_ascii_digit),
             "invalid `time`: expected UTC, such as \"2026-11-28T15:20:00Z\""
         );
         Ok(())
@@ -132,11 +106,6 @@ impl Decision {
         // A range that is shorter than the tolerance affects the frame in which it starts.
         let end = ((end - ROUNDING_FRAMES).ceil() as usize).max(start + 1).min(n_frames);
         start.min(end)..end
-    }
-
-    /// Whether the range contains a time.
-    pub fn contains(&self, secs: f64) -> bool {
-        (self.start_secs..self.end_secs).contains(&secs)
     }
 }
 
@@ -160,24 +129,11 @@ pub fn record(decisions: &[&Decision], settings: &mut Value) {
 
 /// Numbers of decisions by action and author: `2 accept (ana), 1 word`.
 pub fn counts(decisions: &[&Decision]) -> String {
-    let mut counts: BTreeMap<(DecisionAction, &str), usize> = BTreeMap::new();
+    let mut counts: BTreeMap<String, usize> = BTreeMap::new();
     for one in decisions {
-        *counts.entry((one.action, &one.author)).or_default() += 1;
+        let author = if one.author.is_empty() { String::new() } else { format!(" ({})", one.author) };
+        let action = json!(one.action);
+        *counts.entry(action.as_str().unwrap_or_default().to_owned() + &author).or_default() += 1;
     }
-    let text = |((action, author), n): ((DecisionAction, &str), usize)| match author {
-        "" => format!("{n} {action}"),
-        author => format!("{n} {action} ({author})"),
-    };
-    counts.into_iter().map(text).collect::<Vec<_>>().join(", ")
-}
-
-/// Parses an entry of the file.
-///
-/// # Errors
-/// An unknown or missing key, or an invalid value.
-pub(super) fn parse(entry: toml::Value) -> Result<Decision> {
-    let decision: Decision = entry.try_into().context("expected the keys of a decision")?;
-    decision.check_assigned()?;
-    decision.check()?;
-    Ok(decision)
+    counts.into_iter().map(|(what, n)| format!("{n} {what}")).collect::<Vec<_>>().join(", ")
 }

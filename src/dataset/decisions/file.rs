@@ -1,15 +1,13 @@
 //! `decisions.toml`, a list of `[[decision]]` tables beside the configuration. It is replaced as a whole under a lock,
 //! so that two programs cannot lose a decision; comments in it are not retained.
 
-use super::decision::DecisionAction;
-use super::decision::{self, Decision};
+use super::decision::{Decision, DecisionAction};
 use crate::config::Config;
 use crate::config::videos::Videos;
-use anyhow::{Context, Result, bail, ensure};
+use anyhow::{Context, Result, ensure};
 use orator_base::input;
 use orator_base::stage::workdir::{self, FolderLock};
-use serde::Serialize;
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
@@ -23,11 +21,6 @@ const HEADING: &str = "# Decisions by hand, applied by `orator run`. To undo one
 
 /// Serialises changes within this program; those of other programs are excluded by a lock of the file.
 static CHANGES: Mutex<()> = Mutex::new(());
-
-#[derive(Serialize)]
-struct Listed<'a> {
-    decision: &'a [Decision],
-}
 
 /// Path of the decisions that belong to the configuration file `config`.
 pub fn path(config: &Path) -> PathBuf {
@@ -49,23 +42,20 @@ pub fn read(config: &Path) -> Result<Vec<Decision>> {
 }
 
 fn parse(text: &str) -> Result<Vec<Decision>> {
-    let mut table: toml::Table = text.parse().context("expected TOML")?;
-    let entries = match table.remove("decision") {
-        Some(toml::Value::Array(entries)) => entries,
-        Some(_) => bail!("`decision` is not a list: expected [[decision]] tables"),
-        None => Vec::new(),
-    };
-    ensure!(
-        table.is_empty(),
-        "unknown key `{}`: expected [[decision]] tables",
-        table.keys().next().map_or("", |key| key)
-    );
+    let mut table: BTreeMap<String, Vec<toml::Value>> = toml::from_str(text).context("expected [[decision]] tables")?;
+    let entries = table.remove("decision").unwrap_or_default();
+    ensure!(table.is_empty(), "unknown keys {:?}: expected [[decision]] tables", table.keys());
     let mut ids = BTreeSet::new();
     let mut decisions = Vec::with_capacity(entries.len());
     for (entry, nth) in entries.into_iter().zip(1..) {
-        let id = entry.get("id").and_then(toml::Value::as_str).unwrap_or("without id").to_owned();
-        let decision = decision::parse(entry).with_context(|| format!("decision {nth} ({id})"))?;
-        ensure!(ids.insert(decision.id.clone()), "decision {nth} ({id}): another decision has this `id`");
+        let id = entry.get("id").and_then(toml::Value::as_str).unwrap_or_default().to_owned();
+        let parsed = entry.try_into().context("expected the keys of a decision");
+        let decision = parsed.and_then(|decision: Decision| decision.check().map(|()| decision));
+        let decision = decision.with_context(|| format!("decision {nth} ({id})"))?;
+        ensure!(
+            !id.is_empty() && ids.insert(id.clone()),
+            "decision {nth} ({id}): expected an `id` that no other decision has"
+        );
         decisions.push(decision);
     }
     Ok(decisions)
@@ -112,7 +102,7 @@ fn change(config: &Path, work: impl FnOnce(&mut Vec<Decision>) -> Result<Decisio
         workdir::remove_file(&file)?;
         return Ok(changed);
     }
-    let text = HEADING.to_owned() + &toml::to_string(&Listed { decision: &decisions })?;
+    let text = HEADING.to_owned() + &toml::to_string(&BTreeMap::from([("decision", &decisions)]))?;
     ensure!(text.len() as u64 <= MAX_BYTES, "{} would exceed {} MiB", file.display(), MAX_BYTES >> 20);
     workdir::write_file(&file, text.as_bytes())?;
     Ok(changed)
@@ -154,7 +144,7 @@ pub fn attach(config: &Config, all: &mut [Videos]) -> Result<()> {
 }
 
 /// Formats seconds since 1970 as RFC 3339 in UTC (Gregorian calendar; days from Howard Hinnant's `civil_from_days`).
-fn rfc3339(secs: u64) -> String {
+pub fn rfc3339(secs: u64) -> String {
     let (days, of_day) = (secs / 86_400 + 719_468, secs % 86_400);
     let (era, of_era) = (days / 146_097, days % 146_097);
     let year = (of_era - of_era / 1460 + of_era / 36_524 - of_era / 146_096) / 365;
@@ -165,22 +155,4 @@ fn rfc3339(secs: u64) -> String {
     let (month, is_next) = if month < 10 { (month + 3, 0) } else { (month - 9, 1) };
     let (year, [hour, minute, second]) = (400 * era + year + is_next, [of_day / 3600, of_day / 60 % 60, of_day % 60]);
     format!("{year:04}-{month:02}-{day:02}T{hour:02}:{minute:02}:{second:02}Z")
-}
-
-#[cfg(test)]
-mod tests {
-    #[test]
-    fn times_are_utc_in_rfc_3339() {
-        // Expected values of `date -u -d @SECS +%FT%TZ`.
-        let expected = [
-            (0, "1970-01-01T00:00:00Z"),
-            (951_782_400, "2000-02-29T00:00:00Z"),
-            (1_709_251_199, "2024-02-29T23:59:59Z"),
-            (1_735_689_599, "2024-12-31T23:59:59Z"),
-            (4_107_542_400, "2100-03-01T00:00:00Z"),
-        ];
-        for (secs, text) in expected {
-            assert_eq!(super::rfc3339(secs), text);
-        }
-    }
 }

@@ -2,7 +2,7 @@
 
 use super::decision::Decision;
 use anyhow::Result;
-use ndarray::{Array3, Axis};
+use ndarray::{Array3, Zip, s};
 use orator_base::types::pose2d::{Keypoints, coco};
 use orator_formats::keypoints_npz;
 use std::ops::Range;
@@ -38,15 +38,12 @@ pub fn swapped(keypoints: &Keypoints, swaps: &[&Decision]) -> Vec<Range<usize>> 
 /// the wrists were confused along with them: the wrists are exchanged if that brings them closer to the hands.
 fn swap_hands(keypoints: &mut Keypoints, frames: Range<usize>) {
     let Keypoints { body, left_hand, right_hand, hand_depth, .. } = keypoints;
-    for t in frames.clone() {
-        for (left, right) in left_hand.index_axis_mut(Axis(0), t).iter_mut().zip(right_hand.index_axis_mut(Axis(0), t))
-        {
-            std::mem::swap(left, right);
-        }
-        if let Some(depth) = hand_depth {
-            let (mut left, mut right) = depth.index_axis_mut(Axis(0), t).split_at(Axis(0), 1);
-            ndarray::Zip::from(&mut left).and(&mut right).for_each(std::mem::swap);
-        }
+    let all = |frames: &Range<usize>| s![frames.clone(), .., ..];
+    Zip::from(left_hand.slice_mut(all(&frames))).and(right_hand.slice_mut(all(&frames))).for_each(std::mem::swap);
+    let row = |row: usize| s![frames.clone(), row, ..];
+    if let Some(depth) = hand_depth {
+        let (left, right) = depth.multi_slice_mut((row(0), row(1)));
+        Zip::from(left).and(right).for_each(std::mem::swap);
     }
     // Sums over the range, so that the wrists do not jump within it.
     let distance = |wrist: usize, hand: &Array3<f32>| -> f32 {
@@ -57,10 +54,7 @@ fn swap_hands(keypoints: &mut Keypoints, frames: Range<usize>) {
     let own = distance(coco::L_WRIST, left_hand) + distance(coco::R_WRIST, right_hand);
     let other = distance(coco::R_WRIST, left_hand) + distance(coco::L_WRIST, right_hand);
     if other < own {
-        for t in frames {
-            for k in 0..3 {
-                body.swap([t, coco::L_WRIST, k], [t, coco::R_WRIST, k]);
-            }
-        }
+        let (left, right) = body.multi_slice_mut((row(coco::L_WRIST), row(coco::R_WRIST)));
+        Zip::from(left).and(right).for_each(std::mem::swap);
     }
 }

@@ -155,11 +155,6 @@ impl LiftedVideo {
         self
     }
 
-    /// Decisions with this action.
-    fn decided(&self, action: DecisionAction) -> Vec<&Decision> {
-        self.decisions.iter().filter(|decision| decision.action == action).collect()
-    }
-
     /// Adds the words of the first usable one of the files `transcripts`; may be empty.
     pub fn with_words(mut self, transcripts: &[PathBuf]) -> Self {
         let n_samples = hound::WavReader::open(&self.sound).map_or(0.0, |wav| f64::from(wav.duration()));
@@ -177,7 +172,7 @@ impl LiftedVideo {
         let end_secs = first + n_samples / rate;
         let choice = words::choose(transcripts, &self.unit.speaker, end_secs);
         let words = VideoWords::of(choice, transcripts, end_secs, first + self.shift as f64 / rate);
-        self.words = Some(words.corrected(&self.decided(DecisionAction::Word)));
+        self.words = Some(words.corrected(&self.decisions.iter().collect::<Vec<_>>()));
         self
     }
 
@@ -216,7 +211,8 @@ impl LiftedVideo {
         if intervals.is_empty() {
             return Ok(None);
         }
-        let keypoints = decisions::read_keypoints(&self.keypoints, &self.decided(DecisionAction::SwapHands))?;
+        let swaps = decisions::of_unit(&self.decisions, &self.unit, &[DecisionAction::SwapHands]);
+        let keypoints = decisions::read_keypoints(&self.keypoints, &swaps)?;
         let motion = joints_npz::read(&self.joints)?;
         let n_frames = self.intervals.n_frames;
         for (n, path) in [(keypoints.n_frames(), &self.keypoints), (motion.n_frames(), &self.joints)] {

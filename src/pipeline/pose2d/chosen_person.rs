@@ -4,14 +4,9 @@ use super::talker::TalkerPath;
 use orator_base::types::pose2d::PersonBox;
 use std::ops::Range;
 
-/// Choice of a person.
-#[derive(Clone, Debug, PartialEq)]
-pub struct ChosenPerson {
-    /// Frames of the video in which the person is followed, up to the next shot boundary.
-    pub frames: Range<usize>,
-    /// Pixel of the full picture at which the person is in the first of them.
-    pub point: [f32; 2],
-}
+/// Frames of a video in which a person is followed, up to the next shot boundary, and the pixel of the full picture at
+/// which the person is in the first of them.
+pub type ChosenPerson = (Range<usize>, [f32; 2]);
 
 /// Path of the chosen person through the detections of a shot.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -34,37 +29,19 @@ impl ChosenPath {
     /// Index of the person among the detections in frame `idx` of the shot: the box that contains the point, if several
     /// the most centrally, and then the box that continues the path.
     pub fn find(&mut self, idx: usize, found: &[PersonBox]) -> Option<usize> {
+        // Distance of the point from the middle of a box, in half widths or heights.
+        let distance = |one: &PersonBox| {
+            let off = |at: f32, start: f32, size: f32| ((at - start) / size.max(1.0) - 0.5).abs() * 2.0;
+            off(self.point[0], one.x, one.width).max(off(self.point[1], one.y, one.height))
+        };
         let at = if self.is_found() {
             self.path.find(idx, found.iter().copied())
         } else {
-            // Distance from the middle in half widths and heights.
-            let distances = found.iter().map(|one| {
-                let off = |at: f32, start: f32, size: f32| ((at - start) / size.max(1.0) - 0.5).abs() * 2.0;
-                let [x, y] = self.point;
-                off(x, one.x, one.width).max(off(y, one.y, one.height))
-            });
-            let nearest = distances.enumerate().min_by(|a, b| a.1.total_cmp(&b.1));
+            let nearest = found.iter().map(distance).enumerate().min_by(|a, b| a.1.total_cmp(&b.1));
             nearest.filter(|(_, distance)| *distance <= 1.0).map(|(at, _)| at)
         };
         let person = at.and_then(|at| found.get(at));
         person.into_iter().for_each(|person| self.path.push(idx, *person));
         at
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_person_at_the_point_is_followed_while_it_moves() {
-        let at = |x: f32| PersonBox { x, y: 0.0, width: 100.0, height: 200.0, score: 0.9 };
-        let mut chosen = ChosenPath::new([330.0, 100.0]);
-        assert_eq!((chosen.find(0, &[at(0.0), at(500.0)]), chosen.is_found()), (None, false));
-        // Both boxes contain the point, the second more centrally.
-        assert_eq!((chosen.find(1, &[at(240.0), at(290.0)]), chosen.is_found()), (Some(1), true));
-        assert_eq!(chosen.find(5, &[at(320.0), at(240.0)]), Some(0));
-        assert_eq!(chosen.find(10, &[at(240.0), at(350.0)]), Some(1));
-        assert_eq!(chosen.find(15, &[at(0.0)]), None);
     }
 }

@@ -125,10 +125,9 @@ impl SpeakerTracker {
         self.idx = idx;
         let every = settings.person_every.max(1);
         let regular = idx.is_multiple_of(every);
-        let is_awaited = |chosen: &Option<ChosenPath>| chosen.as_ref().is_some_and(|chosen| !chosen.is_found());
-        let was_awaited = is_awaited(&self.chosen);
+        let is_awaited = self.chosen.as_ref().is_some_and(|chosen| !chosen.is_found());
         if !regular
-            && !was_awaited
+            && !is_awaited
             && !is_detection_frame(idx, every, self.track.n_persons > 1)
             && self.track.bbox.is_some()
         {
@@ -138,7 +137,7 @@ impl SpeakerTracker {
         if let Some(reference) = self.reference.as_ref().filter(|_| found.len() > 1) {
             measure(&mut found, reference, image, body, settings.joint_score)?;
         }
-        if was_awaited && !is_awaited(&self.chosen) {
+        if is_awaited && self.chosen.as_ref().is_some_and(ChosenPath::is_found) {
             self.track.reset();
         }
         let follow = regular.then_some(settings.box_smoothing);

@@ -202,11 +202,11 @@ impl Pose2dStage {
             let search = TalkerSearch::new(&self.runtime()?, &self.chosen.store, &self.chosen.settings)?;
             pass::talkers(&video, &Artifact::Sound.path(&self.work, unit), search, &*task)
         });
-        let chosen = self.choices(unit).into_iter().filter_map(|choice| {
-            let point = choice.x.zip(choice.y).map(|(x, y)| [x as f32, y as f32])?;
-            Some(ChosenPerson { frames: choice.frames(self.fps, timeline.n_frames()), point })
-        });
-        let (chosen, talkers) = (chosen.collect::<Vec<_>>(), talkers.transpose()?);
+        let choice = |choice: &Decision| -> Option<ChosenPerson> {
+            Some((choice.frames(self.fps, timeline.n_frames()), [choice.x? as f32, choice.y? as f32]))
+        };
+        let chosen: Vec<_> = self.choices(unit).into_iter().filter_map(choice).collect();
+        let talkers = talkers.transpose()?;
         pass::estimate_poses(&video, self.chain(unit)?, talkers.as_deref(), &chosen, progress, &*task)
     }
 

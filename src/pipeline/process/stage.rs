@@ -13,7 +13,6 @@ use orator_base::types::device::DeviceChoice;
 use orator_base::types::time::FrameRate;
 use orator_dataset::config::videos::Videos;
 use orator_dataset::config::{Config, KeypointSource};
-use orator_dataset::decisions::Decision;
 use orator_formats::media_json::MediaInfo;
 use orator_media::sandbox::Restriction;
 use orator_onnx::{ModelStore, find_library};
@@ -94,15 +93,11 @@ impl SubprocessStage<'_> {
         of_speaker.and_then(|videos| videos.keypoints.get(&unit.video))
     }
 
-    fn decisions(&self, unit: &Unit) -> Vec<Decision> {
-        let of_speaker = self.videos.iter().find(|videos| videos.speaker == unit.speaker);
-        let all = of_speaker.map_or(&[][..], |videos| &videos.decisions);
-        all.iter().filter(|decision| decision.video == unit.video).cloned().collect()
-    }
-
     fn request(&self, unit: &Unit, part: Option<usize>, out: &Path, memory: u64) -> Result<UnitRequest> {
         let mut settings = self.config.settings.clone();
         settings.speaker.retain(|speaker| speaker.name == unit.speaker);
+        let decisions = self.videos.iter().flat_map(|videos| &videos.decisions);
+        let decisions = decisions.filter(|one| one.speaker == unit.speaker && one.video == unit.video);
         let mut reads: Vec<_> = self.stage.inputs(unit)?.into_iter().map(|input| input.path.into()).collect();
         reads.push(settings.models.dir.as_os_str().to_owned());
         // The sandboxed process cannot list the folders of the library search, so the library is found here.
@@ -119,7 +114,7 @@ impl SubprocessStage<'_> {
             settings,
             config_file: self.config.file.clone(),
             keypoints: self.keypoints(unit).cloned(),
-            decisions: self.decisions(unit),
+            decisions: decisions.cloned().collect(),
             reads,
             out: out.into(),
             memory,

@@ -1,9 +1,8 @@
 //! Turns the measures of a video into intervals and a ledger, by the rules of `table`. A frame is rejected by the first
-//! rule that fails for longer than its gap allows, unless a user decided otherwise (`by_hand`). The rest is split at
+//! rule that fails for longer than its gap allows, unless a user decided otherwise. The rest is split at
 //! shot boundaries and identity changes; pieces that are too short or violate a rule on segments are rejected as a
 //! whole.
 
-use super::by_hand::{ByHand, by_hand};
 use super::measure::Measures;
 use super::table::{FrameRule, Gap, frame_rules, segment_rules};
 use orator_base::stage::ledger::{AcceptedInterval, Ledger, RejectedInterval};
@@ -11,8 +10,19 @@ use orator_base::stage::rejection::{FrameRejection, Rejection};
 use orator_base::types::interval::{Interval, Intervals};
 use orator_base::types::time::FrameRate;
 use orator_dataset::config;
-use orator_dataset::decisions::Decision;
+use orator_dataset::decisions::{Decision, DecisionAction};
 use orator_formats::media_json::MediaInfo;
+
+/// Decision of a user about a frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum ByHand<'a> {
+    Accepted,
+    /// Rejected by `author`, in a range of `secs` seconds.
+    Rejected {
+        author: &'a str,
+        secs: f64,
+    },
+}
 
 /// Judges a video. `decisions` are those of users on this video; actions other than accept and reject are ignored.
 pub fn judge(
@@ -55,6 +65,22 @@ pub fn judge(
     let intervals = Intervals::new(video.fps, n_frames, intervals).with_resting(&resting);
     let ledger = ledger(&pieces, &decided, n_frames, video).with_resting(intervals.resting_intervals());
     (intervals, ledger)
+}
+
+/// Decision about each of `n_frames` frames; the last one of several counts.
+fn by_hand<'a>(decisions: &[&'a Decision], n_frames: usize, fps: FrameRate) -> Vec<Option<ByHand<'a>>> {
+    let mut decided = vec![None; n_frames];
+    for decision in decisions {
+        let effect = match decision.action {
+            DecisionAction::Accept => ByHand::Accepted,
+            DecisionAction::Reject => {
+                ByHand::Rejected { author: &decision.author, secs: decision.end_secs - decision.start_secs }
+            }
+            _ => continue,
+        };
+        decided[decision.frames(fps, n_frames)].fill(Some(effect));
+    }
+    decided
 }
 
 /// Rejects the frames of runs in which `rule` fails for too long, unless an earlier rule has rejected them.

@@ -1,8 +1,7 @@
 //! Stage 3: keypoints to accepted intervals. `measure` and `rest` compute per-frame measures from the outputs of earlier
-//! stages (`store` saves them), `table` defines the rules, `judge` applies them and the decisions of users (`by_hand`), `stage`
-//! reads and writes the files.
+//! stages (`store` saves them), `table` defines the rules, `judge` applies them and the decisions of users, `stage` reads
+//! and writes the files.
 
-pub mod by_hand;
 pub mod judge;
 pub mod measure;
 pub mod rest;

@@ -136,8 +136,8 @@ impl ReportData {
         let now = judged.accepted_secs(rules);
         if (now - video.ledger.accepted_secs()).abs() > 1e-6 {
             video.note(
-                "Thresholds or decisions have changed since this video was processed; the sliders start at the new values. Run \
-                 `orator run` to update it.",
+                "Thresholds or decisions have changed since this video was processed; the sliders start at the new \
+                 values. Run `orator run` to update it.",
             );
         }
         let accepted = judged.table(rules);

@@ -41,11 +41,11 @@ pub fn estimate_poses(
         if begins_shot {
             chain.begin_shot(paths.next().flatten());
         }
-        let now = chosen.iter().rposition(|one| one.frames.contains(&idx));
+        let now = chosen.iter().rposition(|(frames, _)| frames.contains(&idx));
         if now != choice {
             // After its first frame, the point is no longer where the person is.
-            let begun = now.map(|at| &chosen[at]).filter(|one| one.frames.start == idx);
-            chain.follow(begun.map(|one| [0, 1].map(|k| one.point[k] - corner[k] as f32)));
+            let begun = now.map(|at| &chosen[at]).filter(|(frames, _)| frames.start == idx);
+            chain.follow(begun.map(|(_, point)| [0, 1].map(|k| point[k] - corner[k] as f32)));
             choice = now;
         }
         if let Some(picture) = picture {
