@@ -86,7 +86,7 @@ impl Decision {
         );
         ensure!(
             text.as_ref().map_or(!is_on_word, |text| is_on_word && is_word(text)),
-            "invalid `text`: expected one word of at most {MAX_CHARS} characters, or \"\" to remove words, for the action \
+            "invalid `text`: expected a word of at most {MAX_CHARS} characters, or \"\" to remove words, for the action \
              word, and nothing for other actions"
         );
         ensure!(is_short(&self.author), "invalid `author`: expected at most {MAX_CHARS} characters on one line");

@@ -75,7 +75,7 @@ pub fn add(config: &Path, decision: &Decision) -> Result<Decision> {
         };
         let is_free = |id: &String| decisions.iter().all(|known| known.id != *id);
         let id = (0..=decisions.len()).map(id).find(is_free).context("no unused id was found; try again")?;
-        let added = Decision { id, time: rfc3339(now.as_secs()), ..decision.clone() };
+        let added = Decision { id, time: time_text(now.as_secs()), ..decision.clone() };
         decisions.push(added.clone());
         Ok(added)
     })
@@ -144,7 +144,7 @@ pub fn attach(config: &Config, all: &mut [Videos]) -> Result<()> {
 }
 
 /// Formats seconds since 1970 as RFC 3339 in UTC (Gregorian calendar; days from Howard Hinnant's `civil_from_days`).
-pub fn rfc3339(secs: u64) -> String {
+pub fn time_text(secs: u64) -> String {
     let (days, of_day) = (secs / 86_400 + 719_468, secs % 86_400);
     let (era, of_era) = (days / 146_097, days % 146_097);
     let year = (of_era - of_era / 1460 + of_era / 36_524 - of_era / 146_096) / 365;

@@ -6,5 +6,5 @@ pub mod file;
 pub mod hands;
 
 pub use decision::{Decision, DecisionAction, counts, of_unit, record};
-pub use file::{FILE_NAME, add, attach, path, read, remove, rfc3339};
+pub use file::{FILE_NAME, add, attach, path, read, remove, time_text};
 pub use hands::{read_keypoints, swapped};
