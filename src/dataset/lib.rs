@@ -7,6 +7,7 @@
 pub mod bones;
 pub mod card;
 pub mod config;
+pub mod decisions;
 pub mod forget;
 pub mod import;
 pub mod index;

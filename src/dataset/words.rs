@@ -1,10 +1,11 @@
 //! Assignment of a video's transcript words to its samples. A word belongs to the sample that contains its midpoint, so
 //! each word is in at most one sample; its times count from the start of that sample.
 
+use super::decisions::{Decision, DecisionAction};
 use super::file_name;
 use anyhow::{Result, ensure};
 use orator_base::stage::ledger::{TranscriptReport, WordCount};
-use orator_formats::transcript::{Transcript, TranscriptChoice, Word};
+use orator_formats::transcript::{Transcript, TranscriptChoice, Word, WordSource};
 use std::path::{Path, PathBuf};
 
 /// Number and share of words that may be after the end of the sound; beyond both, the transcript is of another sound.
@@ -62,6 +63,27 @@ impl VideoWords {
         words.sort_by(|a, b| midpoint_secs(a).total_cmp(&midpoint_secs(b)));
         let count = WordCount { n_words, n_outside, ..WordCount::default() };
         Self { words, account: TranscriptReport { file: Some(file_name(path)), count, notes } }
+    }
+
+    /// Applies the decisions on words, in order. A new word has the time of those that it replaces, within the range of
+    /// the decision; without any, that of the range.
+    #[must_use]
+    pub fn corrected(mut self, decisions: &[&Decision]) -> Self {
+        for decision in decisions.iter().filter(|decision| decision.action == DecisionAction::Word) {
+            let (start, end) = (decision.start_secs, decision.end_secs);
+            let is_replaced = |word: &Word| (start..end).contains(&midpoint_secs(word));
+            let (replaced, mut words): (Vec<Word>, Vec<Word>) = self.words.into_iter().partition(is_replaced);
+            let first = replaced.iter().map(|word| word.start_secs).min_by(f64::total_cmp).unwrap_or(start);
+            let last = replaced.iter().map(|word| word.end_secs).max_by(f64::total_cmp).unwrap_or(end);
+            if let Some(word) = decision.text.clone().filter(|text| !text.is_empty()) {
+                let (start_secs, end_secs) = (first.max(start), last.min(end));
+                words.push(Word { word, start_secs, end_secs, source: WordSource::Given, confidence: None });
+                words.sort_by(|a, b| midpoint_secs(a).total_cmp(&midpoint_secs(b)));
+            }
+            self.words = words;
+        }
+        self.account.count.n_words = self.words.len() + self.account.count.n_outside;
+        self
     }
 
     /// Words of the sample from `start_secs` to `end_secs`, sorted by start; times count from the start of the sample

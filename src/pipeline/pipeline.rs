@@ -8,6 +8,7 @@ use orator_base::stage::fingerprint::HashCache;
 use orator_base::stage::{Stage, Unit};
 use orator_dataset::config::videos::Videos;
 use orator_dataset::config::{Config, videos};
+use orator_dataset::decisions;
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 
@@ -23,14 +24,15 @@ impl Pipeline {
     /// Finds the videos that the configuration names; writes nothing.
     ///
     /// # Errors
-    /// A configuration without speakers.
+    /// A configuration without speakers; an invalid `decisions.toml` beside it.
     pub fn open(config: Config) -> Result<Self> {
-        let videos = videos::all(&config);
+        let mut videos = videos::all(&config);
         ensure!(
             !videos.is_empty(),
             "{} has no [[speaker]] section: add one, or create a configuration with `orator init`",
             config.file.display()
         );
+        decisions::attach(&config, &mut videos)?;
         Ok(Self { config, videos, program: None })
     }
 

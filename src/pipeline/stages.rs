@@ -28,13 +28,20 @@ use std::path::Path;
 /// A model that the manifest does not list; weights that cannot be read.
 pub fn build(name: StageName, config: &Config, all: &[Videos], ready: &[Unit]) -> Result<Box<dyn Stage>> {
     let settings = &config.settings;
+    let decisions = || all.iter().flat_map(|videos| videos.decisions.iter().cloned()).collect();
     Ok(match name {
         StageName::Extract => StageBySource::extract(Box::new(ExtractStage::of_config(config)), settings, all),
-        StageName::Pose2d => StageBySource::pose2d(Box::new(Pose2dStage::new(settings)?), settings, all),
+        StageName::Pose2d => {
+            StageBySource::pose2d(Box::new(Pose2dStage::new(settings)?.with_decisions(decisions())), settings, all)
+        }
         StageName::Segment => Box::new(
-            SegmentStage::new(&settings.segment, &settings.work.dir).with_speech(SpeechDetector::find(settings)?),
+            SegmentStage::new(&settings.segment, &settings.work.dir)
+                .with_speech(SpeechDetector::find(settings)?)
+                .with_decisions(decisions()),
         ),
-        StageName::Lift => Box::new(LiftStage::new(&settings.lift, &settings.segment, &settings.work.dir)?),
+        StageName::Lift => {
+            Box::new(LiftStage::new(&settings.lift, &settings.segment, &settings.work.dir)?.with_decisions(decisions()))
+        }
         StageName::Transcribe => Box::new(TranscribeStage::new(settings, SpeechDetector::find(settings)?)?),
         StageName::Dataset => {
             let inputs = DatasetInputs {

@@ -1,7 +1,5 @@
 //! Files of the page by path below the token, with their content types.
 
-use orator_web::reply::text_reply;
-
 const SCRIPT: &str = "text/javascript; charset=utf-8";
 const PAGE: &str = "text/html; charset=utf-8";
 

@@ -1,13 +1,15 @@
 //! Project of a viewer: its videos with their ledgers, and the state of every stage.
 
 use crate::video::VideoView;
-use anyhow::Result;
+use anyhow::{Context, Result, ensure};
 use orator_base::stage::Unit;
 use orator_base::stage::artifacts::StageName;
 use orator_base::stage::rejection::Rejection;
 use orator_dataset::config::Config;
+use orator_dataset::decisions::{self, Decision, DecisionAction};
 use orator_pipeline::{Pipeline, UnitState};
 use orator_report::videos::gather::VideoSummary;
+use serde::Deserialize;
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -64,7 +66,7 @@ impl Project {
                     "id": id(unit), "speaker": unit.speaker, "name": unit.video, "file": video.file, "state": state,
                     "message": video.notes.join(" "), "duration_secs": video.ledger.duration_secs,
                     "accepted_secs": video.ledger.accepted_secs().abs(), "rejected_secs": rejected_secs,
-                    "n_decisions": 0,
+                    "n_decisions": of_speaker.decisions.iter().filter(|one| one.video == unit.video).count(),
                 }));
             }
         }
@@ -79,10 +81,34 @@ impl Project {
         for mut of_speaker in self.pipeline.videos(&[])?.into_iter().filter(|of| of.speaker == speaker) {
             if let Some(unit) = of_speaker.units.iter().find(|unit| unit.video == name) {
                 let transcripts: Vec<PathBuf> = of_speaker.transcripts.remove(name).unwrap_or_default();
-                return Ok(Some(VideoView::new(unit.clone(), &self.config().settings, transcripts)));
+                let decisions = of_speaker.decisions.iter().filter(|one| one.video == name).cloned().collect();
+                return Ok(Some(VideoView::new(unit.clone(), &self.config().settings, transcripts, decisions)));
             }
         }
         Ok(None)
+    }
+
+    /// Stores a decision by `author` and returns its identifier.
+    ///
+    /// # Errors
+    /// An invalid decision, one about an unknown video, or a file that cannot be written.
+    pub fn decide(&self, request: DecisionRequest, author: &str) -> Result<Value> {
+        let DecisionRequest { video, action, start_secs, end_secs, x, y, text } = request;
+        let (speaker, name) = video.split_once('/').context("`video` is not SPEAKER/NAME")?;
+        ensure!(self.video(speaker, name)?.is_some(), "the project has no video {video}");
+        let (id, time) = (String::new(), String::new());
+        let (speaker, video, author) = (speaker.to_owned(), name.to_owned(), author.to_owned());
+        let decision = Decision { id, speaker, video, action, start_secs, end_secs, x, y, text, author, time };
+        Ok(json!({ "id": decisions::add(&self.config().file, &decision)?.id }))
+    }
+
+    /// Removes the decision `id`.
+    ///
+    /// # Errors
+    /// There is no such decision, or the file cannot be written.
+    pub fn undo(&self, id: &str) -> Result<Value> {
+        decisions::remove(&self.config().file, id)?;
+        Ok(json!({ "removed": true }))
     }
 
     /// Number of videos by state at every stage, and the failures.
@@ -108,6 +134,19 @@ impl Project {
         let failures = failures.map(|unit| json!({ "video": unit.unit, "stage": unit.stage, "message": unit.reason }));
         Ok(json!({ "stages": stages, "failures": failures.collect::<Vec<_>>() }))
     }
+}
+
+/// Decision as the page sends it; `video` is `SPEAKER/NAME`.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct DecisionRequest {
+    video: String,
+    action: DecisionAction,
+    start_secs: f64,
+    end_secs: f64,
+    x: Option<f64>,
+    y: Option<f64>,
+    text: Option<String>,
 }
 
 /// Identifier of a video on the page: `SPEAKER/NAME`.

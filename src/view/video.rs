@@ -11,13 +11,14 @@ use orator_base::stage::artifacts::Artifact;
 use orator_base::stage::progress::Silent;
 use orator_base::stage::rejection::Rejection;
 use orator_base::types::interval::{Interval, Intervals};
-use orator_base::types::pose2d::{N_BODY, N_HAND};
+use orator_base::types::pose2d::{Keypoints, N_BODY, N_HAND};
 use orator_base::types::pose3d::Motion;
 use orator_base::types::posture::Posture;
 use orator_base::types::sound::SAMPLE_RATE;
 use orator_dataset::config::Settings;
+use orator_dataset::decisions::{self, Decision, DecisionAction};
 use orator_formats::media_json::MediaInfo;
-use orator_formats::{joints_npz, keypoints_npz, wav};
+use orator_formats::{joints_npz, wav};
 use orator_gesture::phases::{GesturePhase, HANDS, WristTrack, find_phases};
 use orator_report::videos::gather::VideoSummary;
 use serde_json::{Value, json};
@@ -41,12 +42,13 @@ pub struct VideoView {
     work: PathBuf,
     summary: VideoSummary,
     transcripts: Vec<PathBuf>,
+    decisions: Vec<Decision>,
 }
 
 impl VideoView {
-    pub fn new(unit: Unit, settings: &Settings, transcripts: Vec<PathBuf>) -> Self {
+    pub fn new(unit: Unit, settings: &Settings, transcripts: Vec<PathBuf>, decisions: Vec<Decision>) -> Self {
         let summary = VideoSummary::read(settings, &unit);
-        Self { unit, work: settings.work.dir.clone(), summary, transcripts }
+        Self { unit, work: settings.work.dir.clone(), summary, transcripts, decisions }
     }
 
     fn path(&self, artifact: Artifact) -> PathBuf {
@@ -68,7 +70,8 @@ impl VideoView {
         });
         let failed = ledger.failed.iter();
         let failed = failed.map(|failed| json!([failed.start_secs, failed.end_secs, "failed", failed.error]));
-        let words = self.summary.video_words(&self.work, &self.transcripts);
+        let of = |action| decisions::of_unit(&self.decisions, &self.unit, &[action]);
+        let words = self.summary.video_words(&self.work, &self.transcripts, &of(DecisionAction::Word));
         let words = words.map(|words| words.within(0.0, ledger.duration_secs)).unwrap_or_default();
         let motion = self.motion().ok();
         json!({
@@ -83,7 +86,7 @@ impl VideoView {
             "strokes": motion.as_ref().map(strokes).unwrap_or_default(),
             "has_motion": motion.is_some(),
             "edges": lines(), "n_keypoints": N_BODY + 2 * N_HAND,
-            "decisions": [],
+            "decisions": self.decisions,
         })
     }
 
@@ -123,7 +126,7 @@ impl VideoView {
     /// There are no keypoints yet, or too many frames are requested.
     pub fn keypoints(&self, start: usize, n: usize) -> Result<Vec<u8>> {
         ensure!(n <= MAX_FRAMES, "{n} frames requested, at most {MAX_FRAMES} are sent at once");
-        let keypoints = keypoints_npz::read(&self.path(Artifact::Keypoints))?;
+        let keypoints = self.corrected_keypoints()?;
         let media = MediaInfo::read(&self.path(Artifact::MediaInfo))?;
         let last_x = media.image_size[0] as f32 - 1.0;
         let end = start.saturating_add(n).min(keypoints.n_frames());
@@ -140,13 +143,19 @@ impl VideoView {
         Ok(bytes)
     }
 
+    /// Keypoints with the hands exchanged where a decision says so.
+    fn corrected_keypoints(&self) -> Result<Keypoints> {
+        let swaps = decisions::of_unit(&self.decisions, &self.unit, &[DecisionAction::SwapHands]);
+        decisions::read_keypoints(&self.path(Artifact::Keypoints), &swaps)
+    }
+
     /// Avatar with the motion from `start_secs` to `end_secs` as GLB.
     ///
     /// # Errors
     /// The range is empty, longer than a minute or beyond the video; the video is not lifted; no arm is visible.
     pub fn avatar(&self, start_secs: f64, end_secs: f64) -> Result<Vec<u8>> {
         let (motion, _) = self.motion()?;
-        let keypoints = keypoints_npz::read(&self.path(Artifact::Keypoints))?;
+        let keypoints = self.corrected_keypoints()?;
         let extra = joints_npz::read_extra(&self.path(Artifact::Joints))?;
         let fps = motion.fps.per_sec();
         ensure!(

@@ -3,7 +3,7 @@
 
 use crate::assets::ASSETS;
 use crate::file::ViewedFile;
-use crate::project::Project;
+use crate::project::{DecisionRequest, Project};
 use crate::results::Results;
 use crate::training;
 use crate::video::VideoView;
@@ -12,10 +12,10 @@ use orator_web::axum::Router;
 use orator_web::axum::extract::{Path, Query, Request, State};
 use orator_web::axum::http::{StatusCode, header};
 use orator_web::axum::response::{IntoResponse, Response as HttpResponse};
-use orator_web::axum::routing::{get, post};
+use orator_web::axum::routing::{delete, get, post};
 use orator_web::files::{hex, random, serve_file};
 use orator_web::host::AllowedHosts;
-use orator_web::reply::{ApiError, json_reply};
+use orator_web::reply::{ApiError, JsonBody, json_reply, text_reply};
 use orator_web::server::secured;
 use serde::Deserialize;
 use serde_json::{Value, json};
@@ -80,6 +80,8 @@ fn router(viewer: Viewer, token: &str) -> Router {
         .route("/api/training", get(curves))
         .route("/api/pair", post(pair))
         .route("/api/checkpoints", get(checkpoints))
+        .route("/api/decisions", post(decide))
+        .route("/api/decisions/{id}", delete(undo))
         .route("/api/results", get(results).post(generate))
         .route("/api/results/{id}/video", post(film))
         .route("/results/{id}/{file}", get(result_file))
@@ -210,6 +212,23 @@ async fn pair(State(viewer): Shared, Query(query): Query<TrainingQuery>) -> Repl
         Ok(json!({ "id": id }))
     })
     .await
+}
+
+/// Author of decisions; an error if the page is read-only.
+fn author(viewer: &Viewer) -> Result<String, ApiError> {
+    let sentence = "The page is read-only: start `orator view` with --edit.";
+    viewer.request.author.clone().ok_or_else(|| ApiError::new(StatusCode::FORBIDDEN, sentence))
+}
+
+async fn decide(State(viewer): Shared, body: Result<JsonBody<DecisionRequest>, ApiError>) -> Reply {
+    let (author, JsonBody(request)) = (author(&viewer)?, body?);
+    let stored = of_project(viewer, move |project| project.decide(request, &author)).await;
+    stored.map_err(|error| error.with_status(StatusCode::BAD_REQUEST))
+}
+
+async fn undo(State(viewer): Shared, Path(id): Path<String>) -> Reply {
+    author(&viewer)?;
+    of_project(viewer, move |project| project.undo(&id)).await.map_err(|error| error.with_status(StatusCode::NOT_FOUND))
 }
 
 #[derive(Deserialize)]

@@ -66,6 +66,8 @@ rejections! {
     Bones: "bones", "bone length", "bone lengths", "a lifted bone deviates too much from its length";
     /// Number of joints that are not visible for longer than lifting interpolates.
     MissingJoints: "open", "missing joints", "joints", "joints are not visible for too long";
+    /// Length in seconds of the range that a user rejected.
+    ByHand: "rejected by hand", "by hand", "s", "a user rejected it (`decisions.toml`)";
     /// Seconds that are also in another video of the dataset.
     Duplicate: "duplicate", "duplicate", "s", "duplicate of another video";
     /// Seconds omitted between two splits of a video.
@@ -84,7 +86,7 @@ rejections! {
 
 impl Rejection {
     /// Reasons by which `segment` and `lift` judge frames.
-    pub const JUDGED: [Self; 21] = match Self::ALL.first_chunk() {
+    pub const JUDGED: [Self; 22] = match Self::ALL.first_chunk() {
         Some(judged) => *judged,
         None => panic!("fewer reasons than judged ones"),
     };
@@ -151,6 +153,7 @@ impl Rejection {
             Self::Crowd => format!("too many people in {m:.2} of the frames, {t:.2} is allowed"),
             Self::Bones => format!("a bone was lifted {m:.2} off its length in the video, {t:.2} is allowed"),
             Self::MissingJoints => format!("{m:.0} of the joints are not seen for longer than can be filled"),
+            Self::ByHand => "rejected by hand".to_owned(),
             Self::Duplicate => format!("{m:.1} s are in another video"),
             Self::SplitGap => format!("{m:.1} s are left out: two splits are at least {t:.1} s apart"),
             Self::NoSoundFile => "the sound ends here".to_owned(),

@@ -5,6 +5,7 @@
 use super::keypoints::{self, KeypointSource};
 use super::patterns::{self, ANY_CASE, SearchRoot};
 use super::{Config, SpeakerConfig, transcripts};
+use crate::decisions::Decision;
 use crate::file_name;
 use orator_base::stage::Unit;
 use orator_base::stage::artifacts::Artifact;
@@ -26,6 +27,8 @@ pub struct Videos {
     pub transcripts: BTreeMap<String, Vec<PathBuf>>,
     /// Splits named in the configuration, by the work name of the video.
     pub splits: BTreeMap<String, Split>,
+    /// Decisions of users about the videos; empty until `decisions::attach`.
+    pub decisions: Vec<Decision>,
     /// Messages about entries of the configuration that have no effect, each with advice.
     pub missing: Vec<String>,
     /// Names of the files in folders of `videos` that are not videos, without transcripts if those are configured.
@@ -102,7 +105,9 @@ fn of_speaker(speaker: &SpeakerConfig, root: &SearchRoot) -> Videos {
     given.retain(|video, _| found.contains_key(video));
     let units: Vec<Unit> = found.into_values().collect();
     let transcripts = transcripts::of_speaker(speaker, &units, root, &mut missing);
-    Videos { speaker: speaker.name.clone(), units, keypoints: given, transcripts, splits, missing, passed_over }
+    let decisions = Vec::new();
+    let speaker = speaker.name.clone();
+    Videos { speaker, units, keypoints: given, transcripts, splits, decisions, missing, passed_over }
 }
 
 /// Names of the files of a folder that are not videos, without hidden files; empty for a file or a pattern.

@@ -16,6 +16,7 @@ use orator_base::text::{counted, length};
 use orator_base::types::time::FrameRate;
 use orator_dataset::config::videos::Videos;
 use orator_dataset::config::{self, Settings};
+use orator_dataset::decisions::{self, Decision};
 use orator_dataset::info::{About, ModelUsed};
 use orator_dataset::split::{Assignment, Split, SplitBy, SplitRule};
 use orator_dataset::write::assemble::DatasetWriter;
@@ -143,6 +144,7 @@ impl DatasetStage {
     /// Opens a video, with its words if the speaker has transcripts.
     fn open(&self, video: &Unit) -> Result<LiftedVideo> {
         let mut opened = LiftedVideo::open(&self.work, video, self.fixes_offset)?;
+        opened = opened.with_decisions(self.decisions(&video.speaker));
         if self.settings.posture {
             opened = opened.with_posture();
         }
@@ -151,6 +153,12 @@ impl DatasetStage {
             .iter()
             .any(|configured| configured.name == video.speaker && !configured.transcripts.is_empty());
         Ok(if has_words { opened.with_words(self.transcripts(video)) } else { opened })
+    }
+
+    /// Decisions of users on the videos of a speaker.
+    fn decisions(&self, speaker: &str) -> &[Decision] {
+        let videos = self.inputs.all.iter().find(|videos| videos.speaker == speaker);
+        videos.map(|videos| videos.decisions.as_slice()).unwrap_or_default()
     }
 
     /// Files that may be the transcript of a video.
@@ -185,6 +193,10 @@ impl DatasetStage {
         let kinds: BTreeSet<&String> = not_judged.iter().collect();
         let count = |kind: &str| not_judged.iter().filter(|other| *other == kind).count();
         notes.extend(kinds.into_iter().map(|kind| format!("{} made {kind}.", counted(count(kind), "video"))));
+        let decided: Vec<&Decision> = self.decisions(&speaker.speaker).iter().collect();
+        if !decided.is_empty() {
+            notes.push(format!("Decided by hand: {}.", decisions::counts(&decided)));
+        }
         About { models, licence, consent, source, notes, ..About::new(&speaker.speaker, first.intervals.fps) }
     }
 }
@@ -242,6 +254,7 @@ impl Stage for DatasetStage {
         if let (true, Some(settings)) = (configured.same_person, settings.as_object_mut()) {
             settings.insert("same_person".to_owned(), true.into());
         }
+        decisions::record(&self.decisions(&unit.speaker).iter().collect::<Vec<_>>(), &mut settings);
         settings
     }
 

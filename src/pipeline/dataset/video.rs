@@ -18,10 +18,11 @@ use orator_base::types::skeleton::{L_HAND, N_HAND_JOINTS, R_HAND};
 use orator_base::types::sound::{SAMPLE_RATE, Sound, SoundOffset, samples_of};
 use orator_dataset::bones::VideoBones;
 use orator_dataset::config::videos::slug;
+use orator_dataset::decisions::{self, Decision, DecisionAction};
 use orator_dataset::sample::Sample;
 use orator_dataset::words::{self, VideoWords};
 use orator_formats::media_json::MediaInfo;
-use orator_formats::{joints_npz, keypoints_npz, sound_offset_json};
+use orator_formats::{joints_npz, sound_offset_json};
 use std::fs::File;
 use std::io::BufReader;
 use std::path::{Path, PathBuf};
@@ -51,6 +52,8 @@ pub struct LiftedVideo {
     pub words: Option<VideoWords>,
     /// Whether samples contain the angles of head and trunk.
     has_posture: bool,
+    /// Decisions of users on hands and words.
+    decisions: Vec<Decision>,
 }
 
 /// Version of the estimator of head and trunk angles, for fingerprints.
@@ -135,7 +138,21 @@ impl LiftedVideo {
             intervals,
             words: None,
             has_posture: false,
+            decisions: Vec::new(),
         })
+    }
+
+    /// Applies the decisions of users among `all` on the hands, and on the words of a later `with_words`.
+    pub fn with_decisions(mut self, all: &[Decision]) -> Self {
+        let applied = decisions::of_unit(all, &self.unit, &[DecisionAction::SwapHands, DecisionAction::Word]);
+        if !applied.is_empty() {
+            let mut inputs = serde_json::json!({});
+            decisions::record(&applied, &mut inputs);
+            let inputs = format!("{} {inputs}\n", self.files_hash);
+            self.files_hash = blake3::hash(inputs.as_bytes()).to_hex().to_string();
+        }
+        self.decisions = applied.into_iter().cloned().collect();
+        self
     }
 
     /// Adds the words of the first usable one of the files `transcripts`; may be empty.
@@ -154,7 +171,8 @@ impl LiftedVideo {
             blake3::hash(format!("{} words {files}{moved}\n", self.files_hash).as_bytes()).to_hex().to_string();
         let end_secs = first + n_samples / rate;
         let choice = words::choose(transcripts, &self.unit.speaker, end_secs);
-        self.words = Some(VideoWords::of(choice, transcripts, end_secs, first + self.shift as f64 / rate));
+        let words = VideoWords::of(choice, transcripts, end_secs, first + self.shift as f64 / rate);
+        self.words = Some(words.corrected(&self.decisions.iter().collect::<Vec<_>>()));
         self
     }
 
@@ -193,7 +211,8 @@ impl LiftedVideo {
         if intervals.is_empty() {
             return Ok(None);
         }
-        let keypoints = keypoints_npz::read(&self.keypoints)?;
+        let swaps = decisions::of_unit(&self.decisions, &self.unit, &[DecisionAction::SwapHands]);
+        let keypoints = decisions::read_keypoints(&self.keypoints, &swaps)?;
         let motion = joints_npz::read(&self.joints)?;
         let n_frames = self.intervals.n_frames;
         for (n, path) in [(keypoints.n_frames(), &self.keypoints), (motion.n_frames(), &self.joints)] {

@@ -15,8 +15,9 @@ use orator_base::text::{counted, length};
 use orator_base::types::interval::{Interval, Intervals};
 use orator_base::types::pose2d::Keypoints;
 use orator_dataset::config;
+use orator_dataset::decisions::{self, Decision, DecisionAction};
 use orator_formats::timeline_npz::Timeline;
-use orator_formats::{joints_npz, keypoints_npz, npz};
+use orator_formats::{joints_npz, npz};
 use serde_json::json;
 use std::path::{Path, PathBuf};
 
@@ -28,6 +29,8 @@ pub struct LiftStage {
     work: PathBuf,
     /// Hashes of the built-in body and hand weights; `file` if weights come from a file, which is an input.
     weights: [String; 2],
+    /// Decisions of users on any videos.
+    decisions: Vec<Decision>,
 }
 
 impl LiftStage {
@@ -43,7 +46,16 @@ impl LiftStage {
             if is_builtin { blake3::hash(builtin).to_hex().to_string() } else { "file".to_owned() }
         };
         let weights = [hash(&settings.body_weights, weights::BODY), hash(&settings.hand_weights, weights::HANDS)];
-        Ok(Self { lifter, settings: settings.clone(), rules: rules.clone(), work: work.to_owned(), weights })
+        let (settings, rules, work) = (settings.clone(), rules.clone(), work.to_owned());
+        Ok(Self { lifter, settings, rules, work, weights, decisions: Vec::new() })
+    }
+
+    pub fn with_decisions(self, decisions: Vec<Decision>) -> Self {
+        Self { decisions, ..self }
+    }
+
+    fn swaps(&self, unit: &Unit) -> Vec<&Decision> {
+        decisions::of_unit(&self.decisions, unit, &[DecisionAction::SwapHands])
     }
 
     fn file(&self, file: Artifact, unit: &Unit) -> PathBuf {
@@ -60,8 +72,8 @@ impl Stage for LiftStage {
         11
     }
 
-    fn settings(&self, _unit: &Unit) -> serde_json::Value {
-        json!({
+    fn settings(&self, unit: &Unit) -> serde_json::Value {
+        let mut settings = json!({
             "lift": {
                 "body_weights": self.weights[0],
                 "hand_weights": self.weights[1],
@@ -74,7 +86,9 @@ impl Stage for LiftStage {
                 "min_frames": self.rules.min_frames,
                 "max_body_gap_secs": self.rules.max_body_gap_secs,
             },
-        })
+        });
+        decisions::record(&self.swaps(unit), &mut settings);
+        settings
     }
 
     fn inputs(&self, unit: &Unit) -> Result<Vec<Input>> {
@@ -138,7 +152,7 @@ impl Stage for LiftStage {
 impl LiftStage {
     /// Keypoints of the video, without the points of repeated frames, and its timeline.
     fn keypoints(&self, unit: &Unit) -> Result<(Keypoints, Timeline)> {
-        let mut keypoints = keypoints_npz::read(&self.file(Artifact::Keypoints, unit))?;
+        let mut keypoints = decisions::read_keypoints(&self.file(Artifact::Keypoints, unit), &self.swaps(unit))?;
         let path = self.file(Artifact::Timeline, unit);
         let timeline = Timeline::read(&path)?;
         ensure!(

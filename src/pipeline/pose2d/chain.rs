@@ -79,6 +79,12 @@ impl Chain {
         self.n_frames = 0;
     }
 
+    /// Follows the person whom a user chose, at pixel `point` of the next picture; `None` ends that.
+    pub fn follow(&mut self, point: Option<[f32; 2]>) {
+        self.speaker.follow(point);
+        self.reset_details();
+    }
+
     /// Face landmarks of the last frame, if a face was detected.
     pub fn face_points(&self) -> Option<&[FacePoint]> {
         self.face_track.points()

@@ -3,6 +3,7 @@
 
 use super::appearance::BodyColours;
 use super::body::BodyModel;
+use super::chosen_person::ChosenPath;
 use super::decode::{ScoredPoint, boxes};
 use super::detector::Detector;
 use super::liveness::LivenessTracks;
@@ -70,6 +71,8 @@ pub struct SpeakerTracker {
     /// Path of the active speaker in this shot, if known; `idx` is the current frame of the shot.
     talker: Option<TalkerPath>,
     idx: usize,
+    /// Path of the person whom a user chose.
+    chosen: Option<ChosenPath>,
 }
 
 impl SpeakerTracker {
@@ -94,12 +97,20 @@ impl SpeakerTracker {
 
     /// Ends the track. `talker` is the path of the person to follow next, if known.
     pub fn reset(&mut self, talker: Option<TalkerPath>) {
-        self.talker = talker;
+        (self.talker, self.chosen) = (talker, None);
         self.before = self.last();
         self.colours = None;
         self.track.reset();
         self.tracks = LivenessTracks::default();
         (self.n_deviating, self.several) = (0, false);
+    }
+
+    /// Follows the person at pixel `point` of the next picture; `None`: chooses a person again, if one was given before.
+    pub fn follow(&mut self, point: Option<[f32; 2]>) {
+        if self.chosen.is_some() && point.is_none() {
+            self.track.reset();
+        }
+        self.chosen = point.map(ChosenPath::new);
     }
 
     /// Runs the detector in frame `idx` of a shot, if it is due.
@@ -114,12 +125,20 @@ impl SpeakerTracker {
         self.idx = idx;
         let every = settings.person_every.max(1);
         let regular = idx.is_multiple_of(every);
-        if !regular && !is_detection_frame(idx, every, self.track.n_persons > 1) && self.track.bbox.is_some() {
+        let is_awaited = self.chosen.as_ref().is_some_and(|chosen| !chosen.is_found());
+        if !regular
+            && !is_awaited
+            && !is_detection_frame(idx, every, self.track.n_persons > 1)
+            && self.track.bbox.is_some()
+        {
             return Ok(());
         }
         let Some(mut found) = self.find(image)? else { return Ok(()) };
         if let Some(reference) = self.reference.as_ref().filter(|_| found.len() > 1) {
             measure(&mut found, reference, image, body, settings.joint_score)?;
+        }
+        if is_awaited && self.chosen.as_ref().is_some_and(ChosenPath::is_found) {
+            self.track.reset();
         }
         let follow = regular.then_some(settings.box_smoothing);
         let was = self.track.identity();
@@ -193,7 +212,10 @@ impl SpeakerTracker {
         };
         let found = detector.find(image)?;
         let movements = self.tracks.update(image, &found);
-        let talker = self.talker.as_ref().and_then(|path| path.find(self.idx, found.iter().copied()));
+        let talker = match &mut self.chosen {
+            Some(chosen) => chosen.find(self.idx, &found),
+            None => self.talker.as_ref().and_then(|path| path.find(self.idx, found.iter().copied())),
+        };
         let candidate = |(at, (person, movement))| {
             let speaks = talker == Some(at);
             Candidate { person, movement, appearance_distance: None, speaks }

@@ -1,6 +1,7 @@
 //! Stage `pose2d`: processes the spans of a video independently and joins them into `keypoints.npz` and the portrait.
 
 use super::chain::Chain;
+use super::chosen_person::ChosenPerson;
 use super::models::{self, ChosenModels, check_follow};
 use super::span::video_frames::VideoFrames;
 use super::span::{PoseSpan, pass};
@@ -13,6 +14,7 @@ use orator_base::types::device::DeviceChoice;
 use orator_base::types::time::FrameRate;
 use orator_dataset::config;
 use orator_dataset::config::{FollowRule, Settings, to_stored};
+use orator_dataset::decisions::{self, Decision, DecisionAction};
 use orator_formats::media_json::MediaInfo;
 use orator_formats::timeline_npz::Timeline;
 use orator_media::ffmpeg;
@@ -35,6 +37,8 @@ pub struct Pose2dStage {
     /// Version of ONNX Runtime, or `missing`.
     onnxruntime: String,
     on_gpu: bool,
+    /// Decisions of users on any videos.
+    decisions: Vec<Decision>,
 }
 
 impl Pose2dStage {
@@ -55,7 +59,16 @@ impl Pose2dStage {
         };
         let onnxruntime = runtime.map_or_else(|_| "missing".to_owned(), |runtime| runtime.version());
         let (fps, work) = (settings.extract.rate(), settings.work.dir.clone());
-        Ok(Self { chosen, models, fps, work, references, onnxruntime, on_gpu })
+        Ok(Self { chosen, models, fps, work, references, onnxruntime, on_gpu, decisions: Vec::new() })
+    }
+
+    pub fn with_decisions(self, decisions: Vec<Decision>) -> Self {
+        Self { decisions, ..self }
+    }
+
+    /// Decisions on whom to follow in a video.
+    fn choices(&self, unit: &Unit) -> Vec<&Decision> {
+        decisions::of_unit(&self.decisions, unit, &[DecisionAction::Speaker])
     }
 
     fn runtime(&self) -> Result<Runtime> {
@@ -76,7 +89,7 @@ impl Stage for Pose2dStage {
         40
     }
 
-    fn settings(&self, _unit: &Unit) -> Value {
+    fn settings(&self, unit: &Unit) -> Value {
         let read = |entry: &ModelEntry| {
             json!({
                 "id": entry.id, "picture": entry.picture, "fit": entry.fit,
@@ -107,6 +120,7 @@ impl Stage for Pose2dStage {
         if self.on_gpu {
             settings["provider"] = json!("cuda");
         }
+        decisions::record(&self.choices(unit), &mut settings);
         settings
     }
 
@@ -188,7 +202,12 @@ impl Pose2dStage {
             let search = TalkerSearch::new(&self.runtime()?, &self.chosen.store, &self.chosen.settings)?;
             pass::talkers(&video, &Artifact::Sound.path(&self.work, unit), search, &*task)
         });
-        pass::estimate_poses(&video, self.chain(unit)?, talkers.transpose()?.as_deref(), progress, &*task)
+        let choice = |choice: &Decision| -> Option<ChosenPerson> {
+            Some((choice.frames(self.fps, timeline.n_frames()), [choice.x? as f32, choice.y? as f32]))
+        };
+        let chosen: Vec<_> = self.choices(unit).into_iter().filter_map(choice).collect();
+        let talkers = talkers.transpose()?;
+        pass::estimate_poses(&video, self.chain(unit)?, talkers.as_deref(), &chosen, progress, &*task)
     }
 
     /// Opens the models and sets the reference picture of the speaker.

@@ -3,6 +3,7 @@
 use super::failure::SentFailure;
 use anyhow::{Context, Result, ensure};
 use orator_dataset::config::{KeypointSource, Settings};
+use orator_dataset::decisions::Decision;
 use orator_media::sandbox::Restriction;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
@@ -54,6 +55,8 @@ pub struct UnitRequest {
     pub config_file: PathBuf,
     /// Set if the unit consists of keypoints of another program.
     pub keypoints: Option<KeypointSource>,
+    /// Decisions of users on the unit.
+    pub decisions: Vec<Decision>,
     /// Files and folders that the stage may read.
     pub reads: Vec<OsString>,
     /// Empty output folder.

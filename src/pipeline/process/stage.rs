@@ -96,6 +96,8 @@ impl SubprocessStage<'_> {
     fn request(&self, unit: &Unit, part: Option<usize>, out: &Path, memory: u64) -> Result<UnitRequest> {
         let mut settings = self.config.settings.clone();
         settings.speaker.retain(|speaker| speaker.name == unit.speaker);
+        let decisions = self.videos.iter().flat_map(|videos| &videos.decisions);
+        let decisions = decisions.filter(|one| one.speaker == unit.speaker && one.video == unit.video);
         let mut reads: Vec<_> = self.stage.inputs(unit)?.into_iter().map(|input| input.path.into()).collect();
         reads.push(settings.models.dir.as_os_str().to_owned());
         // The sandboxed process cannot list the folders of the library search, so the library is found here.
@@ -112,6 +114,7 @@ impl SubprocessStage<'_> {
             settings,
             config_file: self.config.file.clone(),
             keypoints: self.keypoints(unit).cloned(),
+            decisions: decisions.cloned().collect(),
             reads,
             out: out.into(),
             memory,

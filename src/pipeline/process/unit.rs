@@ -86,16 +86,16 @@ pub fn parent_inference() -> Option<Inference> {
 
 static PARENT: OnceLock<Inference> = OnceLock::new();
 
-fn work(request: UnitRequest, out: &Messages) -> Result<Report> {
-    let UnitRequest { stage, speaker, video, source, part, settings, config_file, keypoints, out: folder, .. } =
+fn work(request: UnitRequest, messages: &Messages) -> Result<Report> {
+    let UnitRequest { stage, speaker, video, source, part, settings, config_file, keypoints, decisions, out, .. } =
         request;
     let unit = Unit { speaker: speaker.clone(), video: video.clone(), source: source.into() };
     let keypoints = keypoints.map(|source| (video, source)).into_iter().collect();
-    let videos = Videos { speaker, units: vec![unit.clone()], keypoints, ..Videos::default() };
+    let videos = Videos { speaker, units: vec![unit.clone()], keypoints, decisions, ..Videos::default() };
     let config = Config { settings, file: config_file, notes: Vec::new() };
     let stage = stages::build(stage.parse()?, &config, &[videos], &[])?;
-    let progress = SentProgress { out, next: AtomicU32::new(0) };
-    let folder = PathBuf::from(folder);
+    let progress = SentProgress { out: messages, next: AtomicU32::new(0) };
+    let folder = PathBuf::from(out);
     match part {
         Some(part) => stage.run_part(&unit, part, &folder, &progress).map(|()| Report::default()),
         None => stage.run(&unit, &folder, &progress),

@@ -1,6 +1,7 @@
-//! Decision: turns the measures of a video into intervals and a ledger, by the rules of `table`. A frame is rejected
-//! by the first rule that fails for longer than its gap allows. The rest is split at shot boundaries and identity
-//! changes; pieces that are too short or violate a rule on segments are rejected as a whole.
+//! Turns the measures of a video into intervals and a ledger, by the rules of `table`. A frame is rejected by the first
+//! rule that fails for longer than its gap allows, unless a user decided otherwise. The rest is split at
+//! shot boundaries and identity changes; pieces that are too short or violate a rule on segments are rejected as a
+//! whole.
 
 use super::measure::Measures;
 use super::table::{FrameRule, Gap, frame_rules, segment_rules};
@@ -9,9 +10,27 @@ use orator_base::stage::rejection::{FrameRejection, Rejection};
 use orator_base::types::interval::{Interval, Intervals};
 use orator_base::types::time::FrameRate;
 use orator_dataset::config;
+use orator_dataset::decisions::{Decision, DecisionAction};
 use orator_formats::media_json::MediaInfo;
 
-pub fn judge(measures: &Measures, video: &MediaInfo, rules: &config::SegmentConfig) -> (Intervals, Ledger) {
+/// Decision of a user about a frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum ByHand<'a> {
+    Accepted,
+    /// Rejected by `author`, in a range of `secs` seconds.
+    Rejected {
+        author: &'a str,
+        secs: f64,
+    },
+}
+
+/// Judges a video. `decisions` are those of users on this video; actions other than accept and reject are ignored.
+pub fn judge(
+    measures: &Measures,
+    video: &MediaInfo,
+    rules: &config::SegmentConfig,
+    decisions: &[&Decision],
+) -> (Intervals, Ledger) {
     let n_frames = measures.n_frames();
     let begins_shot = |t: usize| {
         let score = f64::from(measures.shot_score[t]);
@@ -19,7 +38,7 @@ pub fn judge(measures: &Measures, video: &MediaInfo, rules: &config::SegmentConf
     };
     let begins_shot: Vec<bool> = (0..n_frames).map(begins_shot).collect();
     let rests: Vec<bool> = measures.rest.iter().map(|&rest| f64::from(rest) < rules.max_rest_move).collect();
-    let mut rejections = vec![None; n_frames];
+    let (mut rejections, mut no_person) = (vec![None; n_frames], vec![None; n_frames]);
     for rule in frame_rules(rules) {
         let holds = |t: usize| {
             rule.bound.holds(f64::from((rule.values)(measures)[t]))
@@ -27,13 +46,41 @@ pub fn judge(measures: &Measures, video: &MediaInfo, rules: &config::SegmentConf
                 || (rule.allows_rest && rests[t])
         };
         apply(&rule, holds, &mut rejections, measures, &begins_shot, video.fps);
+        if rule.rejection == Rejection::NoPerson {
+            apply(&rule, holds, &mut no_person, measures, &begins_shot, video.fps);
+        }
     }
-    let pieces = pieces(&rejections, measures, &begins_shot, video.fps, rules);
+    let decided = by_hand(decisions, n_frames, video.fps);
+    for (rejected, (decided, no_person)) in rejections.iter_mut().zip(decided.iter().zip(no_person)) {
+        *rejected = match decided {
+            None => *rejected,
+            // Without a person there is nothing to accept.
+            Some(ByHand::Accepted) => no_person,
+            Some(ByHand::Rejected { secs, .. }) => Some(FrameRejection::new(Rejection::ByHand, *secs, 0.0)),
+        };
+    }
+    let pieces = pieces(&rejections, &decided, measures, &begins_shot, video.fps, rules);
     let intervals = pieces.iter().filter(|(_, rejected)| rejected.is_none()).map(|(interval, _)| *interval).collect();
     let resting = runs(n_frames, |t| rests[t], |_| false);
     let intervals = Intervals::new(video.fps, n_frames, intervals).with_resting(&resting);
-    let ledger = ledger(&pieces, n_frames, video).with_resting(intervals.resting_intervals());
+    let ledger = ledger(&pieces, &decided, n_frames, video).with_resting(intervals.resting_intervals());
     (intervals, ledger)
+}
+
+/// Decision about each of `n_frames` frames; the last one of several counts.
+fn by_hand<'a>(decisions: &[&'a Decision], n_frames: usize, fps: FrameRate) -> Vec<Option<ByHand<'a>>> {
+    let mut decided = vec![None; n_frames];
+    for decision in decisions {
+        let effect = match decision.action {
+            DecisionAction::Accept => ByHand::Accepted,
+            DecisionAction::Reject => {
+                ByHand::Rejected { author: &decision.author, secs: decision.end_secs - decision.start_secs }
+            }
+            _ => continue,
+        };
+        decided[decision.frames(fps, n_frames)].fill(Some(effect));
+    }
+    decided
 }
 
 /// Rejects the frames of runs in which `rule` fails for too long, unless an earlier rule has rejected them.
@@ -69,6 +116,7 @@ fn apply(
 /// Consecutive pieces covering all frames, accepted (`None`) or rejected.
 fn pieces(
     rejections: &[Option<FrameRejection>],
+    decided: &[Option<ByHand>],
     measures: &Measures,
     begins_shot: &[bool],
     fps: FrameRate,
@@ -76,17 +124,26 @@ fn pieces(
 ) -> Vec<(Interval, Option<FrameRejection>)> {
     let reason = |t: usize| rejections[t].map(|rejected| rejected.rejection);
     let begins = |t: usize| begins_shot[t] || measures.identity[t] > 0.0;
-    let divides = |t: usize| reason(t) != reason(t - 1) || (reason(t).is_none() && begins(t));
-    let judged = runs(rejections.len(), |_| true, divides).into_iter().map(|piece| {
+    let divides = |t: usize| {
+        let is_other_decision = || reason(t) == Some(Rejection::ByHand) && decided[t] != decided[t - 1];
+        reason(t) != reason(t - 1) || (reason(t).is_none() && begins(t)) || is_other_decision()
+    };
+    let judged = runs(rejections.len(), |_| true, divides).into_iter().flat_map(|piece| {
         let rejected = match rejections[piece.start] {
             Some(rejected) => {
                 let measured = FrameRejection::mean_measured(&rejections[piece.start..piece.end]);
-                Some(FrameRejection { measured, ..rejected })
+                return vec![(piece, Some(FrameRejection { measured, ..rejected }))];
             }
             None => too_short(piece, measures, begins_shot, fps, rules)
                 .or_else(|| violated_segment_rule(piece, measures, rules)),
         };
-        (piece, rejected)
+        if rejected.is_none() {
+            return vec![(piece, None)];
+        }
+        // Of a piece that is rejected as a whole, the frames remain that a user accepted.
+        let is_accepted = |t: usize| decided[t] == Some(ByHand::Accepted);
+        let parts = runs(piece.end, |t| t >= piece.start, |t| is_accepted(t) != is_accepted(t - 1));
+        parts.into_iter().map(|part| (part, rejected.filter(|_| !is_accepted(part.start)))).collect()
     });
     judged.collect()
 }
@@ -132,7 +189,12 @@ fn violated_segment_rule(
 }
 
 /// Converts pieces to seconds. The last one ends with the video, so that a partial last frame is counted.
-fn ledger(pieces: &[(Interval, Option<FrameRejection>)], n_frames: usize, video: &MediaInfo) -> Ledger {
+fn ledger(
+    pieces: &[(Interval, Option<FrameRejection>)],
+    decided: &[Option<ByHand>],
+    n_frames: usize,
+    video: &MediaInfo,
+) -> Ledger {
     let mut ledger = Ledger { duration_secs: video.duration_secs, ..Ledger::default() };
     let no_frames = [(Interval { start: 0, end: 0 }, Some(FrameRejection::new(Rejection::NoPerson, 0.0, 0.0)))];
     let pieces = if pieces.is_empty() { &no_frames[..] } else { pieces };
@@ -148,7 +210,13 @@ fn ledger(pieces: &[(Interval, Option<FrameRejection>)], n_frames: usize, video:
         }
         match *rejected {
             None => ledger.accepted.push(AcceptedInterval { start_secs, end_secs }),
-            Some(why) => ledger.rejected.push(RejectedInterval::new(start_secs, end_secs, why)),
+            Some(why) => ledger.rejected.push(match decided.get(piece.start) {
+                Some(Some(ByHand::Rejected { author, .. })) if !author.is_empty() => {
+                    let message = format!("{} ({author})", why.rejection.message(why.measured, why.threshold));
+                    RejectedInterval::with_message(start_secs, end_secs, why, message)
+                }
+                _ => RejectedInterval::new(start_secs, end_secs, why),
+            }),
         }
     }
     ledger

@@ -1,5 +1,6 @@
 //! Stage 3: keypoints to accepted intervals. `measure` and `rest` compute per-frame measures from the outputs of earlier
-//! stages (`store` saves them), `table` defines the rules, `judge` applies them, `stage` reads and writes the files.
+//! stages (`store` saves them), `table` defines the rules, `judge` applies them and decisions of users, `stage` reads and
+//! writes the files.
 
 pub mod judge;
 pub mod measure;

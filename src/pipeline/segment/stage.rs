@@ -14,6 +14,7 @@ use orator_base::text::{counted, length};
 use orator_base::types::interval::Intervals;
 use orator_base::types::sound::SoundOffset;
 use orator_dataset::config;
+use orator_dataset::decisions::{self, Decision, DecisionAction};
 use orator_formats::keypoints_npz;
 use orator_formats::media_json::MediaInfo;
 use orator_formats::timeline_npz::Timeline;
@@ -26,16 +27,25 @@ pub struct SegmentStage {
     work: PathBuf,
     /// Speech detector; `None`: speech is detected by loudness only.
     speech: Option<SpeechDetector>,
+    /// Decisions of users on any videos.
+    decisions: Vec<Decision>,
 }
+
+/// Decisions that this stage applies.
+const APPLIED: [DecisionAction; 3] = [DecisionAction::Accept, DecisionAction::Reject, DecisionAction::SwapHands];
 
 impl SegmentStage {
     /// Creates the stage with `rules`; earlier stages' files are read under `work`.
     pub fn new(rules: &config::SegmentConfig, work: &Path) -> Self {
-        Self { rules: rules.clone(), work: work.to_owned(), speech: None }
+        Self { rules: rules.clone(), work: work.to_owned(), speech: None, decisions: Vec::new() }
     }
 
     pub fn with_speech(self, speech: Option<SpeechDetector>) -> Self {
         Self { speech, ..self }
+    }
+
+    pub fn with_decisions(self, decisions: Vec<Decision>) -> Self {
+        Self { decisions, ..self }
     }
 
     fn file(&self, file: Artifact, unit: &Unit) -> PathBuf {
@@ -52,10 +62,12 @@ impl Stage for SegmentStage {
         9
     }
 
-    fn settings(&self, _unit: &Unit) -> serde_json::Value {
+    fn settings(&self, unit: &Unit) -> serde_json::Value {
         let model = self.speech.as_ref().map(SpeechDetector::used);
         let rules = config::to_stored(StageName::Segment.as_str(), &self.rules).unwrap_or_default();
-        serde_json::json!({ "segment": rules, "speech_model": model })
+        let mut settings = serde_json::json!({ "segment": rules, "speech_model": model });
+        decisions::record(&decisions::of_unit(&self.decisions, unit, &APPLIED), &mut settings);
+        settings
     }
 
     fn inputs(&self, unit: &Unit) -> Result<Vec<Input>> {
@@ -75,7 +87,8 @@ impl Stage for SegmentStage {
     fn run(&self, unit: &Unit, out: &Path, _progress: &dyn Progress) -> Result<Report> {
         let video = MediaInfo::read(&self.file(Artifact::MediaInfo, unit))?;
         let (measures, offset) = self.measures(unit, &video)?;
-        let (intervals, ledger) = judge(&measures, &video, &self.rules);
+        let decided = decisions::of_unit(&self.decisions, unit, &APPLIED);
+        let (intervals, ledger) = judge(&measures, &video, &self.rules, &decided);
         write_json(&Artifact::SegmentIntervals.within(out), &intervals)?;
         write_json(&Artifact::SegmentLedger.within(out), &ledger)?;
         measures.write(&Artifact::Measures.within(out))?;
@@ -88,6 +101,9 @@ impl Stage for SegmentStage {
         report.facts.insert("sound_offset".to_owned(), serde_json::to_value(offset)?);
         report.line.extend(offset.filter(SoundOffset::is_reportable).map(|offset| format!("; {offset}")));
         report.line.extend(video.not_judged().map(|note| format!("; {note}")));
+        if !decided.is_empty() {
+            let _ = write!(report.line, "; decided by hand: {}", decisions::counts(&decided));
+        }
         Ok(report)
     }
 }
@@ -95,7 +111,13 @@ impl Stage for SegmentStage {
 impl SegmentStage {
     fn measures(&self, unit: &Unit, video: &MediaInfo) -> Result<(Measures, Option<SoundOffset>)> {
         let path = self.file(Artifact::Keypoints, unit);
-        let (keypoints, extras) = (keypoints_npz::read(&path)?, keypoints_npz::read_extras(&path)?);
+        let swaps = decisions::of_unit(&self.decisions, unit, &[DecisionAction::SwapHands]);
+        let keypoints = decisions::read_keypoints(&path, &swaps)?;
+        let mut extras = keypoints_npz::read_extras(&path)?;
+        let n_known = extras.other_hand.nrows();
+        for t in decisions::swapped(&keypoints, &swaps).into_iter().flatten().filter(|t| *t < n_known) {
+            extras.other_hand.swap([t, 0], [t, 1]);
+        }
         let n_frames = video.n_frames;
         ensure!(
             keypoints.n_frames() == n_frames && extras.identity.len() == n_frames && keypoints.fps == video.fps,

@@ -18,6 +18,7 @@ use orator_base::stage::record::Failure;
 use orator_base::types::interval::Intervals;
 use orator_dataset::config::Settings;
 use orator_dataset::config::videos::Videos;
+use orator_dataset::decisions::Decision;
 use orator_dataset::words::{self, VideoWords};
 use orator_formats::media_json::MediaInfo;
 use orator_formats::npz::Npz;
@@ -67,9 +68,10 @@ pub fn gather(settings: &Settings, videos: &[Videos], n_pictures: usize, progres
         task.detail(&unit.video);
         let mut video = VideoSummary::read(settings, unit);
         let transcripts = of_speaker.transcripts.get(&unit.video).map(Vec::as_slice).unwrap_or_default();
-        video.add_words(&settings.work.dir, transcripts);
+        let decided: Vec<&Decision> = of_speaker.decisions.iter().filter(|one| one.video == unit.video).collect();
+        video.add_words(&settings.work.dir, transcripts, &decided);
         let accepted = if video.ledger.failed.is_empty() && video.ledger.duration_secs > 0.0 {
-            all.add(settings, &mut video)
+            all.add(settings, &mut video, &decided)
         } else {
             None
         };
@@ -82,7 +84,12 @@ pub fn gather(settings: &Settings, videos: &[Videos], n_pictures: usize, progres
 
 impl ReportData {
     /// Adds the measures of a video; unreadable data becomes a note. Returns its accepted seconds by threshold.
-    fn add(&mut self, settings: &Settings, video: &mut VideoSummary) -> Option<AcceptedByThreshold> {
+    fn add(
+        &mut self,
+        settings: &Settings,
+        video: &mut VideoSummary,
+        decisions: &[&Decision],
+    ) -> Option<AcceptedByThreshold> {
         let rules = &settings.segment;
         let (work, unit) = (&settings.work.dir, video.unit.clone());
         self.measures.add_intervals(&video.ledger);
@@ -124,12 +131,13 @@ impl ReportData {
             bone_change: &bone_change,
             max_bone_change,
             open: &open,
+            decisions,
         };
         let now = judged.accepted_secs(rules);
         if (now - video.ledger.accepted_secs()).abs() > 1e-6 {
             video.note(
-                "The thresholds have changed since this video was processed; the sliders start at the new values. Run \
-                 `orator run` to update it.",
+                "Thresholds or decisions have changed since this video was processed; the sliders start at the new \
+                 values. Run `orator run` to update it.",
             );
         }
         let accepted = judged.table(rules);
@@ -241,8 +249,8 @@ impl VideoSummary {
         video
     }
 
-    /// Words of the first usable one of the files `transcripts`; `None`: there is no such file.
-    pub fn video_words(&self, work: &Path, transcripts: &[PathBuf]) -> Option<VideoWords> {
+    /// Words of the first usable one of the files `transcripts`, corrected by `decisions`; `None`: there is no such file.
+    pub fn video_words(&self, work: &Path, transcripts: &[PathBuf], decisions: &[&Decision]) -> Option<VideoWords> {
         if !transcripts.iter().any(|path| path.is_file()) {
             return None;
         }
@@ -251,11 +259,11 @@ impl VideoSummary {
         let audio_secs = media.and_then(|media| media.audio_secs).unwrap_or(self.ledger.duration_secs);
         let end_secs = start_secs + audio_secs;
         let choice = words::choose(transcripts, &self.unit.speaker, end_secs);
-        Some(VideoWords::of(choice, transcripts, end_secs, start_secs))
+        Some(VideoWords::of(choice, transcripts, end_secs, start_secs).corrected(decisions))
     }
 
-    fn add_words(&mut self, work: &Path, transcripts: &[PathBuf]) {
-        let Some(words) = self.video_words(work, transcripts) else { return };
+    fn add_words(&mut self, work: &Path, transcripts: &[PathBuf], decisions: &[&Decision]) {
+        let Some(words) = self.video_words(work, transcripts, decisions) else { return };
         let accepted = self.ledger.accepted.iter().map(|accepted| (accepted.start_secs, accepted.end_secs));
         let rejected = self.ledger.rejected.iter().map(|rejected| (rejected.start_secs, rejected.end_secs));
         let spoken = |(start, end): (f64, f64)| {

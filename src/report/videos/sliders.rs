@@ -11,6 +11,7 @@ use orator_base::stage::ledger::Ledger;
 use orator_base::stage::rejection::{FrameRejection, Rejection};
 use orator_base::text::{length, with_unit};
 use orator_dataset::config::SegmentConfig;
+use orator_dataset::decisions::Decision;
 use orator_formats::media_json::MediaInfo;
 use orator_pipeline::lift::reject::{bone_rejections, exclude_frames, max_gap_frames};
 use orator_pipeline::segment::{self, Measures};
@@ -129,11 +130,13 @@ pub struct JudgedVideo<'a> {
     pub max_bone_change: f64,
     /// Refusals of the frames that the lift stage left open; empty if the video is not lifted.
     pub open: &'a [Option<FrameRejection>],
+    /// Decisions of users on the video.
+    pub decisions: &'a [&'a Decision],
 }
 
 impl JudgedVideo<'_> {
     pub fn ledger(&self, rules: &SegmentConfig) -> Ledger {
-        let (mut intervals, mut ledger) = segment::judge(self.measures, self.video, rules);
+        let (mut intervals, mut ledger) = segment::judge(self.measures, self.video, rules, self.decisions);
         let bones = bone_rejections(self.bone_change, self.max_bone_change, max_gap_frames(rules, self.video.fps));
         for rejections in [&bones[..], self.open] {
             if rejections.len() == intervals.n_frames

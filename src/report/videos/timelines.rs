@@ -153,6 +153,7 @@ const fn quantity(rejection: Rejection) -> &'static str {
         Rejection::Crowd => "share of frames with too many persons",
         Rejection::Bones => "deviation",
         Rejection::MissingJoints => "count",
+        Rejection::ByHand => "length",
         _ => "measured",
     }
 }
@@ -175,6 +176,7 @@ pub fn heading(reason: &str) -> &'static str {
 pub fn description(rejected: &RejectedInterval) -> String {
     let [measured, threshold] = [rejected.measured, rejected.threshold].map(|value| with_unit(value, &rejected.unit));
     match Rejection::find(&rejected.reason, &rejected.unit) {
+        Some(Rejection::ByHand) => rejected.message.clone(),
         Some(rejection) => {
             format!("{}: {} {measured}, threshold {threshold}", rejection.heading(), quantity(rejection))
         }

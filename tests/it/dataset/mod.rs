@@ -3,6 +3,7 @@
 pub(crate) mod audio_offset;
 pub(crate) mod dataset;
 pub(crate) mod dataset_verify;
+pub(crate) mod decisions;
 pub(crate) mod forget;
 mod genea_folders;
 pub(crate) mod import;

@@ -65,6 +65,7 @@ fn a_slider_predicts_the_accepted_seconds_of_a_run() {
         bone_change: &bone_change,
         max_bone_change,
         open: &open,
+        decisions: &[],
     };
     assert!((judged(lift.max_bone_change).accepted_secs(&rules) - now.accepted_secs()).abs() < 1e-3);
 

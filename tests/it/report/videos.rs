@@ -44,7 +44,14 @@ fn other_thresholds_change_what_is_accepted_and_open_frames_stay_refused() {
     let video = MediaInfo::new(19.99, 300, FrameRate::new(15, 1));
     let (measures, rules) = (measures(), SegmentConfig::default());
     let max_bone_change = 0.4;
-    let none = JudgedVideo { measures: &measures, video: &video, bone_change: &[], max_bone_change, open: &[] };
+    let none = JudgedVideo {
+        measures: &measures,
+        video: &video,
+        bone_change: &[],
+        max_bone_change,
+        open: &[],
+        decisions: &[],
+    };
     assert!((none.accepted_secs(&rules) - (19.99 - 1.0 / 15.0)).abs() < 1e-9);
     let why = FrameRejection::new(Rejection::MissingJoints, 3.0, 0.0);
     let rejected = vec![RejectedInterval::new(12.0, 13.0, why), RejectedInterval::new(19.0, 19.99, why)];

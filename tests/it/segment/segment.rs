@@ -31,7 +31,7 @@ fn measures(footage: &Footage) -> Measures {
 
 fn judged_measures(measures: &Measures, duration_secs: f64) -> (Intervals, Ledger) {
     let video = MediaInfo::new(duration_secs, measures.n_frames(), FPS);
-    judge(measures, &video, &config::SegmentConfig::default())
+    judge(measures, &video, &config::SegmentConfig::default(), &[])
 }
 
 fn judged(footage: &Footage) -> (Intervals, Ledger) {

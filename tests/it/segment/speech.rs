@@ -214,7 +214,7 @@ fn pauses_are_accepted_and_longer_parts_without_speech_rejected() {
         let mut measures = Measures::from_keypoints(&footage.keypoints);
         measures.speech = (0..600).map(speech).collect();
         measures.sound_db = vec![-20.0; 600];
-        judge(&measures, &MediaInfo::new(40.0, 600, FPS), &config::SegmentConfig::default())
+        judge(&measures, &MediaInfo::new(40.0, 600, FPS), &config::SegmentConfig::default(), &[])
     };
     let with_pause = |pause: usize| judged(&|t| if (300..300 + pause).contains(&t) { 0.12 } else { 0.8 });
     let (intervals, ledger) = with_pause(45);
@@ -228,7 +228,7 @@ fn pauses_are_accepted_and_longer_parts_without_speech_rejected() {
     let lower = slider.with(&config::SegmentConfig::default(), 0.1);
     let mut measures = Measures::from_keypoints(&good(600).keypoints);
     measures.speech = vec![0.12; 600];
-    let accepted = |rules| judge(&measures, &MediaInfo::new(40.0, 600, FPS), rules).1.accepted_secs();
+    let accepted = |rules| judge(&measures, &MediaInfo::new(40.0, 600, FPS), rules, &[]).1.accepted_secs();
     assert_eq!(
         (accepted(&config::SegmentConfig::default()), accepted(&lower)),
         (0.0, 40.0),

@@ -4,6 +4,7 @@
 use super::PoseSpan;
 use super::video_frames::VideoFrames;
 use crate::pose2d::Chain;
+use crate::pose2d::chosen_person::ChosenPerson;
 use crate::pose2d::talker::TalkerSearch;
 use crate::pose2d::talker::choice::ShotVoice;
 use crate::pose2d::talker::search::ShotTalker;
@@ -17,7 +18,8 @@ use std::time::Instant;
 /// Number of frames after which the estimate of the processing time is reported.
 const ESTIMATE_AFTER_FRAMES: usize = 150;
 
-/// Estimates the poses in the frames of `video`. `talkers` are the active speakers of its shots, if they were searched.
+/// Estimates the poses in the frames of `video`. `talkers` are the active speakers of its shots, if they were searched,
+/// and `chosen` the persons whom users chose; the last of several choices for a frame counts.
 ///
 /// # Errors
 /// A video that cannot be read; a model that fails.
@@ -25,6 +27,7 @@ pub fn estimate_poses(
     video: &VideoFrames,
     mut chain: Chain,
     talkers: Option<&[ShotTalker]>,
+    chosen: &[ChosenPerson],
     progress: &dyn Progress,
     task: &dyn Task,
 ) -> Result<PoseSpan> {
@@ -32,11 +35,18 @@ pub fn estimate_poses(
     let corner = video.media.active_area.map_or([0; 2], |area| [area.x, area.y]);
     let (start, n_frames) = (Instant::now(), video.timeline.n_frames());
     let mut span = PoseSpan::default();
-    let mut pose = Pose2d::default();
+    let (mut pose, mut choice) = (Pose2d::default(), None);
     span.image_size = video.each(|time, begins_shot, picture| {
         let idx = time.frame_idx;
         if begins_shot {
             chain.begin_shot(paths.next().flatten());
+        }
+        let now = chosen.iter().rposition(|(frames, _)| frames.contains(&idx));
+        if now != choice {
+            // After its first frame, the point is no longer where the person is.
+            let begun = now.map(|at| &chosen[at]).filter(|(frames, _)| frames.start == idx);
+            chain.follow(begun.map(|(_, point)| [0, 1].map(|k| point[k] - corner[k] as f32)));
+            choice = now;
         }
         if let Some(picture) = picture {
             let estimated = chain.frame(&picture).with_context(|| format!("frame {idx}"))?;
