@@ -1,12 +1,12 @@
 //! The person whom a user chose is followed through the detections of a shot.
 
+use crate::dataset::decisions::decision;
+use orator_base::stage::{Stage, Unit};
 use orator_base::types::pose2d::PersonBox;
 use orator_dataset::config::Settings;
 use orator_dataset::decisions::{Decision, DecisionAction};
-use orator_base::stage::{Stage, Unit};
 use orator_pipeline::pose2d::Pose2dStage;
 use orator_pipeline::pose2d::chosen_person::ChosenPath;
-use crate::dataset::decisions::decision;
 
 #[test]
 fn the_person_at_the_point_is_followed_while_it_moves() {
