@@ -137,7 +137,7 @@ fn only_units_with_decisions_become_stale_and_undoing_restores_every_byte() {
     }
     let stage =
         |decisions: &[Decision]| SegmentStage::new(&SegmentConfig::default(), &work).with_decisions(decisions.to_vec());
-    let decided = [accept(80..130), reject(0..10), at(DecisionAction::SwapHands, 20..40)];
+    let decided = [accept(80..130), reject(0..10), at(DecisionAction::SwapHands, 100..110)];
     let hashes = HashCache::open(&dir.path().join("hashes.json"));
     let key = |stage: &dyn Stage, unit: &Unit| Fingerprint::now(stage, unit, &hashes).unwrap();
     let bytes = |key: &Fingerprint| serde_json::to_string(key).unwrap();
