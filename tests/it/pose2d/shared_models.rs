@@ -143,6 +143,7 @@ fn a_subprocess_detects_keypoints_with_the_models_of_the_run() {
         settings,
         config_file: file,
         keypoints: None,
+        decisions: Vec::new(),
         reads,
         out: out.clone().into(),
         memory: 8 << 30,

@@ -1,6 +1,8 @@
 //! Messages to and from the processes of units.
 
+use crate::dataset::decisions::decision;
 use orator_dataset::config::{KeypointSource, Settings};
+use orator_dataset::decisions::DecisionAction;
 use orator_pipeline::process::message::{Message, Request, UnitRequest, receive, send};
 use serde_json::json;
 use std::ffi::OsString;
@@ -23,6 +25,7 @@ fn numbers_round_trip_exactly_and_names_byte_for_byte() {
         settings: settings.clone(),
         config_file: "pipeline.toml".into(),
         keypoints: Some(KeypointSource { fps: None, image_size: Some([4, 3]), sound: Err("none".into()) }),
+        decisions: vec![decision("b", DecisionAction::SwapHands, (1.0, 2.0))],
         reads: vec![source.clone()],
         out: "out".into(),
         memory: 1 << 40,
@@ -32,6 +35,7 @@ fn numbers_round_trip_exactly_and_names_byte_for_byte() {
     send(&mut pipe, &Message::Done { line: "l".into(), facts: facts.clone() }).unwrap();
     let mut pipe = pipe.as_slice();
     let Request::Unit(unit) = receive(&mut pipe).unwrap() else { panic!("another request") };
+    assert_eq!(unit.decisions, [decision("b", DecisionAction::SwapHands, (1.0, 2.0))]);
     assert_eq!((unit.settings, unit.source), (settings, source));
     let Message::Done { facts: back, .. } = receive(&mut pipe).unwrap() else { panic!("another message") };
     assert_eq!(serde_json::to_string(&back).unwrap(), serde_json::to_string(&facts).unwrap());
