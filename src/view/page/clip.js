@@ -85,7 +85,7 @@ export class Clip {
 
   #fail() {
     this.problem.hidden = false;
-    this.problem.textContent = `This browser cannot play ${this.video.file} (its video or audio codec). The pipeline reads it all the same: timeline, keypoints and avatar are shown.`;
+    this.problem.textContent = `This browser cannot play ${this.video.file}: it does not support the codec of its video or audio. Timeline, keypoints and avatar still work.`;
   }
 
   #changed() {

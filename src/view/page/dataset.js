@@ -146,8 +146,7 @@ export class DatasetView {
     this.timeline.time = secs;
     this.decisions?.follow(secs);
     const interval = this.timeline.intervalAt(secs);
-    const text = interval ? label(interval.reason) : "between intervals";
-    const sentence = interval?.reason ? `Rejected: ${text}. ${interval.message}` : `${text[0].toUpperCase()}${text.slice(1)}.`;
+    const sentence = !interval ? "Between intervals" : interval.reason === null ? "Accepted" : `Rejected: ${interval.message || label(interval.reason)}`;
     if (this.state.textContent !== sentence) this.state.textContent = sentence;
     this.state.classList.toggle("wrong", Boolean(interval?.reason));
   }

@@ -135,6 +135,7 @@ export class IntervalTable {
     this.count.textContent = `${this.#shown.length} of ${this.intervals.length} intervals`;
     this.grid.setAttribute("aria-rowcount", `${this.#shown.length + 1}`);
     this.body.style.height = `${ROW_PX * this.#shown.length}px`;
+    this.grid.style.height = `min(22rem, ${ROW_PX * (this.#shown.length + 2)}px)`;
     this.grid.scrollTop = 0;
     this.draw();
   }

@@ -254,12 +254,12 @@ export class Timeline {
     });
   }
 
-  // Strokes are full, holds half as high, and rests thin.
+  // Strokes are full, holds half as high, rests and other phases thin.
   #drawStrokes(pen) {
     for (const hand of ["left", "right"]) {
       pen.fillStyle = this.#colours[hand];
       const draw = ([, phase], x, width) => {
-        const inset = { stroke: 0, hold: 3.5, rest: 6 }[phase] ?? 0;
+        const inset = { stroke: 0, hold: 3.5, rest: 6 }[phase] ?? 5;
         this.#fillBand(pen, hand, x, width, inset, inset);
       };
       this.#parts(this.strokes[hand] ?? [], draw, ([, , start]) => start, ([, , , end]) => end);
