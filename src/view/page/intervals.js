@@ -2,13 +2,10 @@
 
 import { clock, el, labelled, options } from "./dom.js";
 
-// Labels of the words of the ledger; the order selects colour and pattern.
-const LABELS = {
-  hands: "hand not visible", "no person": "no person", cut: "close to a cut", "voice of another": "off-screen speaker", quiet: "too quiet",
-  turned: "turned away", jump: "jump", crowd: "too many persons", "no sound": "no audio", "no speech": "no speech", still: "static picture",
-  "too small": "person too small", face: "face not visible", arms: "arms not visible", "other hand": "duplicate hand",
-  "other person": "change of person", "too short": "too short", bones: "bone length", open: "missing joints", duplicate: "duplicate",
-};
+// Reasons for rejection; the order selects colour and pattern.
+const REASONS = ["hand not visible", "no person", "close to a cut", "off-screen speaker", "too quiet", "turned away", "jump",
+  "too many persons", "no audio", "no speech", "static picture", "person too small", "face not visible", "arms not visible",
+  "duplicate hand", "change of person", "too short", "bone length", "missing joints", "duplicate"];
 const COLOURS = {
   light: { accepted: "#2f9c8f", reasons: ["#d9713f", "#8a6fc0", "#c25a86", "#b08a1e", "#7d8894", "#c94c4c", "#5b7fc4", "#98633c"] },
   dark: { accepted: "#2f8f84", reasons: ["#d87b4c", "#9a82cf", "#cc6d95", "#bb9936", "#8893a0", "#d66363", "#6f91d1", "#ac7a54"] },
@@ -23,12 +20,11 @@ const darkScheme = matchMedia("(prefers-color-scheme: dark)");
 
 export const scheme = () => (darkScheme.matches ? "dark" : "light");
 export const onScheme = (action) => darkScheme.addEventListener("change", action);
-export const label = (reason) => (reason === null ? "accepted" : (LABELS[reason] ?? reason));
+export const label = (reason) => reason ?? "accepted";
 
-// Number of a reason; an unknown reason is its own label.
 function index(reason) {
-  LABELS[reason] ??= reason;
-  return Object.keys(LABELS).indexOf(reason);
+  if (!REASONS.includes(reason)) REASONS.push(reason);
+  return REASONS.indexOf(reason);
 }
 
 export const colour = (reason) => {
