@@ -14,7 +14,7 @@
 SHELL := /bin/bash
 .SHELLFLAGS := -euo pipefail -c
 .DEFAULT_GOAL := build
-.PHONY: cuda spelling test-data setup runtime models readers aligner browser blender validator vrm web driver loader build dist check test prove prove-dist prove-rule prove-words prove-people prove-cluster prove-cuda prove-study demo demo-quick demo-study clean-demo docs
+.PHONY: cuda spelling test-data setup runtime models readers aligner browser blender validator vrm page web driver loader build dist check test prove prove-dist prove-rule prove-words prove-people prove-cluster prove-cuda prove-study demo demo-quick demo-study clean-demo docs
 
 TARGET := $(or $(CARGO_TARGET_DIR),target)
 ORATOR := $(TARGET)/release/orator
@@ -36,7 +36,7 @@ export ORATOR_DRIVER ?= $(abspath $(TARGET)/driver)
 setup: ; @.ci/setup/system.sh
 runtime: ; @.ci/setup/onnxruntime.sh
 readers spelling: ; @.ci/setup/python.sh $@
-aligner browser blender cuda validator vrm web driver loader: ; @.ci/setup/$@.sh
+aligner browser blender cuda validator vrm page web driver loader: ; @.ci/setup/$@.sh
 models: build ; @.ci/setup/models.sh
 
 build: setup runtime

@@ -1,6 +1,6 @@
 // Start of the page: tabs for the views, which the fragment of the address selects.
 
-import { announce, attempt, byId, el, getJson } from "./dom.js";
+import { announce, attempt, button, byId, el, getJson } from "./dom.js";
 import { DatasetView } from "./dataset.js";
 import { FileView } from "./player.js";
 import { ResultView } from "./result.js";
@@ -10,13 +10,14 @@ const VIEWS = [["dataset", "Dataset", DatasetView], ["run", "Run", RunView], ["r
 const panels = new Map();
 let project = null;
 
-function shownViews() { return project.file ? [["file", "File", FileView]] : VIEWS; }
+const shownViews = () => (project.file ? [["file", "File", FileView]] : VIEWS);
+// Parts of the fragment: the view, and what it shows.
+const route = () => location.hash.slice(1).split("/");
 
 // Shows the view of the fragment; a view is created when it is first shown.
 function showView() {
   const views = shownViews();
-  const wanted = location.hash.slice(1).split("/")[0];
-  const [name, , View] = views.find(([known]) => known === wanted) ?? views[0];
+  const [name, , View] = views.find(([known]) => known === route()[0]) ?? views[0];
   for (const tab of byId("tabs").children) {
     const isShown = tab.id === `tab-${name}`;
     tab.setAttribute("aria-selected", `${isShown}`);
@@ -35,7 +36,7 @@ function showView() {
   const { panel, view } = panels.get(name);
   panel.hidden = false;
   announce("");
-  view.enter(decodeURIComponent(location.hash.slice(1).split("/").slice(1).join("/")));
+  view.enter(decodeURIComponent(route().slice(1).join("/")));
 }
 
 function moveBetweenTabs(event) {
@@ -58,13 +59,7 @@ async function start() {
   const access = editable ? `editable as ${author}` : "read-only; start with --edit to correct it";
   byId("project").textContent = file ? "" : `${config}, ${access}`;
   const tab = ([name, label]) =>
-    el("button", {
-      type: "button",
-      role: "tab",
-      id: `tab-${name}`,
-      "aria-controls": `panel-${name}`,
-      onclick: () => location.hash.slice(1).split("/")[0] === name || (location.hash = name),
-    }, label);
+    button(label, () => route()[0] === name || (location.hash = name), { role: "tab", id: `tab-${name}`, "aria-controls": `panel-${name}` });
   byId("tabs").replaceChildren(...shownViews().map(tab));
   byId("tabs").hidden = Boolean(file);
   byId("tabs").addEventListener("keydown", moveBetweenTabs);

@@ -101,7 +101,7 @@ export class AvatarView {
       this.#action.clampWhenFinished = true;
     }
     this.time = 0;
-    if (!this.#isFramed) this.#frame();
+    if (!this.#isFramed || motion) this.#frame();
     this.say("");
     this.#draw();
   }

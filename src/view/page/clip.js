@@ -42,7 +42,12 @@ export class Clip {
     // A file with sound only in a codec that the browser reads has no picture size.
     this.film.addEventListener("loadedmetadata", () => this.film.videoWidth || this.#fail());
     this.film.src = `./media/${video.id}`;
-    this.#follow();
+    // Follows the frames that the browser shows while the film plays.
+    const shown = (_now, { mediaTime }) => {
+      if (this.isPlaying) this.#update(mediaTime);
+      this.film.requestVideoFrameCallback(shown);
+    };
+    this.film.requestVideoFrameCallback(shown);
   }
 
   // Position in seconds, also of a film that the browser cannot play.
@@ -85,21 +90,12 @@ export class Clip {
 
   #fail() {
     this.problem.hidden = false;
-    this.problem.textContent = `This browser cannot play ${this.video.file} (its video or audio codec). The pipeline reads it all the same: timeline, keypoints and avatar are shown.`;
+    this.problem.textContent = `This browser cannot play ${this.video.file}: it does not support the codec of its video or audio. Timeline, keypoints and avatar still work.`;
   }
 
   #changed() {
     this.playButton.textContent = this.isPlaying ? "Pause" : "Play";
     this.#update(this.film.currentTime);
-  }
-
-  // Follows the frames that the browser shows while the film plays.
-  #follow() {
-    const shown = (_now, { mediaTime }) => {
-      if (this.isPlaying) this.#update(mediaTime);
-      this.film.requestVideoFrameCallback(shown);
-    };
-    this.film.requestVideoFrameCallback(shown);
   }
 
   #update(secs) {

@@ -27,9 +27,10 @@ export class DatasetView {
     const reply = await attempt(() => getJson("./api/videos"));
     if (!reply) return;
     this.videos = reply.videos;
-    const wanted = this.videos.find((video) => video.id === id) ?? this.videos.find(({ state }) => state === "done");
+    const known = (wanted) => this.videos.find((video) => video.id === wanted);
+    const wanted = known(id) ?? known(this.#chosen) ?? this.videos.find(({ state }) => state === "done");
     this.#drawList(wanted?.id);
-    if (wanted && wanted.id !== this.#chosen) await this.open(wanted.id);
+    if (wanted && wanted.id !== this.#chosen) await this.#openVideo(wanted.id);
     else if (!wanted) this.detail.replaceChildren(el("p", {}, "No video has been processed yet: run `orator run`."));
   }
 
@@ -39,11 +40,10 @@ export class DatasetView {
   }
 
   #drawList(chosen) {
-    const states = { waiting: "waiting", failed: "failed" };
     const item = ({ id, file, speaker, state, message, duration_secs: secs, accepted_secs: accepted, n_decisions: n }) => {
       const share = secs ? accepted / secs : 0;
       const bar = el("progress", { max: "1", value: `${share}`, "aria-hidden": "true" });
-      const note = states[state] ?? `${percent(share)} accepted of ${clock(secs ?? 0, 0)}`;
+      const note = state !== "done" ? state : `${percent(share)} accepted of ${clock(secs ?? 0, 0)}`;
       const link = el("a", { href: `#dataset/${id}`, "aria-current": id === chosen && "true" }, el("b", {}, file),
         el("span", { class: state === "failed" ? "wrong" : "note" }, `${speaker}, ${note}${n ? `, decisions: ${n}` : ""}`),
         state === "done" ? bar : null, message ? el("span", { class: "note" }, message) : null);
@@ -52,8 +52,7 @@ export class DatasetView {
     this.list.replaceChildren(el("h2", {}, `Videos (${this.videos.length})`), el("ul", {}, ...this.videos.map(item)));
   }
 
-  // Opens a video; `time` and `range` restore the position after a change.
-  async open(id, time = 0, range = null) {
+  async #openVideo(id) {
     this.#chosen = id;
     const replies = await attempt(() =>
       Promise.all([getJson(`./api/videos/${id}`), getBytes(`./api/videos/${id}/wave`).catch(() => new ArrayBuffer(0))]));
@@ -82,7 +81,7 @@ export class DatasetView {
       seek(start);
       announce(`The playhead is at ${clock(start)}; the range is the interval.`);
     });
-    this.decisions = this.project.editable ? new DecisionPanel(video, this, () => this.#reload(id)) : null;
+    this.decisions = this.project.editable ? new DecisionPanel(video, this) : null;
     this.#parts = [this.clip, this.timeline, table];
     const zooms = row(
       button("Zoom in", () => this.timeline.zoom(1 / 2)), button("Zoom out", () => this.timeline.zoom(2)),
@@ -102,22 +101,14 @@ export class DatasetView {
       row(el("h2", {}, video.file), this.#beside(id)), this.besides, this.state, this.timeline.element, keys, zooms, legends,
       ...(this.decisions ? [this.decisions.element] : []), el("h2", {}, "Intervals"), table.element,
     );
-    this.timeline.range = range;
-    if (time) this.clip.film.addEventListener("loadedmetadata", () => seek(time), { once: true });
+    this.timeline.range = null;
     this.clip.redraw();
-    // The second video stays while the first one is loaded again.
     if (this.#second) this.besides.append(this.#second.element);
-  }
-
-  async #reload(id) {
-    await this.open(id, this.clip.time, this.timeline.range);
-    await this.enter(id);
   }
 
   // Choice of a second video, which is played next to the first one.
   #beside(id) {
-    const others = this.videos.filter((video) => video.id !== id && video.state === "done");
-    const files = new Map(others.map((video) => [video.id, video.file]));
+    const files = new Map(this.videos.filter((video) => video.id !== id && video.state === "done").map((video) => [video.id, video.file]));
     const choose = el("select", { onchange: () => this.#openSecond(choose.value) },
       ...options(["", ...files.keys()], (other) => files.get(other) ?? "none"));
     choose.value = this.#second?.video.id ?? "";
@@ -146,8 +137,7 @@ export class DatasetView {
     this.timeline.time = secs;
     this.decisions?.follow(secs);
     const interval = this.timeline.intervalAt(secs);
-    const text = interval ? label(interval.reason) : "between intervals";
-    const sentence = interval?.reason ? `Rejected: ${text}. ${interval.message}` : `${text[0].toUpperCase()}${text.slice(1)}.`;
+    const sentence = !interval ? "Between intervals" : interval.reason === null ? "Accepted" : `Rejected: ${interval.message || label(interval.reason)}`;
     if (this.state.textContent !== sentence) this.state.textContent = sentence;
     this.state.classList.toggle("wrong", Boolean(interval?.reason));
   }

@@ -1,7 +1,7 @@
 // Decisions on the chosen video: overrides of a range, the speaker among several persons, the text of a word. The server
 // saves them; the next run applies them.
 
-import { announce, attempt, button, clock, el, labelled, options, row, send, sendJson, table } from "./dom.js";
+import { announce, attempt, button, clock, el, getJson, labelled, options, row, send, sendJson, table } from "./dom.js";
 
 const ACTIONS = { reject: "Reject", accept: "Accept", "swap-hands": "Swap hands", speaker: "Choose the speaker", word: "Correct a word" };
 // Number of words around the playhead that can be chosen.
@@ -13,9 +13,9 @@ const numberInput = (attributes) => el("input", { type: "number", step: "any", m
 export class DecisionPanel {
   #word = null; #firstWord = -1;
 
-  // `view` has the timeline and the clip of the video; `onchange()` loads the video again.
-  constructor(video, view, onchange) {
-    Object.assign(this, { video, view, onchange });
+  // `view` is the dataset view, with the timeline and the clip of the video.
+  constructor(video, view) {
+    Object.assign(this, { video, view });
     const setRange = () => (view.timeline.range = [this.from.valueAsNumber || 0, this.to.valueAsNumber || video.duration_secs]);
     this.from = numberInput({ onchange: setRange });
     this.to = numberInput({ onchange: setRange });
@@ -38,25 +38,36 @@ export class DecisionPanel {
     this.words = el("select", { onchange: () => this.showWord(Number(this.words.value)) });
     this.text = el("input", { type: "text", autocomplete: "off" });
     const correct = button("Correct the word", () => this.#correct());
+    this.heading = el("h2", { tabindex: "-1" }, "Decisions");
+    this.list = el("div", {});
     const note = "Decisions are saved beside the configuration. The next `orator run` applies them; the dataset is unchanged until then.";
     this.element = el("section", { class: "decisions", "aria-label": "Decisions" },
-      el("h2", {}, "Decisions"), el("p", { class: "note" }, note),
+      this.heading, el("p", { class: "note" }, note),
       row(labelled("From, s", this.from), labelled("To, s", this.to), ...this.actions),
       row(pick, labelled("x, px", this.x), labelled("y, px", this.y), set),
       video.words.length ? row(labelled("Word", this.words), labelled("Correct text", this.text), correct) : null,
-      this.#list());
+      this.list);
+    this.#drawList();
   }
 
-  #list() {
+  #drawList() {
     const { decisions } = this.video;
-    if (!decisions.length) return el("p", { class: "note" }, "No decisions on this video.");
     const cells = ({ id, action, start_secs: start, end_secs: end, x, y, text, author, time }) => {
       const name = `${ACTIONS[action] ?? action}, ${clock(start)} to ${clock(end)}`;
       const detail = text ?? (action === "speaker" ? `at ${x}, ${y} px` : "");
       return [ACTIONS[action] ?? action, `${clock(start)} to ${clock(end)}`, detail, author, new Date(time).toLocaleString(),
         button("Undo", () => this.#undo(id, name), { "aria-label": `Undo: ${name}` })];
     };
-    return table("Decisions on this video", ["Decision", "Range", "Detail", "Author", "Time", "Undo"], decisions.map(cells));
+    const heads = ["Decision", "Range", "Detail", "Author", "Time", "Undo"];
+    this.list.replaceChildren(decisions.length ? table("Decisions on this video", heads, decisions.map(cells)) : el("p", { class: "note" }, "No decisions on this video."));
+  }
+
+  // Reads the decisions again; everything else of the video changes with the next run only.
+  async #refresh() {
+    this.video.decisions = (await getJson(`./api/videos/${this.video.id}`)).decisions;
+    this.#drawList();
+    this.view.timeline.refresh();
+    await this.view.enter(this.video.id);
   }
 
   showRange(range) {
@@ -104,14 +115,19 @@ export class DecisionPanel {
   async #decide(action, detail, range = this.view.timeline.range ?? [0, this.video.duration_secs]) {
     const [start, end] = range;
     const decision = { video: this.video.id, action, start_secs: start, end_secs: end, ...detail };
-    if (!(await attempt(() => sendJson("./api/decisions", decision)))) return;
-    await this.onchange();
-    announce(`Saved: ${ACTIONS[action]}, ${clock(start)} to ${clock(end)}. The next run applies it.`);
+    await attempt(async () => {
+      await sendJson("./api/decisions", decision);
+      await this.#refresh();
+      announce(`Saved: ${ACTIONS[action]}, ${clock(start)} to ${clock(end)}. The next run applies it.`);
+    });
   }
 
-  async #undo(id, name) {
-    if (!(await attempt(() => send("DELETE", `./api/decisions/${encodeURIComponent(id)}`)))) return;
-    await this.onchange();
-    announce(`Undone: ${name}.`);
+  #undo(id, name) {
+    return attempt(async () => {
+      await send("DELETE", `./api/decisions/${encodeURIComponent(id)}`);
+      await this.#refresh();
+      this.heading.focus();
+      announce(`Undone: ${name}.`);
+    });
   }
 }

@@ -2,37 +2,29 @@
 
 import { clock, el, labelled, options } from "./dom.js";
 
-// Labels of the words of the ledger; the order selects colour and pattern.
-const LABELS = {
-  hands: "hand not visible", "no person": "no person", cut: "close to a cut", "voice of another": "off-screen speaker", quiet: "too quiet",
-  turned: "turned away", jump: "jump", crowd: "too many persons", "no sound": "no audio", "no speech": "no speech", still: "static picture",
-  "too small": "person too small", face: "face not visible", arms: "arms not visible", "other hand": "duplicate hand",
-  "other person": "change of person", "too short": "too short", bones: "bone length", open: "missing joints", duplicate: "duplicate",
-};
+// Reasons for rejection; the order selects colour and pattern.
+const REASONS = ["hand not visible", "no person", "close to a cut", "off-screen speaker", "too quiet", "turned away", "jump",
+  "too many persons", "no audio", "no speech", "static picture", "person too small", "face not visible", "arms not visible",
+  "duplicate hand", "change of person", "too short", "bone length", "missing joints", "duplicate"];
 const COLOURS = {
   light: { accepted: "#2f9c8f", reasons: ["#d9713f", "#8a6fc0", "#c25a86", "#b08a1e", "#7d8894", "#c94c4c", "#5b7fc4", "#98633c"] },
   dark: { accepted: "#2f8f84", reasons: ["#d87b4c", "#9a82cf", "#cc6d95", "#bb9936", "#8893a0", "#d66363", "#6f91d1", "#ac7a54"] },
 };
 // Lines and dots of a pattern in a tile of 8 x 8 px: segments [x0, y0, x1, y1].
 const MARKS = [
-  [[0, 8, 8, 0], [-1, 1, 1, -1], [7, 9, 9, 7]],
-  [[0, 0, 8, 8], [-1, 7, 1, 9], [7, -1, 9, 1]],
-  [[0, 4, 8, 4]],
-  [[4, 0, 4, 8]],
-  [[2, 2, 4, 2], [6, 6, 8, 6]],
-  [[0, 4, 8, 4], [4, 0, 4, 8]],
+  [[0, 8, 8, 0], [-1, 1, 1, -1], [7, 9, 9, 7]], [[0, 0, 8, 8], [-1, 7, 1, 9], [7, -1, 9, 1]],
+  [[0, 4, 8, 4]], [[4, 0, 4, 8]], [[2, 2, 4, 2], [6, 6, 8, 6]], [[0, 4, 8, 4], [4, 0, 4, 8]],
 ];
 const ROW_PX = 36;
 const darkScheme = matchMedia("(prefers-color-scheme: dark)");
 
 export const scheme = () => (darkScheme.matches ? "dark" : "light");
 export const onScheme = (action) => darkScheme.addEventListener("change", action);
-export const label = (reason) => (reason === null ? "accepted" : (LABELS[reason] ?? reason));
+export const label = (reason) => reason ?? "accepted";
 
-// Number of a reason; an unknown reason is its own label.
 function index(reason) {
-  LABELS[reason] ??= reason;
-  return Object.keys(LABELS).indexOf(reason);
+  if (!REASONS.includes(reason)) REASONS.push(reason);
+  return REASONS.indexOf(reason);
 }
 
 export const colour = (reason) => {
@@ -135,6 +127,7 @@ export class IntervalTable {
     this.count.textContent = `${this.#shown.length} of ${this.intervals.length} intervals`;
     this.grid.setAttribute("aria-rowcount", `${this.#shown.length + 1}`);
     this.body.style.height = `${ROW_PX * this.#shown.length}px`;
+    this.grid.style.height = `min(22rem, ${ROW_PX * (this.#shown.length + 2)}px)`;
     this.grid.scrollTop = 0;
     this.draw();
   }

@@ -49,7 +49,7 @@ export class ResultView {
   leave() {
     this.#visit += 1;
     this.player?.pause();
-    if (this.#recorder) this.#recorder.stop();
+    this.#recorder?.stop();
   }
 
   #setSound(file) {
@@ -76,8 +76,8 @@ export class ResultView {
       for (const track of stream.getTracks()) track.stop();
       this.#recorder = null;
       this.recordButton.textContent = "Record";
-      const isOgg = recorder.mimeType.includes("ogg");
-      this.#setSound(new File(parts, isOgg ? "recording.ogg" : recorder.mimeType.includes("mp4") ? "recording.m4a" : "recording.webm", { type: recorder.mimeType }));
+      const type = recorder.mimeType.split(";")[0];
+      this.#setSound(new File(parts, `recording.${type.split("/")[1]}`, { type }));
     });
     recorder.start();
     this.#recorder = recorder;
@@ -160,7 +160,7 @@ export class ResultView {
     const link = ([file, kind]) => files.includes(file) && el("a", { href: `./results/${encodeURIComponent(id)}/${file}`, download: `${name.replace(/\.\w+$/, "")}-seed-${seed}.${file.split(".").pop()}`, "aria-label": `${kind} of ${title}` }, kind);
     const links = DOWNLOADS.map(link).filter(Boolean);
     const film = files.includes("motion.mp4") ? null : button("Make MP4", () => attempt(() => this.#makeVideo(id)), { id: `result-${id}-mp4`, "aria-label": `Make MP4 of ${title}` });
-    return el("li", {}, el("b", {}, title), el("span", { class: "note" }, clock(secs ?? 0)),
+    return el("li", {}, el("b", {}, title), secs ? el("span", { class: "note" }, clock(secs)) : null,
       row(button("Open", () => attempt(() => this.#play([result])), { id: `result-${id}-open`, "aria-label": `Open ${title}` }),
         el("label", { class: "field" }, box, el("span", {}, "Compare")), ...links, film));
   }

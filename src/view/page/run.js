@@ -43,7 +43,7 @@ function drawCurve(canvas, points) {
   const x = (step) => 44 + (step / last) * (width - 54);
   const y = (value) => height - 20 - ((value - low) / (high - low || 1)) * (height - 32);
   for (const value of new Set([low, high])) {
-    pen.fillText(number(value), 0, y(value) + 4);
+    pen.fillText(String(Number(value.toPrecision(3))), 0, y(value) + 4);
     pen.fillRect(44, y(value), width - 54, 0.5);
   }
   pen.fillText("0", 44, height - 4);
@@ -147,7 +147,7 @@ export class RunView {
       this.values[k].textContent = number(points.at(-1)?.[1]);
     });
     const every = Math.ceil(lists[0].length / MAX_ROWS);
-    const [train] = [lists[0].filter((_, k) => k % every === 0 || k === lists[0].length - 1)];
+    const train = lists[0].filter((_, k) => k % every === 0 || k === lists[0].length - 1);
     const cells = (list, keys) => list.map((one) => keys.map((key) => number(one[key])));
     const keys = ["step", "l1", "adv", "d"];
     this.#replace(this.tables, [train.at(-1), lists[1].at(-1)], () => [

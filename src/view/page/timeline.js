@@ -199,16 +199,44 @@ export class Timeline {
       pen.fillStyle = this.#colours.rule;
       pen.fillRect(x, 0, 1, HEIGHT);
       pen.fillStyle = this.#colours.soft;
-      if (x < this.#width - 36) pen.fillText(clock(k * step, step < 1 ? 1 : 0), x + 3, 9);
+      if (x < this.#width - 52) pen.fillText(clock(k * step, step < 1 ? 1 : 0), x + 3, 9);
+    }
+  }
+
+  // More intervals than a third of the px: each column is filled from below by the accepted share of its seconds, and
+  // above that by the share of the reason that rejects most of them.
+  #drawShares(pen, first, last) {
+    const [top, height] = BANDS.state;
+    let at = first;
+    for (let x = GUTTER; x < this.#width; x += 1) {
+      const [from, to] = [this.#secs(x), this.#secs(x + 1)];
+      const secs = new Map([[null, 0]]);
+      for (let k = at; k < last && this.intervals[k].start < to; k += 1) {
+        const { start, end, reason } = this.intervals[k];
+        secs.set(reason, (secs.get(reason) ?? 0) + Math.min(end, to) - Math.max(start, from));
+        if (end <= to) at = k + 1;
+      }
+      const pxPerSec = height / (to - from);
+      const accepted = pxPerSec * secs.get(null);
+      const rejected = [...secs].slice(1).sort((a, b) => b[1] - a[1]);
+      const tall = pxPerSec * rejected.reduce((sum, [, one]) => sum + one, 0);
+      pen.fillStyle = colour(null);
+      pen.fillRect(x, top + height - accepted, 1, accepted);
+      if (tall > 0) pen.fillStyle = colour(rejected[0][0]);
+      pen.fillRect(x, top + height - accepted - tall, 1, tall);
     }
   }
 
   #drawStates(pen) {
+    const [first, last] = this.#view.map((secs) => Math.max(0, lastBefore(this.intervals, secs, ({ start }) => start)));
+    const isDense = 3 * (last - first) > this.#width;
     // Rejected intervals are lower than accepted ones: their state does not depend on the colour alone.
-    this.#parts(this.intervals, ({ reason }, x, width) => {
+    const drawState = ({ reason }, x, width) => {
       pen.fillStyle = width < 3 ? colour(reason) : fill(pen, reason);
       this.#fillBand(pen, "state", x, width, reason === null ? 0 : 6, 0);
-    }, ({ start }) => start, ({ end }) => end);
+    };
+    if (isDense) this.#drawShares(pen, first, last + 1);
+    else this.#parts(this.intervals, drawState, ({ start }) => start, ({ end }) => end);
     pen.fillStyle = this.#colours.soft;
     this.#parts(this.video.resting, (_, x, width) => this.#fillBand(pen, "resting", x, width, 2, 2));
     pen.fillStyle = this.#colours.accent;
@@ -254,12 +282,12 @@ export class Timeline {
     });
   }
 
-  // Strokes are full, holds half as high, and rests thin.
+  // Strokes are full, holds half as high, rests and other phases thin.
   #drawStrokes(pen) {
     for (const hand of ["left", "right"]) {
       pen.fillStyle = this.#colours[hand];
       const draw = ([, phase], x, width) => {
-        const inset = { stroke: 0, hold: 3.5, rest: 6 }[phase] ?? 0;
+        const inset = { stroke: 0, hold: 3.5, rest: 6 }[phase] ?? 5;
         this.#fillBand(pen, hand, x, width, inset, inset);
       };
       this.#parts(this.strokes[hand] ?? [], draw, ([, , start]) => start, ([, , , end]) => end);

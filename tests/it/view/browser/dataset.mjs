@@ -1,5 +1,5 @@
-// A visitor of the dataset view by keyboard only: plays, steps, selects a range, rejects it, undoes it, opens an interval
-// from the table and moves between the tabs. Prints one line of JSON.
+// A visitor of the dataset view by keyboard only: plays, steps, selects a range, rejects it, chooses the speaker, corrects
+// a word, undoes all, opens an interval from the table and moves between the tabs. Prints one line of JSON.
 //
 //   node dataset.mjs --url URL --video SPEAKER/NAME [--width 360] [--scheme dark] [--screenshot FILE]
 
@@ -38,17 +38,33 @@ await visit(`dataset/${options.video}`, async ({ page }) => {
 
   const isEditable = (await page.$(".decisions")) !== null;
   const rows = () => page.$$eval(".decisions tbody tr", (nodes) => nodes.map((row) => [...row.cells].slice(0, 4).map((cell) => cell.textContent)));
-  let [made, left] = [[], []];
+  let [made, left, isFocusKept] = [[], [], null];
   if (isEditable) {
-    await page.waitForSelector(".decisions .row button:not(:disabled)");
-    const reject = await page.evaluateHandle(() => [...document.querySelectorAll(".decisions button")].find((node) => node.textContent === "Reject"));
-    await reject.evaluate((node) => (node.id = "reject"));
-    await focus(page, "#reject");
-    await page.keyboard.press("Enter");
-    await waitForStatus(page, "Saved: Reject");
+    await page.$$eval(".decisions button, .decisions input, .decisions select", (nodes) =>
+      nodes.forEach((node) => (node.id ||= (node.labels?.[0] ?? node).textContent.split(",")[0].replaceAll(" ", "-").toLowerCase())));
+    const press = async (id, status) => {
+      await focus(page, `#${id}`);
+      await page.keyboard.press("Enter");
+      await waitForStatus(page, status);
+    };
+    await press("reject", "Saved: Reject");
+    isFocusKept = await page.evaluate(() => document.activeElement.id === "reject");
+    for (const [id, value] of [["x", "300"], ["y", "200"]]) {
+      await focus(page, `#${id}`);
+      await page.keyboard.type(value);
+    }
+    await press("set-the-speaker", "Saved: Choose the speaker");
+    if (await page.$("#correct-text")) {
+      await focus(page, "#correct-text");
+      await page.keyboard.type("!");
+      await press("correct-the-word", "Saved: Correct a word");
+    }
     made = await rows();
-    await focus(page, ".decisions tbody button");
-    await page.keyboard.press("Enter");
+    for (let k = made.length; k > 0; k -= 1) {
+      await focus(page, ".decisions tbody button");
+      await page.keyboard.press("Enter");
+      await page.waitForFunction((n) => document.querySelectorAll(".decisions tbody tr").length === n, {}, k - 1);
+    }
     await waitForStatus(page, "Undone");
     left = await rows();
   }
@@ -69,5 +85,5 @@ await visit(`dataset/${options.video}`, async ({ page }) => {
   await page.focus("[role=tab][aria-selected=true]");
   await keys("Home");
   await page.waitForSelector(".timeline");
-  return { openedMs, findings, playedSecs, steppedSecs, shiftedSecs, valueText, isEditable, made, left, activeRow, state, hash, shownAfterReload };
+  return { openedMs, findings, playedSecs, steppedSecs, shiftedSecs, valueText, isEditable, made, left, isFocusKept, activeRow, state, hash, shownAfterReload };
 });
