@@ -90,7 +90,14 @@ fn a_given_unit_replaces_the_detected_one() {
 
     let limits =
         TakeLimits { fps: FrameRate::new(15, 1), min_frames: 1, max_difference_secs: 60.0, no_sound: true, units };
-    let files = TakeFiles { kind: MotionKind::Bvh, motion: path, sound: None, transcripts: Vec::new(), genea: None };
+    let files = TakeFiles {
+        kind: MotionKind::Bvh,
+        motion: path,
+        sound: None,
+        transcripts: Vec::new(),
+        genea: None,
+        origin: None,
+    };
     let TakeOutcome::Accepted(accepted) = ImportedTake::read(&files, &limits, "host").unwrap().outcome else {
         panic!()
     };

@@ -75,7 +75,7 @@ fn take() {
         for (kind, name) in kinds {
             let motion = dir.path().join(name);
             std::fs::write(&motion, bytes).unwrap();
-            let files = TakeFiles { kind, motion, sound: None, transcripts: Vec::new(), genea: None };
+            let files = TakeFiles { kind, motion, sound: None, transcripts: Vec::new(), genea: None, origin: None };
             let _ = ImportedTake::read(&files, &limits, "host");
         }
     });
