@@ -83,7 +83,7 @@ pub fn manifests(job: &JobRequest, plan: &ClusterPlan, work: &Path, target: &Kub
 
 /// Shell script that runs a worker and forwards SIGTERM to it, which the shell, as the pod's first process, would not
 /// do by itself. Failed videos (exit code 2) do not fail the pod.
-fn sigterm_forwarding_script(worker: &str) -> Vec<String> {
+pub fn sigterm_forwarding_script(worker: &str) -> Vec<String> {
     let lines = [
         &format!("{worker} & worker=$!"),
         "trap 'kill -TERM $worker 2>/dev/null' TERM",
@@ -93,27 +93,4 @@ fn sigterm_forwarding_script(worker: &str) -> Vec<String> {
         "[ $code -eq 0 ] || [ $code -eq 2 ]",
     ];
     lines.map(str::to_owned).to_vec()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use rustix::process::{Pid, Signal, kill_process};
-    use std::process::Command;
-    use std::time::Duration;
-
-    #[test]
-    fn a_worker_receives_the_sigterm_of_its_pod() {
-        let code = |worker: &str, signal: Option<Signal>| {
-            let mut pod =
-                Command::new("/bin/sh").args(["-c", &sigterm_forwarding_script(worker).join("\n")]).spawn().unwrap();
-            std::thread::sleep(Duration::from_millis(300));
-            signal.iter().for_each(|signal| kill_process(Pid::from_child(&pod), *signal).unwrap());
-            pod.wait().unwrap().code()
-        };
-        let traps_term =
-            |code: u8| format!("sh -c 'trap \"sleep 0.2; exit {code}\" TERM; while :; do sleep 0.05; done'");
-        assert_eq!([0, 2, 1].map(|n| code(&traps_term(n), Some(Signal::TERM))), [Some(0), Some(0), Some(1)]);
-        assert_eq!([0, 2, 3].map(|n| code(&format!("sh -c 'exit {n}'"), None)), [Some(0), Some(0), Some(1)]);
-    }
 }

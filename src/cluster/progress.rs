@@ -83,7 +83,7 @@ pub fn progress(plan: &ClusterPlan, path: &Path, dead_after: Duration) -> Result
 }
 
 /// An error without the paths in it, so that units that fail for one cause are listed together.
-fn reason(error: &str) -> String {
+pub fn reason(error: &str) -> String {
     let parts = error.split(": ").map(|part| {
         let words = part.split(' ').map(|word| if word.contains('/') { "FILE" } else { word });
         words.collect::<Vec<_>>().join(" ")
@@ -116,15 +116,4 @@ fn workers(folder: &DiskFolder, dead_after: Duration) -> Result<Vec<WorkerProgre
         workers.push(WorkerProgress { worker: worker.to_owned(), is_alive, heartbeat, silent_secs });
     }
     Ok(workers)
-}
-
-#[cfg(test)]
-mod tests {
-    #[test]
-    fn errors_that_differ_in_their_paths_have_one_reason() {
-        let reason =
-            |file: &str| super::reason(&format!("cannot read {file}: {file}: expected a video; copy it again"));
-        assert_eq!(reason("/a/b.mp4"), "cannot read FILE: expected a video; copy it again");
-        assert_eq!(reason("/a/b.mp4"), reason("videos/c.mp4"));
-    }
 }

@@ -103,26 +103,8 @@ pub fn find_library(explicit: &Path, models_dir: &Path) -> Result<PathBuf> {
 }
 
 /// The library in a folder; among several versions the last by name.
-fn library_in(folder: &Path) -> Option<PathBuf> {
+pub fn library_in(folder: &Path) -> Option<PathBuf> {
     let files = std::fs::read_dir(folder).ok()?.flatten().map(|file| file.path());
     let named = |path: &PathBuf| path.file_name().and_then(OsStr::to_str).is_some_and(|name| name.starts_with(LIBRARY));
     files.filter(|path| named(path) && path.is_file()).max()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn library_is_found_in_lib_and_its_absence_is_explained() {
-        let dir = tempfile::tempdir().unwrap();
-        let error = find_library(&dir.path().join("gone.so"), dir.path()).unwrap_err();
-        assert!(error.to_string().contains("gone.so") && error.to_string().contains("make runtime"));
-        std::fs::create_dir(dir.path().join("lib")).unwrap();
-        for version in ["1.9.0", "1.31.1"] {
-            std::fs::write(dir.path().join(format!("lib/{LIBRARY}.{version}")), b"").unwrap();
-        }
-        assert!(library_in(&dir.path().join("lib")).is_some());
-        assert!(library_in(&dir.path().join("nothing")).is_none());
-    }
 }

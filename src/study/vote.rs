@@ -79,28 +79,3 @@ pub struct StudyVote {
     /// Whether the participant completed the session.
     pub completed: bool,
 }
-
-#[cfg(test)]
-impl StudyVote {
-    /// Main-phase vote for unit tests.
-    pub fn example(design: TaskDesign, conditions: &[&str], response: Response) -> Self {
-        Self {
-            participant: "p".to_owned(),
-            task: "t".to_owned(),
-            design,
-            phase: TrialPhase::Main,
-            trial: 3,
-            clip: "ellen/4".to_owned(),
-            speaker: "ellen".to_owned(),
-            conditions: conditions.iter().map(|name| (*name).to_owned()).collect(),
-            response,
-            expected: None,
-            stalled_secs: 0.5,
-            unfocused_secs: 0.0,
-            response_secs: 4.25,
-            plays: 2,
-            reloads: 0,
-            completed: true,
-        }
-    }
-}

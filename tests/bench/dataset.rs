@@ -14,7 +14,7 @@ use orator_dataset::split::SplitBy;
 use orator_dataset::write::assemble::DatasetWriter;
 use orator_dataset::write::entry::VideoSource;
 use orator_dataset::{Dataset, Sample, Split};
-use orator_gesture::train::gan::train;
+use orator_gesture::train::gan::train::{self, TrainingStart};
 use orator_gesture::train::gan::windows::WindowLoader;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -240,7 +240,7 @@ fn loader(args: &Args, dir: &Path, out: &Path) -> Result<LoadingRates> {
     drop(examples);
 
     let steps = StepTimes::default();
-    train::train(&dataset, &settings, out, &steps)?;
+    train::train(&[&dataset], &settings, &TrainingStart::default(), out, &steps, &mut |_| ())?;
     let ends = steps.ends.lock().map(|ends| ends.clone()).unwrap_or_default();
     let durations = ends.windows(2).map(|pair| (pair[1] - pair[0]).as_secs_f64()).collect();
     Ok(LoadingRates { n_windows, load_secs, windows_a_second, trained_a_second: BATCH as f64 / median(durations) })

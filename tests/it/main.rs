@@ -29,6 +29,7 @@ mod report;
 mod robustness;
 mod segment;
 mod source_tree;
+mod speech;
 mod study;
 mod train;
 mod view;

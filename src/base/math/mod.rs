@@ -1,4 +1,5 @@
-//! Vectors, rotations, Procrustes alignment, eigenvalues, filters, medians, quantiles. Independent of bodies and files.
+//! Vectors, rotations, Procrustes alignment, eigenvalues, filters, medians, quantiles, runs. Independent of bodies and
+//! files.
 
 pub mod cholesky;
 pub mod eigen;
@@ -8,5 +9,6 @@ pub mod local_fit;
 pub mod order;
 pub mod procrustes;
 pub mod rotation;
+pub mod runs;
 pub mod savitzky_golay;
 pub mod vec3;

@@ -57,15 +57,3 @@ pub fn relaxed() -> HandJoints {
     }
     hand
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_relaxed_hand_has_the_reference_size() {
-        let hand = relaxed();
-        assert!((vec3::norm(vec3::sub(hand[10], hand[9])) - PHALANX).abs() < 1e-12);
-        assert!(hand[5][0] > hand[17][0] && hand[4][0] > hand[5][0] && hand[12][2] < 0.0);
-    }
-}

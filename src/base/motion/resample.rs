@@ -2,10 +2,12 @@
 //! linear phase) against aliasing; upsampling interpolates with the same sinc. Frame n of the result is at exactly n /
 //! fps seconds after the source's first frame. At the source's own rate the motion is returned unchanged.
 
+use crate::math::runs::true_ranges;
 use crate::types::pose3d::Motion;
 use crate::types::skeleton::N_JOINTS;
 use crate::types::time::FrameRate;
 use ndarray::{Array2, Array3};
+use std::ops::Range;
 
 /// Half width of the kernel, in periods of the slower rate.
 const HALF_WIDTH: f64 = 8.0;
@@ -32,7 +34,9 @@ pub fn at_rate(motion: &Motion, fps: FrameRate) -> Motion {
         (0..n_frames).map(|n| ResamplingKernel::at(fps.secs(n) * from.per_sec(), from, fps)).collect();
     for joint in 0..N_JOINTS {
         let is_visible = |frame: usize| motion.mask[[frame.min(n_source - 1), joint]];
-        for (start, end) in runs(motion, joint) {
+        let exists = |t: usize| (0..3).all(|k| motion.joints[[t, joint, k]].is_finite());
+        let exists: Vec<bool> = (0..n_source).map(exists).collect();
+        for Range { start, end } in true_ranges(&exists) {
             let tracks: [Vec<f64>; 3] =
                 std::array::from_fn(|k| (start..end).map(|t| f64::from(motion.joints[[t, joint, k]])).collect());
             for (n, kernel) in kernels.iter().enumerate() {
@@ -48,19 +52,6 @@ pub fn at_rate(motion: &Motion, fps: FrameRate) -> Motion {
         }
     }
     Motion { fps, joints, mask }
-}
-
-/// Returns the ranges of frames in which a joint exists.
-fn runs(motion: &Motion, joint: usize) -> Vec<(usize, usize)> {
-    let exists = |t: usize| (0..3).all(|k| motion.joints[[t, joint, k]].is_finite());
-    let exists: Vec<bool> = (0..motion.n_frames()).map(exists).collect();
-    let mut end = 0;
-    let runs = exists.chunk_by(|a, b| a == b).map(|run| {
-        let start = end;
-        end += run.len();
-        (run[0], start, end)
-    });
-    runs.filter(|(exists, ..)| *exists).map(|(_, start, end)| (start, end)).collect()
 }
 
 /// Weights of the source frames around one point in time.

@@ -116,7 +116,7 @@ fn train_one(args: &Args, speaker: Option<&String>, config: &Config, device: &De
     let validated = &mut |at| page.update(at);
     let (from, vectors) = (args.from.as_deref(), args.words.as_deref().map(WordVectors::open).transpose()?);
     let training = TrainingStart { device, from, vectors: vectors.as_ref() };
-    let outcome = train::train_with_callback(&datasets, &settings, &training, &out, ui, validated)?;
+    let outcome = train::train(&datasets, &settings, &training, &out, ui, validated)?;
     let (speed, steps_per_sec) = speed(outcome.began_at, outcome.steps, start.elapsed().as_secs_f64());
     let page = page.finish(ValidatedStep { step: outcome.steps, best_step: outcome.best_step });
     let text = format!(

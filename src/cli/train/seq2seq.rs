@@ -106,7 +106,7 @@ fn train_one(
         }
         let mut page = TrainingPage::new(out, source.name(), poses, ui);
         let validated = &mut |at| page.update(at);
-        let outcome = train::train_with_callback(source, vectors, &settings, device, out, ui, validated)?;
+        let outcome = train::train(source, vectors, &settings, device, out, ui, validated)?;
         let page = page.finish(ValidatedStep { step: outcome.steps, best_step: outcome.best_step });
         anyhow::Ok((outcome, page))
     };

@@ -13,7 +13,7 @@ const NEGLIGIBLE: f64 = 1e-4;
 const MIN_DIGITS: usize = 3;
 
 /// Frame rate for a frame time: the common rate if it is nearly equal.
-pub(crate) fn rate(frame_secs: f64) -> FrameRate {
+pub fn rate(frame_secs: f64) -> FrameRate {
     let off = |rate: FrameRate| (rate.per_sec() * frame_secs - 1.0).abs();
     let nearest = integer_rates().chain(broadcast_rates()).min_by(|&a, &b| off(a).total_cmp(&off(b)));
     match nearest.filter(|&rate| off(rate) < RATE_ROUNDING) {
@@ -24,7 +24,7 @@ pub(crate) fn rate(frame_secs: f64) -> FrameRate {
 
 /// The common rate whose frame time, rounded to the digits of `written`, is `frame_secs`; an integer rate is preferred.
 /// `None` if there is none, and for frame times without a notable rounding error.
-pub(super) fn rounded_rate(written: &str, frame_secs: f64) -> Option<FrameRate> {
+pub fn rounded_rate(written: &str, frame_secs: f64) -> Option<FrameRate> {
     let decimals = written.split_once('.').map_or(0, |(_, decimals)| decimals.trim_end_matches('0').len());
     let half_unit = 0.5 * 10f64.powi(-(decimals.max(MIN_DIGITS) as i32));
     let error = |rate: FrameRate| (1.0 / rate.per_sec() - frame_secs).abs();
@@ -40,49 +40,4 @@ fn integer_rates() -> impl Iterator<Item = FrameRate> {
 
 fn broadcast_rates() -> impl Iterator<Item = FrameRate> {
     BROADCAST_RATES.into_iter().map(|rate| FrameRate::new(1000 * rate, 1001))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn rounded_frame_times_are_those_of_the_common_rates() {
-        for (written, num, den) in [
-            ("0.017", 60, 1),
-            ("0.033", 30, 1),
-            ("0.0330000", 30, 1),
-            ("0.008", 120, 1),
-            ("0.042", 24, 1),
-            ("0.067", 15, 1),
-            ("0.0167", 60, 1),
-            ("0.0333", 30, 1),
-            ("0.0083", 120, 1),
-            ("0.0334", 30_000, 1001),
-            ("0.01668", 60_000, 1001),
-            ("0.00834", 120_000, 1001),
-        ] {
-            let rate = rounded_rate(written, written.parse().unwrap());
-            assert_eq!(rate, Some(FrameRate::new(num, den)), "{written}");
-        }
-        for written in ["0.04", "0.02", "0.01", "0.1", "0.0125", "0.025", "0.005", "0.016", "0.033333", "0.008342", "1"]
-        {
-            assert_eq!(rounded_rate(written, written.parse().unwrap()), None, "{written}");
-        }
-    }
-
-    #[test]
-    fn exact_frame_times_keep_their_rates() {
-        for (frame_secs, num, den) in [
-            (0.008_341_67, 120_000, 1001),
-            (0.008_333_33, 120, 1),
-            (0.033_366_7, 30_000, 1001),
-            (0.041_708_4, 24_000, 1001),
-            (0.04, 25, 1),
-            (0.1, 10, 1),
-            (0.005, 200, 1),
-        ] {
-            assert_eq!(rate(frame_secs), FrameRate::new(num, den), "{frame_secs}");
-        }
-    }
 }

@@ -1,7 +1,7 @@
 //! BVH files: reader, frame rate, writer, and conversion to exponential maps.
 
 pub mod exponential_maps;
-pub(crate) mod frame_time;
+pub mod frame_time;
 mod motion_lines;
 pub mod read;
 pub mod skeleton;

@@ -111,7 +111,7 @@ fn plain(name: &str) -> String {
 }
 
 /// Names without the numbers that Sketchfab and Fab append (`LeftArm_010`), where the result differs from all others.
-fn without_numbers<'a>(names: &[&'a str]) -> Vec<&'a str> {
+pub fn without_numbers<'a>(names: &[&'a str]) -> Vec<&'a str> {
     let bare = |name: &'a str| {
         let stem = name.trim_end_matches(|c: char| c.is_ascii_digit());
         if stem.len() < name.len() { stem.strip_suffix('_').unwrap_or(name) } else { name }
@@ -219,19 +219,4 @@ fn numbered(finger: usize, k: usize, bone: &str, is_biped: bool) -> Vec<String> 
     }
     let bone = bone.replace("intermediate", "medial");
     vec![format!("finger{}{}", finger + 1, k + 1), format!("finger{}{bone}", finger + 1)]
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn numbers_that_distinguish_joints_are_retained() {
-        let names = ["Spine_01", "Spine_02", "Neck_03", "Head_04", "LeftHand_05", "LeftHand_06"];
-        let bare = ["Spine_01", "Spine_02", "Neck", "Head", "LeftHand_05", "LeftHand_06"];
-        assert_eq!(without_numbers(&names), bare);
-        let wrists = ["left_wrist", "left_hand", "left_ankle", "left_foot"];
-        let found = match_names(&wrists);
-        assert_eq!((found["LeftHand"], found["LeftFoot"]), (0, 2), "the joint nearer to the trunk");
-    }
 }

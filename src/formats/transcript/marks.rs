@@ -10,7 +10,7 @@ const MAX_WORDS: usize = 8;
 const PUNCTUATION: [char; 6] = ['.', ',', '!', '?', ':', ';'];
 
 /// The spoken words of a label, sentence or cue.
-pub(super) fn spoken(text: &str) -> Vec<&str> {
+pub fn spoken(text: &str) -> Vec<&str> {
     let label = text.trim();
     let is_pause = PAUSES.iter().any(|pause| label == *pause || label == pause.to_uppercase());
     if is_pause || is_enclosed(label, BRACKETS[0]) {
@@ -22,7 +22,7 @@ pub(super) fn spoken(text: &str) -> Vec<&str> {
 }
 
 /// Whether each of the consecutive `tokens` is a spoken word.
-pub(super) fn are_spoken(tokens: &[&str]) -> Vec<bool> {
+pub fn are_spoken(tokens: &[&str]) -> Vec<bool> {
     let mut end_of_mark = 0;
     let is_spoken = |(at, token): (usize, &&str)| {
         if token.starts_with('[') {
@@ -47,45 +47,4 @@ fn is_mark(token: &str) -> bool {
 fn is_enclosed(text: &str, (open, close): (char, char)) -> bool {
     let inside = text.strip_prefix(open).and_then(|rest| rest.strip_suffix(close));
     inside.is_some_and(|inside| !inside.is_empty() && !inside.contains([open, close]))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn marks_are_not_spoken() {
-        let of = |text: &str| spoken(text).join(" ");
-        for mark in [
-            "[Music]",
-            "[soft music playing].",
-            "(applause)",
-            "(audience laughing)",
-            "sp",
-            "SIL",
-            "spn",
-            "<eps>",
-            "<unk>",
-            "{LG}",
-            "{NS}",
-            "{SL}",
-            "♪ ♪",
-            ">>",
-            "-",
-            "---",
-            "– —",
-            " ",
-        ] {
-            assert_eq!(of(mark), "", "{mark}");
-        }
-        assert_eq!(of("[Music]  so (coughs) well, [loud noise] {NS} now"), "so well, now");
-        assert_eq!(of("- Are you? - Well-known, -5 …"), "Are you? Well-known, -5");
-        // Text that only resembles a mark.
-        let long = "[a b c d e f g h i";
-        for words in ["word(s) (as he said) ok", "Sil lay", "[", "a ] b", "3 < 4", "& <", "()", long] {
-            assert_eq!(of(words), words);
-        }
-        assert_eq!(are_spoken(&["so", "[loud", "noise]", "now"]), [true, false, false, true]);
-        assert_eq!(spoken(&"[ ".repeat(1 << 20)).len(), 1 << 20);
-    }
 }

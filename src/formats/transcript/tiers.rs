@@ -11,7 +11,7 @@ const MAX_NAMED: usize = 40;
 
 /// Words of the tier of `speaker`, given all interval tiers with their names. Tiers with `word` in their name (`ORT` of
 /// WebMAUS) take precedence; if there are none, tiers of phones are excluded.
-pub(super) fn words_of(mut tiers: Vec<(String, Vec<Word>)>, speaker: &str) -> Result<Vec<Word>> {
+pub fn words_of(mut tiers: Vec<(String, Vec<Word>)>, speaker: &str) -> Result<Vec<Word>> {
     ensure!(!tiers.is_empty(), "the file has no interval tier");
     let all = names(&tiers);
     if tiers.iter().any(|(name, _)| is_of_words(name)) {
@@ -64,40 +64,4 @@ fn is_of_phones(name: &str, words: &[Word]) -> bool {
     ["phon", "syll"].iter().any(|kind| lower.contains(kind))
         || ["mau", "kanmau"].contains(&key(name).as_str())
         || words.iter().any(is_stressed_vowel)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::transcript::word;
-
-    /// Words of the chosen tier. Each tier contains its own name.
-    fn chosen(names: &[&str], speaker: &str) -> Result<String> {
-        let tier = |name: &&str| {
-            let mut words = Vec::new();
-            word::push(&mut words, name, (0.0, 1.0), None).unwrap();
-            ((*name).to_owned(), words)
-        };
-        let words = words_of(names.iter().map(tier).collect(), speaker)?;
-        Ok(words.iter().map(|word| word.word.as_str()).collect::<Vec<_>>().join(" "))
-    }
-
-    #[test]
-    fn the_tier_of_the_speaker_is_chosen_or_asked_for() {
-        let of = |names: &[&str], speaker: &str| chosen(names, speaker).unwrap();
-        assert_eq!(of(&["phones", "Words", "other"], "anna"), "Words");
-        assert_eq!(of(&["Ben Ray - words", "Ben Ray - phones", "Anna - words"], "anna"), "Anna words");
-        assert_eq!(of(&["Ben Ray - words", "Anna - words"], "ben-ray"), "Ben Ray words");
-        assert_eq!(of(&["word_ben", "word_anna"], "anna"), "word_anna");
-        assert_eq!(of(&["Ben", "Anna", "phones"], "Anna"), "Anna");
-        assert_eq!(of(&["Ben", "phones"], "anna"), "Ben");
-        assert_eq!(of(&["words (old)", "words"], "anna"), "words");
-        assert_eq!(of(&["MAU", "ORT-MAU", "KAN-MAU"], "anna"), "ORT-MAU");
-        let error = |names: &[&str]| chosen(names, "carl").unwrap_err().to_string();
-        let several = error(&["Ben - words", "Anna - words"]);
-        assert!(several.contains("`Ben - words`, `Anna - words`") && several.contains("(Ben, Anna)"), "{several}");
-        assert!(error(&["Ben", "Anna"]).contains("--speaker") && error(&["Ben"; 1_000]).len() < 2_000);
-        assert!(error(&["phones", "Syllables", "MAU"]).contains("`phones`, `Syllables`, `MAU`"));
-        assert!(error(&["AH0"]).contains("contain phones") && error(&[]).contains("no interval tier"));
-    }
 }

@@ -23,7 +23,7 @@ pub fn minima(values: &[f64], order: usize) -> Vec<usize> {
 }
 
 /// `exp(-d^2 / 2 sigma^2)` with the distance d to the nearest of the sorted `times`; 0 if there are none.
-pub(crate) fn beat_proximity(time: f64, times: &[f64], sigma: f64) -> f64 {
+pub fn beat_proximity(time: f64, times: &[f64], sigma: f64) -> f64 {
     let after = times.partition_point(|other| *other < time);
     let neighbours = times.iter().skip(after.saturating_sub(1)).take(2);
     let nearest = neighbours.map(|other| (other - time).abs()).fold(f64::INFINITY, f64::min);
@@ -289,29 +289,4 @@ fn beats(pair: &PairedFrames, poses: &[[Vec3; N_JOINTS]], joints: [usize; 3], me
         |w: &[f64]| w[1] < w[0] && w[1] < w[2] && (w[0] - w[1] >= TRIMODAL_DROP || w[2] - w[1] >= TRIMODAL_DROP);
     let beats = changes.windows(3).enumerate().filter(|(_, w)| is_beat(w));
     Some(beats.map(|(i, _)| (i + 1) as f64 / pair.fps).collect())
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn minima_match_scipy() {
-        let golden: serde_json::Value =
-            serde_json::from_str(include_str!("../../../fixtures/reference/metrics_golden.json")).unwrap();
-        let values: Vec<f64> = serde_json::from_value(golden["minima"]["values"].clone()).unwrap();
-        for (order, expected) in golden["minima"]["of_order"].as_object().unwrap() {
-            let expected: Vec<usize> = serde_json::from_value(expected.clone()).unwrap();
-            assert_eq!(minima(&values, order.parse().unwrap()), expected, "order {order}");
-        }
-        assert!(minima(&[], 3).is_empty());
-        assert!(minima(&[f64::NAN, 1.0, f64::NAN], 1).is_empty());
-    }
-
-    #[test]
-    fn nearness_is_a_gaussian_of_the_distance() {
-        assert_eq!(beat_proximity(1.0, &[1.0, 3.0], 0.1), 1.0);
-        assert!((beat_proximity(1.0, &[1.1], 0.1) - (-0.5f64).exp()).abs() < 1e-9);
-        assert_eq!(beat_proximity(1.0, &[], 0.1), 0.0);
-    }
 }

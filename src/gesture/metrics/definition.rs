@@ -146,7 +146,7 @@ pub enum BodyPart {
 
 /// A joint, and the joint that its position is relative to (`None`: the neck, at the origin).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct MeasuredPoint {
+pub struct MeasuredPoint {
     pub joint: usize,
     pub origin: Option<usize>,
 }
@@ -174,46 +174,12 @@ impl BodyPart {
     }
 
     /// Joints of the part with their origins.
-    pub(crate) fn points(self) -> Vec<MeasuredPoint> {
+    pub fn points(self) -> Vec<MeasuredPoint> {
         let origin = |joint| match self {
             Self::FingersFromWrist if joint < R_HAND => Some(L_WRIST),
             Self::FingersFromWrist => Some(R_WRIST),
             _ => None,
         };
         self.joints().into_iter().map(|joint| MeasuredPoint { joint, origin: origin(joint) }).collect()
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use serde_json::json;
-
-    #[test]
-    fn the_hash_depends_on_everything_but_the_order_of_keys() {
-        let definition = |parameters| Definition {
-            formula: "share",
-            undefined: "never",
-            parameters,
-            ..Definition::new("pck_3d", "all", "1", Better::Higher)
-        };
-        let one = definition(json!({"alpha": 0.2, "fps": [15, 1]}));
-        assert_eq!(one.hash(), definition(json!({"fps": [15, 1], "alpha": 0.2})).hash());
-        assert_ne!(one.hash(), definition(json!({"alpha": 0.1, "fps": [15, 1]})).hash());
-        assert_ne!(one.hash(), Definition { part: "body", ..one.clone() }.hash());
-        assert_ne!(one.hash(), Definition { formula: "part", ..one.clone() }.hash());
-        assert_eq!((one.hash().len(), one.label()), (16, "pck_3d@0.2 all".into()));
-    }
-
-    #[test]
-    fn parts_have_their_documented_joints() {
-        let n = |part: BodyPart| part.joints().len();
-        assert_eq!(
-            [BodyPart::All, BodyPart::WithNeck, BodyPart::Body, BodyPart::Hands, BodyPart::Wrists].map(n),
-            [48, 49, 6, 40, 2]
-        );
-        let fingers = BodyPart::FingersFromWrist.points();
-        assert!(fingers.contains(&MeasuredPoint { joint: 8, origin: Some(L_WRIST) }));
-        assert!(fingers.contains(&MeasuredPoint { joint: 29, origin: Some(R_WRIST) }));
     }
 }

@@ -142,7 +142,7 @@ fn remedy() -> String {
 }
 
 /// Input for the subprocess: the number of words, then one word per line.
-fn header(words: &[SpokenWord]) -> String {
+pub fn header(words: &[SpokenWord]) -> String {
     let mut header = format!("{}\n", words.len());
     for SpokenWord { word, within } in words {
         // Words contain no spaces; other control characters are removed.
@@ -155,7 +155,8 @@ fn header(words: &[SpokenWord]) -> String {
     header
 }
 
-fn times(line: &str) -> Result<Option<AlignedWord>> {
+/// Times of a word in a line that `align.py` writes; `None` for a word that was not found.
+pub fn times(line: &str) -> Result<Option<AlignedWord>> {
     let numbers: Vec<f64> = line.split('\t').filter_map(|part| part.parse().ok()).collect();
     match numbers[..] {
         _ if line == "-" => Ok(None),
@@ -172,25 +173,4 @@ fn last_line(output_text: &[u8]) -> String {
         .find(|line| !line.is_empty())
         .unwrap_or("")
         .to_owned()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn words_and_times_are_exchanged_as_lines() {
-        let words = [("so\u{7}", None), ("well", Some((0.5, 2.0)))];
-        let words = words.map(|(word, within)| SpokenWord { word: word.to_owned(), within });
-        assert_eq!(header(&words), "2\nso\t-\t-\nwell\t0.5\t2\n");
-        let expected = AlignedWord { start_secs: 0.5, end_secs: 0.75, confidence: 1.0 };
-        assert_eq!(times("0.50\t0.75\t1.00").unwrap(), Some(expected));
-        assert!(times("-").unwrap().is_none() && times("0.5\tx").is_err());
-    }
-
-    #[test]
-    fn missing_interpreter_is_reported_with_the_remedy() {
-        let error = Aligner::version(Path::new("/nowhere/python")).unwrap_err().to_string();
-        assert!(error.contains("/nowhere/python") && error.contains("pocketsphinx==5.1.1"), "{error}");
-    }
 }

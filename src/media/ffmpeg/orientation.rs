@@ -7,13 +7,14 @@ use orator_base::types::image::Image;
 /// Transform from the coded to the upright image: the x and y axes of the coded image point along `x` and `y` in the
 /// upright image, each a unit step (right and down are positive). Right angles and mirroring only.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Orientation {
-    x: [i8; 2],
-    y: [i8; 2],
+pub struct Orientation {
+    pub x: [i8; 2],
+    pub y: [i8; 2],
 }
 
 impl Orientation {
-    pub(crate) const UPRIGHT: Self = Self { x: [1, 0], y: [0, 1] };
+    /// Coded pixels are shown as they are.
+    pub const UPRIGHT: Self = Self { x: [1, 0], y: [0, 1] };
 
     /// Orientation from the display matrix of a stream (nine 16.16 numbers; the first two rows are the images of the
     /// axes), snapped to right angles.
@@ -32,12 +33,12 @@ impl Orientation {
     }
 
     /// Orientation with left and right of the upright image swapped.
-    pub(crate) fn mirrored(self) -> Self {
+    pub fn mirrored(self) -> Self {
         Self { x: [-self.x[0], self.x[1]], y: [-self.y[0], self.y[1]] }
     }
 
     /// Clockwise rotation from coded to upright image, degrees: 0, 90, 180 or 270.
-    pub(crate) fn degrees(self) -> u32 {
+    pub fn degrees(self) -> u32 {
         match self.x {
             [1, _] => 0,
             [_, 1] => 90,
@@ -52,7 +53,7 @@ impl Orientation {
     }
 
     /// Converts a coded image to an upright one.
-    pub(crate) fn apply(self, coded: Image) -> Image {
+    pub fn apply(self, coded: Image) -> Image {
         if self == Self::UPRIGHT {
             return coded;
         }
@@ -72,41 +73,5 @@ impl Orientation {
             }
         }
         upright
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn two_by_three() -> Image {
-        Image { width: 2, height: 3, data: (0..6u8).flat_map(|v| [v; 3]).collect() }
-    }
-
-    fn reds(image: &Image) -> Vec<u8> {
-        image.data.iter().step_by(3).copied().collect()
-    }
-
-    #[test]
-    fn rotates_and_mirrors() {
-        // 0 1        4 2 0        5 4        1 3 5        1 0
-        // 2 3  cw->  5 3 1   180  3 2   ccw  0 2 4  flip  3 2
-        // 4 5                     1 0                     5 4
-        let cases = [
-            (Orientation { x: [0, 1], y: [-1, 0] }, 90, [3, 2], [4, 2, 0, 5, 3, 1]),
-            (Orientation { x: [-1, 0], y: [0, -1] }, 180, [2, 3], [5, 4, 3, 2, 1, 0]),
-            (Orientation { x: [0, -1], y: [1, 0] }, 270, [3, 2], [1, 3, 5, 0, 2, 4]),
-            (Orientation { x: [-1, 0], y: [0, 1] }, 180, [2, 3], [1, 0, 3, 2, 5, 4]),
-            (Orientation::UPRIGHT, 0, [2, 3], [0, 1, 2, 3, 4, 5]),
-        ];
-        for (orientation, degrees, size, expected) in cases {
-            let upright = orientation.apply(two_by_three());
-            assert_eq!(orientation.degrees(), degrees);
-            assert_eq!([upright.width, upright.height], size);
-            assert_eq!(reds(&upright), expected);
-            let mirrored = orientation.mirrored().apply(two_by_three());
-            let reversed = expected.chunks(size[0]).flat_map(|row| row.iter().rev().copied()).collect::<Vec<_>>();
-            assert_eq!(reds(&mirrored), reversed);
-        }
     }
 }

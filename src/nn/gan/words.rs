@@ -16,7 +16,7 @@ pub const N_TIMES: usize = 2;
 /// Range of the initial embeddings.
 const INITIAL: f64 = 0.03;
 /// Number of frames that the convolution reads.
-const KERNEL: usize = 31;
+pub const KERNEL: usize = 31;
 
 /// Words at the pose frames of a batch of sounds.
 #[derive(Clone, Debug)]
@@ -45,8 +45,9 @@ impl WordFrames {
 
 /// Embedding table, and the convolution to the width of the last layer.
 pub struct WordLayer {
-    table: Tensor,
-    output: Conv,
+    /// [vocabulary, dim]
+    pub table: Tensor,
+    pub output: Conv,
 }
 
 impl WordLayer {
@@ -76,52 +77,5 @@ impl WordLayer {
         let vectors = table.index_select(&numbers.flatten_all()?, 0)?.reshape((batch, n_frames, table.dim(1)?))?;
         let spoken = Tensor::cat(&[&vectors, times], 2)?;
         Tensor::cat(&[encoded, &self.output.forward(&spoken)?], 2)
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::gan::generator::{Config, Generator, Preset};
-    use crate::ops::gradcheck::{pattern, worst};
-    use candle_core::Device;
-
-    fn frames() -> Result<WordFrames> {
-        let numbers = Tensor::new(&[[0u32, 2, 2, 4, 0], [3, 3, 1, 0, 2]], &Device::Cpu)?;
-        Ok(WordFrames { numbers, times: pattern(&[2, 5, N_TIMES], 0.7)?, added: None })
-    }
-
-    #[test]
-    fn gradients_of_table_and_audio_are_correct() -> Result<()> {
-        let inputs = [pattern(&[2, 5, 6], 0.0)?, pattern(&[5, 3], 1.0)?];
-        let output = Conv::new(&mut Params::with_dtype(0, DType::F64), "output", &[6, 5, KERNEL], 1)?;
-        let error = worst(&inputs, |v| {
-            WordLayer { table: v[1].clone(), output: output.clone() }.forward(&v[0], Some(&frames()?))?.sqr()
-        })?;
-        assert!(error < 1e-7, "{error}");
-        Ok(())
-    }
-
-    #[test]
-    fn added_vectors_follow_those_of_the_table_and_missing_words_are_padding() -> Result<()> {
-        let mut params = Params::with_dtype(0, DType::F64);
-        let config = Config { width: 8, vocabulary: 4, word: 3, ..Config::from_preset(Preset::Light, 2) };
-        let net = Generator::new(&mut params, &config)?;
-        let mels = pattern(&[2, 64, 33], 0.0)?;
-        let run = |words: Option<&WordFrames>| -> Result<Vec<f64>> {
-            net.decode(&net.frames(&mels, &[], words, 5, false)?, false)?.flatten_all()?.to_vec1()
-        };
-        let words = |added| Ok::<_, candle_core::Error>(WordFrames { added, ..frames()? });
-        assert!(run(Some(&words(None)?)).is_err(), "index 4 is after the table");
-        let [first, second] = [0.0, 5.0].map(|phase| run(Some(&words(Some(pattern(&[1, 3], phase)?))?)));
-        assert_ne!(first?, second?);
-        let none = WordFrames {
-            numbers: Tensor::zeros((2, 5), DType::U32, &Device::Cpu)?,
-            times: Tensor::zeros((2, 5, N_TIMES), DType::F64, &Device::Cpu)?,
-            added: None,
-        };
-        assert_eq!(run(None)?, run(Some(&none))?);
-        assert!(run(Some(&none.part(1..3)?)).is_err(), "other number of frames");
-        Ok(())
     }
 }

@@ -120,30 +120,3 @@ impl PictureBlock {
         product / (self.norm * norm.max(MIN_DEVIATION * BLOCK as f32))
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::extract::thumbnail;
-
-    fn scene(seed: usize, shift: usize, light: f64) -> Thumbnail {
-        Thumbnail::new(thumbnail::scene(seed, shift, light))
-    }
-
-    #[test]
-    fn light_is_ignored_and_camera_movement_is_detected() {
-        let a = scene(1, 0, 1.0);
-        assert!(missing(&a, &[&scene(1, 0, 0.4)], 0.75) == 0.0 && edge_correlation(&a, &scene(1, 0, 0.4)) > 0.99);
-        assert!(missing(&a, &[&scene(1, 6, 1.0)], 0.75) < 0.3 && moved(&a, &scene(1, 6, 1.0)) > 0.7);
-        assert_eq!(moved(&a, &scene(1, 0, 0.7)), 0.0);
-    }
-
-    #[test]
-    fn another_scene_is_missing_and_a_flat_one_too() {
-        let (a, b) = (scene(1, 0, 1.0), scene(2, 0, 1.0));
-        assert!(missing(&a, &[&b], 0.75) > 0.9 && edge_correlation(&a, &b) < 0.2 && moved(&a, &b) < 0.1);
-        let black = scene(1, 0, 0.0);
-        assert!(missing(&a, &[&black], 0.75) == 1.0 && missing(&black, &[&a], 0.75) == 1.0);
-        assert_eq!((edge_correlation(&a, &black), moved(&black, &a)), (0.0, 0.0));
-    }
-}

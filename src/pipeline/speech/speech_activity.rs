@@ -4,6 +4,7 @@
 
 use crate::sound;
 use anyhow::{Context, Result, ensure};
+use orator_base::math::runs::true_ranges;
 use orator_base::types::time::FrameRate;
 use orator_onnx::speech::{SpeechModel, WINDOW};
 use std::ops::Range;
@@ -37,15 +38,10 @@ pub fn ranges(path: &Path, model: &mut SpeechModel) -> Result<Vec<Range<f64>>> {
     Ok(ranges_of(&is_speech(&probabilities(path, model)?)))
 }
 
-fn ranges_of(speech: &[bool]) -> Vec<Range<f64>> {
+/// Ranges of neighbouring windows with speech, seconds.
+pub fn ranges_of(speech: &[bool]) -> Vec<Range<f64>> {
     let secs = |window: usize| (window * WINDOW) as f64 / f64::from(RATE);
-    let mut start = 0;
-    let ranges = speech.chunk_by(|a, b| a == b).map(|run| {
-        let range = secs(start)..secs(start + run.len());
-        start += run.len();
-        (run[0], range)
-    });
-    ranges.filter_map(|(is_speech, range)| is_speech.then_some(range)).collect()
+    true_ranges(speech).map(|range| secs(range.start)..secs(range.end)).collect()
 }
 
 /// Speech probability of every window of 512 samples of a wav file, read as a stream.
@@ -65,7 +61,7 @@ pub fn probabilities(path: &Path, model: &mut SpeechModel) -> Result<Vec<f32>> {
 }
 
 /// Windows with speech: from a probability of 0.5 until it stays below 0.35 for 0.1 s; those below 0.25 s are dropped.
-fn is_speech(probabilities: &[f32]) -> Vec<bool> {
+pub fn is_speech(probabilities: &[f32]) -> Vec<bool> {
     let windows = |secs: f64| (secs * f64::from(RATE) / WINDOW as f64).round() as usize;
     let (hangover, shortest) = (windows(HANGOVER_SECS), windows(MIN_SPEECH_SECS));
     let mut speech = vec![false; probabilities.len()];
@@ -93,7 +89,7 @@ fn is_speech(probabilities: &[f32]) -> Vec<bool> {
 }
 
 /// Share of windows with speech within 2 s of the centre of each frame.
-fn shares_of(speech: &[bool], fps: FrameRate, n_frames: usize) -> Vec<f32> {
+pub fn shares_of(speech: &[bool], fps: FrameRate, n_frames: usize) -> Vec<f32> {
     let mut sums = vec![0_u32];
     for &speech in speech {
         sums.push(sums.last().unwrap_or(&0) + u32::from(speech));
@@ -112,57 +108,4 @@ fn shares_of(speech: &[bool], fps: FrameRate, n_frames: usize) -> Vec<f32> {
         (sums[around.end] - sums[around.start]) as f32 / around.len().max(1) as f32
     };
     (0..n_frames).map(share).collect()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    const FPS: FrameRate = FrameRate::new(15, 1);
-
-    /// Probabilities of segments given as (probability, number of windows).
-    fn segments(segments: &[(f32, usize)]) -> Vec<f32> {
-        segments.iter().flat_map(|(probability, n)| vec![*probability; *n]).collect()
-    }
-
-    fn n_speech(of: &[(f32, usize)]) -> usize {
-        is_speech(&segments(of)).into_iter().filter(|speech| *speech).count()
-    }
-
-    #[test]
-    fn speech_segments_have_hysteresis_and_a_least_length() {
-        assert_eq!(n_speech(&[(0.1, 20), (0.9, 20), (0.1, 20)]), 20);
-        // Between the two thresholds speech continues but does not start.
-        assert_eq!(n_speech(&[(0.4, 20), (0.9, 10), (0.4, 20), (0.1, 20)]), 30);
-        // 0.1 s of silence is bridged, longer silence is not.
-        assert_eq!(n_speech(&[(0.9, 10), (0.0, 3), (0.9, 10)]), 23);
-        assert_eq!(n_speech(&[(0.9, 10), (0.0, 4), (0.9, 10)]), 20);
-        // Claps are too short to be speech.
-        assert_eq!(n_speech(&[(0.9, 4), (0.0, 10), (0.9, 6), (0.0, 10), (0.9, 3)]), 0);
-        assert_eq!(is_speech(&[]), [false; 0]);
-    }
-
-    #[test]
-    fn ranges_are_in_seconds() {
-        // Windows of 32 ms; the claps are too short to be speech.
-        let speech = is_speech(&segments(&[(0.0, 100), (0.9, 100), (0.0, 50), (0.9, 4), (0.0, 50), (0.9, 25)]));
-        assert_eq!(ranges_of(&speech), [3.2..6.4, 9.728..10.528]);
-        assert!(ranges_of(&[false; 9]).is_empty() && ranges_of(&[]).is_empty());
-    }
-
-    #[test]
-    fn shares_cover_the_seconds_around_a_frame() {
-        // 10 s of speech, 10 s without; 31.25 windows per second.
-        let speech = is_speech(&segments(&[(0.9, 312), (0.0, 313)]));
-        let shares = shares_of(&speech, FPS, 310);
-        assert_eq!((shares[0], shares[60], shares[220]), (1.0, 1.0, 0.0));
-        assert!((shares[150] - 0.5).abs() < 0.02 && shares[130] > 0.8 && shares[170] < 0.2, "{}", shares[150]);
-        // The audio ends after 20 s.
-        assert!(!shares[299].is_nan() && shares[301].is_nan());
-        assert!(shares_of(&[], FPS, 3).iter().all(|share| share.is_nan()));
-        // One-second pauses between sentences leave a share of more than half.
-        let sentences = segments(&[(0.9, 60), (0.0, 31)]).repeat(8);
-        let shares = shares_of(&is_speech(&sentences), FPS, 340);
-        assert!(shares[..320].iter().all(|share| *share >= 0.5), "{shares:?}");
-    }
 }

@@ -130,7 +130,8 @@ fn legend(videos: &[VideoSummary]) -> Node {
 /// Label of a video that no stage has finished.
 pub const WAITING: &str = "not processed";
 
-const fn quantity(rejection: Rejection) -> &'static str {
+/// What the rule of a reason measures, in words.
+pub const fn quantity(rejection: Rejection) -> &'static str {
     match rejection {
         Rejection::NoSound => "share of frames with audio",
         Rejection::Quiet => "loudness",
@@ -186,29 +187,4 @@ pub fn description(rejected: &RejectedInterval) -> String {
 
 pub fn class(reason: &str) -> String {
     if find(reason).is_some() { format!("r-{}", reason.replace(' ', "-")) } else { "r-unknown".to_owned() }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use orator_base::stage::rejection::FrameRejection;
-
-    #[test]
-    fn every_reason_has_a_label_a_heading_and_a_colour() {
-        let style = include_str!("page.css");
-        for rejection in Rejection::JUDGED {
-            let reason = rejection.reason();
-            assert!(quantity(rejection) != "measured", "{reason}");
-            assert!(!heading(reason).is_empty(), "{reason}");
-            assert!(style.contains(&format!(".{} ", class(reason))), "{reason} has no colour");
-        }
-        assert_eq!(
-            (class("<b>").as_str(), order("new"), Rejection::label("new")),
-            ("r-unknown", Rejection::JUDGED.len(), "new")
-        );
-        let quiet = RejectedInterval::new(0.0, 1.0, FrameRejection::new(Rejection::Quiet, -62.0, -50.0));
-        assert!(description(&quiet).ends_with(": loudness -62 dB, threshold -50 dB"));
-        let other = RejectedInterval { reason: "new".to_owned(), message: "new rule".to_owned(), ..quiet };
-        assert_eq!(description(&other), "new rule: measured -62 dB, threshold -50 dB");
-    }
 }

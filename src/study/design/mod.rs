@@ -1,7 +1,7 @@
 //! Experimental design: clips are allocated to tasks, conditions and screen sides are balanced over the sessions, and
 //! attention checks are inserted among the trials.
 
-mod clip_scheduler;
+pub mod clip_scheduler;
 mod design;
 mod designer;
 mod task_design;

@@ -8,7 +8,7 @@ mod study_file;
 
 pub use condition::{ConditionSource, StudyCondition, fill_pattern};
 pub use layers::StudyPreset;
-pub use read::EXAMPLE;
+pub use read::{EXAMPLE, resolve};
 pub use study_file::{
     AnalysisSettings, ClipReuse, ClipSettings, ExclusionRules, FilmLayout, FilmSettings, HypothesisKind,
     MismatchedClip, StudyFile, StudyHypothesis, StudySpeaker, StudyTask, TaskOrder,

@@ -219,7 +219,7 @@ fn of_file(path: &Path, fps: FrameRate, n_frames: usize) -> Result<Motion> {
 }
 
 /// For each clip the index of a different one, from another segment if possible; a permutation (a rotation).
-fn mismatched_clips(clips: &[StudyClip]) -> Vec<usize> {
+pub fn mismatched_clips(clips: &[StudyClip]) -> Vec<usize> {
     let n = clips.len();
     let n_near = |shift: &usize| (0..n).filter(|at| clips[*at].segment == clips[(at + shift) % n].segment).count();
     let shift = (1..n).min_by_key(n_near).unwrap_or(0);
@@ -318,30 +318,5 @@ impl CommonBody {
             let _ = all.append(Axis(0), motion.joints.view());
         }
         Self { lengths, rig: Rig::from_motion(&Motion::from_joints(fps, all)) }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn mismatched_clips_differ_and_come_from_other_segments_if_possible() {
-        let clip = |segment: usize| StudyClip {
-            name: String::new(),
-            segment,
-            frames: 0..9,
-            cut_db: 0.0,
-            hidden_share: 0.0,
-            strokes_per_minute: None,
-        };
-        let of =
-            |segments: &[usize]| mismatched_clips(&segments.iter().map(|segment| clip(*segment)).collect::<Vec<_>>());
-        assert_eq!(of(&[0, 0, 1, 1]), [2, 3, 0, 1]);
-        assert_eq!(of(&[0, 0, 0]), [1, 2, 0]);
-        let segments = [0, 0, 0, 1, 2, 2];
-        let others = of(&segments);
-        assert!((0..6).all(|at| others[at] != at && others.contains(&at)));
-        assert!((0..6).all(|at| segments[at] != segments[others[at]]), "{others:?}");
     }
 }

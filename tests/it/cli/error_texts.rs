@@ -1,7 +1,7 @@
 //! Error texts of the program, stored in `tests/it/snapshots`: each states the position, the expected value and what to
 //! do. Paths of the test are redacted.
 
-use crate::fixtures::untrained::write_untrained_speaker;
+use crate::fixtures::models::untrained::write_untrained_speaker;
 use ndarray::Array3;
 use ndarray_npy::NpzWriter;
 use orator_test_support::project::Project;

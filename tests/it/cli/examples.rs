@@ -2,7 +2,7 @@
 
 #![allow(dead_code)] // their `main`
 
-use crate::fixtures::untrained::write_untrained_speaker;
+use crate::fixtures::models::untrained::write_untrained_speaker;
 use crate::fixtures::{clips, footage, gesture_dataset};
 use orator_base::stage::Unit;
 use orator_base::stage::artifacts::Artifact;

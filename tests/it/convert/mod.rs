@@ -5,3 +5,4 @@ pub(crate) mod ncnn;
 pub(crate) mod published;
 pub(crate) mod tfjs;
 pub(crate) mod tflite;
+pub(crate) mod unit;

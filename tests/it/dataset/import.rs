@@ -338,7 +338,8 @@ fn a_dataset_without_audio_is_rejected_by_training() {
     assert!(fs::read_to_string(out.join("README.md")).unwrap().contains("There is no sound"));
     let dataset = orator_dataset::Dataset::open(&out).unwrap();
     let settings = orator_dataset::config::Settings::default().gan;
-    let error =
-        orator_gesture::train::gan::train::train(&dataset, &settings, &dir.path().join("gan"), &Silent).err().unwrap();
+    let error = crate::fixtures::models::training::train_gan(&dataset, &settings, &dir.path().join("gan"), &Silent)
+        .err()
+        .unwrap();
     assert!(error.to_string().contains("imported without audio"), "{error:#}");
 }

@@ -4,7 +4,8 @@
 use crate::fixtures::animation::captures::write_capture;
 use crate::fixtures::browser::Browser;
 use crate::fixtures::gesture_dataset::{FPS, dataset};
-use crate::fixtures::untrained::write_untrained_sequence;
+use crate::fixtures::models::training::train_seq2seq;
+use crate::fixtures::models::untrained::write_untrained_sequence;
 use crate::fixtures::write_dataset::write_dataset;
 use orator_base::motion::{bones, resample};
 use orator_base::stage::progress::Silent;
@@ -24,7 +25,6 @@ use orator_formats::word_vectors::glove;
 use orator_gesture::generate::seq2seq::architecture::Architecture;
 use orator_gesture::train::seq2seq::captures::CaptureFolder;
 use orator_gesture::train::seq2seq::source::TrainingSource;
-use orator_gesture::train::seq2seq::train::train;
 use orator_media::ffmpeg::audio;
 use orator_test_support::project::{ProgramAnswer, Project};
 use serde_json::Value;
@@ -41,7 +41,7 @@ fn train_sequence(source: TrainingSource, network: SequenceNetwork, out: &Path) 
         ..Default::default()
     };
     let settings = Seq2seqConfig { network, batch: 3.into(), hidden: 8, stride_frames: 5.into(), ..schedule };
-    train(source, None, &settings, out, &Silent).unwrap();
+    train_seq2seq(source, None, &settings, out, &Silent).unwrap();
 }
 
 fn train_gan(project: &Project, data: &str, out: &str) {

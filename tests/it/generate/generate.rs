@@ -4,8 +4,8 @@
 use crate::fixtures::animation::bvh::{Bvh, worst_mm};
 use crate::fixtures::clips;
 use crate::fixtures::figures::{FPS, swinging};
+use crate::fixtures::models::untrained::{generate, write_untrained_speaker};
 use crate::fixtures::networks::value;
-use crate::fixtures::untrained::{generate, write_untrained_speaker};
 use candle_core::{Device, Tensor};
 use ndarray::{Axis, s};
 use orator_avatar::animate::{AnimationOptions, perform};

@@ -3,7 +3,7 @@
 
 use crate::fixtures::clips;
 use crate::fixtures::figures::FPS;
-use crate::fixtures::untrained::{generate, write_untrained_speaker};
+use crate::fixtures::models::untrained::{generate, write_untrained_speaker};
 use orator_base::types::sound::Sound;
 use orator_formats::npy;
 use orator_formats::wav;

@@ -2,7 +2,7 @@
 //! generated again, and each motion depends on its own audio only.
 
 use crate::fixtures::clips;
-use crate::fixtures::untrained::{generate, write_untrained_speaker};
+use crate::fixtures::models::untrained::{generate, write_untrained_speaker};
 use orator_formats::wav;
 use rustix::process::{Pid, Signal, kill_process};
 use serde_json::Value;

@@ -2,7 +2,7 @@
 //! state at seams; dubious input is reported, invalid input named.
 
 use crate::fixtures::animation::captures::{tone, write_stereo};
-use crate::fixtures::untrained::{generate, write_untrained_sequence, write_untrained_speaker};
+use crate::fixtures::models::untrained::{generate, write_untrained_sequence, write_untrained_speaker};
 use orator_base::types::sound::Sound;
 use orator_formats::bvh::read::Bvh;
 use orator_formats::transcript::{Word, WordSource};

@@ -2,7 +2,7 @@
 //! networks of every kind.
 
 use crate::fixtures::figures::{FPS, swinging};
-use crate::fixtures::untrained::{generate, write_untrained_sequence, write_untrained_speaker};
+use crate::fixtures::models::untrained::{generate, write_untrained_sequence, write_untrained_speaker};
 use candle_core::{Device, Tensor as CandleTensor};
 use ndarray::{ArrayView3, Axis};
 use orator_avatar::animate::rig::rig::bone_metres;

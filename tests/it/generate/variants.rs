@@ -2,7 +2,7 @@
 //! trained without dropout has one variant.
 
 use crate::fixtures::clips;
-use crate::fixtures::untrained::{generate, write_untrained_speaker};
+use crate::fixtures::models::untrained::{generate, write_untrained_speaker};
 use orator_formats::wav;
 use orator_nn::weights::Contents;
 use std::path::Path;

@@ -1,10 +1,10 @@
 //! Discriminators of sequence-to-sequence networks.
 
 use candle_core::{DType, Result};
-use orator_nn::ops::gradcheck::pattern;
 use orator_nn::params::Params;
 use orator_nn::seq2seq::adversarial::SegmentDiscriminator;
 use orator_nn::seq2seq::config::Config;
+use orator_test_support::gradcheck::pattern;
 
 #[test]
 fn the_default_has_the_published_layout() -> Result<()> {

@@ -5,7 +5,7 @@ use candle_core::{Result, Tensor};
 use orator_nn::cpu::axis::ConvAxis;
 use orator_nn::cpu::direct_conv::ConvSizes;
 use orator_nn::ops::conv2d::{conv, same, valid};
-use orator_nn::ops::gradcheck::{check_thread_independence, max_difference, pattern, worst};
+use orator_test_support::gradcheck::{check_thread_independence, max_difference, pattern, worst};
 
 /// Input, weight and bias of a batch of two.
 fn inputs(s: &ConvSizes) -> Result<[Tensor; 3]> {

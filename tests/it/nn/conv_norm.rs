@@ -5,8 +5,8 @@ use candle_core::{DType, Result, Tensor};
 use orator_nn::ops::batch_norm::BatchNorm;
 use orator_nn::ops::conv_norm::conv_norm;
 use orator_nn::ops::conv2d;
-use orator_nn::ops::gradcheck::{check_thread_independence, max_difference, pattern};
 use orator_nn::params::Params;
+use orator_test_support::gradcheck::{check_thread_independence, max_difference, pattern};
 
 /// Inputs, kernels and strides like the networks', but small: over time, over time and frequency, even and odd.
 const LAYERS: [(&[usize], &[usize], usize); 8] = [

@@ -2,10 +2,10 @@
 
 use candle_core::{Result, Tensor, Var};
 use orator_nn::cpu::vectorised::DropMask;
-use orator_nn::ops::gradcheck::{check_thread_independence, max_difference, pattern, worst};
 use orator_nn::ops::recurrent::cell::GruSizes;
 use orator_nn::ops::recurrent::decoder::{DecoderInputs, DecoderWeights, TruePoses, decode};
 use orator_nn::ops::recurrent::gru::{GruOptions, gru};
+use orator_test_support::gradcheck::{check_thread_independence, max_difference, pattern, worst};
 
 const CELL: GruSizes = GruSizes { input: 3, hidden: 4 };
 

@@ -2,9 +2,9 @@
 
 use candle_core::{Result, Tensor};
 use orator_nn::cpu::vectorised::DropMask;
-use orator_nn::ops::gradcheck::{check_thread_independence, max_difference, pattern, worst};
 use orator_nn::ops::recurrent::cell::GruSizes;
 use orator_nn::ops::recurrent::gru::{GruOptions, gru};
+use orator_test_support::gradcheck::{check_thread_independence, max_difference, pattern, worst};
 
 /// A unidirectional GRU composed of candle's operators.
 fn composed(x: &Tensor, first: &Tensor, weights: &Tensor, reverse: bool) -> Result<Tensor> {

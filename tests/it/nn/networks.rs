@@ -2,12 +2,12 @@
 
 use candle_core::{DType, Device, Result, Tensor};
 use orator_nn::Mode;
-use orator_nn::ops::gradcheck::pattern;
 use orator_nn::params::Params;
 use orator_nn::seq2seq::autoencoder::AudioBaseline;
 use orator_nn::seq2seq::config::{Config, Segment};
 use orator_nn::seq2seq::networks::{ContextSeq2Seq, WordsSeq2Seq};
 use orator_nn::seq2seq::predict::{GesturePredictor, TruePoses};
+use orator_test_support::gradcheck::pattern;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 

@@ -2,11 +2,11 @@
 
 use candle_core::{Device, Result, Tensor};
 use orator_nn::Mode;
-use orator_nn::ops::gradcheck::pattern;
 use orator_nn::params::Params;
 use orator_nn::seq2seq::config::{Config, Segment};
 use orator_nn::seq2seq::networks::WordsSeq2Seq;
 use orator_nn::seq2seq::predict::{GesturePredictor, StateAtSeams, generate};
+use orator_test_support::gradcheck::pattern;
 
 /// Adds 1, or 100 if the segment's word is 1, to the last pose at every step, and counts segments in its state.
 struct Counting(Config);

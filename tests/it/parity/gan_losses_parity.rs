@@ -5,7 +5,7 @@ use candle_core::{DType, Device, Result, Tensor, Var};
 use orator_dataset::config::{AdversarialLoss, BoneLoss};
 use orator_gesture::generate::normalisation::{N_FEATURES, Normalisation};
 use orator_gesture::train::gan::losses::{BoneConstancy, discriminator_loss, generator_loss};
-use orator_nn::ops::gradcheck::pattern;
+use orator_test_support::gradcheck::pattern;
 use std::collections::BTreeMap;
 
 #[derive(serde::Deserialize)]

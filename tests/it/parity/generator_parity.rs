@@ -7,8 +7,8 @@ use candle_core::{DType, Result, Tensor, Var};
 use orator_nn::cpu::axis::ConvAxis;
 use orator_nn::gan::discriminator::Discriminator;
 use orator_nn::gan::generator::{Config, Generator, Preset};
-use orator_nn::ops::gradcheck::pattern;
 use orator_nn::params::Params;
+use orator_test_support::gradcheck::pattern;
 use std::collections::BTreeMap;
 
 #[derive(serde::Deserialize)]

@@ -5,8 +5,8 @@ use crate::fixtures::networks::fill;
 use candle_core::{DType, Device, Tensor};
 use orator_nn::Mode;
 use orator_nn::lifter::heatmap_network::{HeatmapLifter, NAME};
-use orator_nn::ops::gradcheck::pattern;
 use orator_nn::params::Params;
+use orator_test_support::gradcheck::pattern;
 
 #[derive(serde::Deserialize)]
 struct Golden {

@@ -1,7 +1,7 @@
 //! Files of an earlier version (`fixtures/before`) remain readable: a dataset, a work folder and a GAN checkpoint, of
 //! which only the header is stored; a formula generates its weights.
 
-use crate::fixtures::untrained::generate;
+use crate::fixtures::models::untrained::generate;
 use orator_dataset::verify::verify::verify;
 use orator_dataset::{Dataset, Split};
 use orator_test_support::project::{Project, files_under};

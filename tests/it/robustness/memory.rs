@@ -6,7 +6,7 @@ use crate::fixtures::clips;
 use crate::fixtures::clips::ffmpeg;
 use crate::fixtures::keypoints::keypoints;
 use crate::fixtures::media::recogniser::write_recogniser;
-use crate::fixtures::untrained::write_untrained_speaker;
+use crate::fixtures::models::untrained::write_untrained_speaker;
 use ndarray::{Array3, s};
 use ndarray_npy::NpzWriter;
 use orator_formats::wav;

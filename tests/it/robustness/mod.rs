@@ -17,3 +17,4 @@ pub(crate) mod privacy;
 pub(crate) mod process;
 pub(crate) mod runner;
 pub(crate) mod sandbox;
+pub(crate) mod unit;

@@ -1,8 +1,8 @@
 //! Films of all kinds of conditions differ only in motion.
 
+use crate::fixtures::models::untrained::{write_untrained_sequence, write_untrained_speaker};
 use crate::fixtures::study::films::{SIZE, speaker};
 use crate::fixtures::study::mp4;
-use crate::fixtures::untrained::{write_untrained_sequence, write_untrained_speaker};
 use orator_base::stage::progress::Silent;
 use orator_base::types::split::Split;
 use orator_base::types::time::FrameRate;

@@ -2,6 +2,7 @@
 
 use crate::fixtures::faults::stop::bytes;
 use crate::fixtures::gesture_dataset::{FPS, dataset, dataset_of, sample, with_posture};
+use crate::fixtures::models::training::train_gan;
 use crate::fixtures::write_dataset::write_dataset;
 use orator::Evaluation;
 use orator_base::stage::progress::Silent;
@@ -15,7 +16,6 @@ use orator_gesture::evaluate::table::result;
 use orator_gesture::generate::GestureGenerator;
 use orator_gesture::generate::model::BEST;
 use orator_gesture::metrics::settings::MetricSettings;
-use orator_gesture::train::gan::train::train;
 
 /// Settings of a training that takes seconds.
 fn settings(channels: &[PostureChannel]) -> GanConfig {
@@ -51,7 +51,7 @@ fn head_and_trunk_follow_held_out_audio() {
     write_dataset(&dataset_folder, "host", FPS, &samples).unwrap();
     let dataset = Dataset::open(&dataset_folder).unwrap();
     let out = folder.path().join("out");
-    let outcome = train(&dataset, &settings(&PostureChannel::ALL), &out, &Silent).unwrap();
+    let outcome = train_gan(&dataset, &settings(&PostureChannel::ALL), &out, &Silent).unwrap();
     let errors = &outcome.validation.channels;
     assert_eq!(errors.keys().copied().collect::<Vec<_>>(), PostureChannel::ALL);
     assert!(errors.values().all(|of| of.generator < 0.5 * of.mean_pose), "{errors:?}");
@@ -97,7 +97,7 @@ fn without_channels_the_posture_of_a_dataset_is_ignored() {
         (dataset(&folder.path().join("plain")), dataset_of(&folder.path().join("posed"), with_posture));
     let trained = |dataset: &Dataset, name: &str, settings: GanConfig| {
         let out = folder.path().join(name);
-        train(dataset, &settings, &out, &Silent).unwrap();
+        train_gan(dataset, &settings, &out, &Silent).unwrap();
         (bytes(&out), checkpoint::facts(&out.join(BEST)).unwrap().to_string(), out)
     };
     let (of_plain, facts, out) = trained(&plain, "a", few(&[]));
@@ -117,6 +117,6 @@ fn without_channels_the_posture_of_a_dataset_is_ignored() {
     let posture = posture.unwrap();
     assert!(posture.head.iter().all(|v| v.is_nan()) && posture.trunk.iter().all(|v| v.is_finite()));
 
-    let error = train(&plain, &few(&[PostureChannel::Head]), &folder.path().join("d"), &Silent).unwrap_err();
+    let error = train_gan(&plain, &few(&[PostureChannel::Head]), &folder.path().join("d"), &Silent).unwrap_err();
     assert!(format!("{error:#}").contains("posture = true"), "{error:#}");
 }

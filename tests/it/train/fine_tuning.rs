@@ -3,6 +3,7 @@
 
 use crate::fixtures::faults::stop::{Shared, Stop, bytes};
 use crate::fixtures::gesture_dataset::{FPS, sample};
+use crate::fixtures::models::training::train_gan;
 use crate::fixtures::write_dataset::write_dataset;
 use orator_base::stage::progress::Silent;
 use orator_dataset::config::{GanConfig, NetworkPreset};
@@ -11,7 +12,7 @@ use orator_formats::checkpoint;
 use orator_gesture::generate::GestureGenerator;
 use orator_gesture::generate::model::BEST;
 use orator_gesture::train::epochs::ValidatedStep;
-use orator_gesture::train::gan::train::{TrainingStart, train, train_with_callback};
+use orator_gesture::train::gan::train::{TrainingStart, train};
 use std::path::Path;
 
 fn speaker(folder: &Path, name: &str, phase: f64) -> Dataset {
@@ -35,11 +36,11 @@ fn weights_are_initialised_and_the_skeleton_is_its_own() {
     let dir = folder.path();
     let (anna, ben) = (speaker(dir, "anna", 0.0), speaker(dir, "ben", 1.5));
     let of_anna = dir.join("anna-gan");
-    train(&anna, &settings(), &of_anna, &Silent).unwrap();
+    train_gan(&anna, &settings(), &of_anna, &Silent).unwrap();
     let stop = Stop::at(u64::MAX);
     let ignore = &mut |_: ValidatedStep| ();
     let of_ben = dir.join("ben-gan");
-    train_with_callback(
+    train(
         &[&ben],
         &settings(),
         &TrainingStart { from: Some(&of_anna), ..TrainingStart::default() },
@@ -54,7 +55,7 @@ fn weights_are_initialised_and_the_skeleton_is_its_own() {
     let model = GestureGenerator::open(&of_ben).unwrap().metadata;
     assert_eq!(model.name, "ben");
     let alone = dir.join("ben-alone");
-    train(&ben, &settings(), &alone, &Silent).unwrap();
+    train_gan(&ben, &settings(), &alone, &Silent).unwrap();
     let own = GestureGenerator::open(&alone).unwrap().metadata;
     assert_eq!((&model.normalisation, &model.representation), (&own.normalisation, &own.representation));
     assert_eq!(own.videos.len(), ben.info().videos.len());
@@ -67,7 +68,7 @@ fn weights_are_initialised_and_the_skeleton_is_its_own() {
     let parts = dir.join("ben-parts");
     let half = GanConfig { warmup_steps: 0.into(), final_lr_ratio: 1.0.into(), ..settings() };
     let uninterrupted = dir.join("ben-whole");
-    train_with_callback(
+    train(
         &[&ben],
         &half,
         &TrainingStart { from: Some(&of_anna), ..TrainingStart::default() },
@@ -76,7 +77,7 @@ fn weights_are_initialised_and_the_skeleton_is_its_own() {
         ignore,
     )
     .unwrap();
-    train_with_callback(
+    train(
         &[&ben],
         &GanConfig { steps: 3.into(), ..half.clone() },
         &TrainingStart { from: Some(&of_anna), ..TrainingStart::default() },
@@ -85,7 +86,7 @@ fn weights_are_initialised_and_the_skeleton_is_its_own() {
         ignore,
     )
     .unwrap();
-    train_with_callback(&[&ben], &half, &TrainingStart::default(), &parts, &Silent, ignore).unwrap();
+    train(&[&ben], &half, &TrainingStart::default(), &parts, &Silent, ignore).unwrap();
     let last = |out: &Path| std::fs::read(checkpoint::path(out, 6)).unwrap();
     assert!(last(&uninterrupted) == last(&parts));
     assert!(bytes(&uninterrupted).iter().any(|(name, _)| name == BEST));
@@ -97,7 +98,7 @@ fn unsuitable_initial_models_are_named() {
     let dir = folder.path();
     let (anna, ben) = (speaker(dir, "anna", 0.0), speaker(dir, "ben", 1.5));
     let fails = |from: &Path, settings: &GanConfig| {
-        let result = train_with_callback(
+        let result = train(
             &[&ben],
             settings,
             &TrainingStart { from: Some(from), ..TrainingStart::default() },
@@ -111,7 +112,7 @@ fn unsuitable_initial_models_are_named() {
     std::fs::create_dir(dir.join("empty")).unwrap();
     assert!(fails(&dir.join("empty"), &settings()).contains("no checkpoint in"));
     let of_anna = dir.join("anna-gan");
-    train(&anna, &GanConfig { steps: 2.into(), ..settings() }, &of_anna, &Silent).unwrap();
+    train_gan(&anna, &GanConfig { steps: 2.into(), ..settings() }, &of_anna, &Silent).unwrap();
     let paper = GanConfig { preset: NetworkPreset::Paper, ..settings() };
     let error = fails(&of_anna, &paper);
     assert!(error.contains("gan.preset") && error.contains(BEST), "{error}");

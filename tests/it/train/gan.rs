@@ -3,6 +3,7 @@
 
 use crate::fixtures::faults::stop::{Shared, Stop, bytes};
 use crate::fixtures::gesture_dataset::{FPS, dataset, dataset_of, sample, with_posture};
+use crate::fixtures::models::training::train_gan;
 use crate::fixtures::write_dataset::write_dataset;
 use orator_base::stage::progress::Silent;
 use orator_base::types::posture::PostureChannel;
@@ -13,7 +14,6 @@ use orator_dataset::config::{AdversarialLoss, GanRecipe, MotionRepresentation, N
 use orator_dataset::{Dataset, Split};
 use orator_gesture::generate::GestureGenerator;
 use orator_gesture::generate::model::BEST;
-use orator_gesture::train::gan::train::train;
 use std::panic::AssertUnwindSafe;
 use std::path::Path;
 
@@ -54,7 +54,7 @@ fn a_training_stopped_at_a_step_resumes_to_identical_bytes() {
         ),
     ] {
         let out = |part: &str| folder.path().join(format!("{name}-{part}"));
-        let outcome = train(dataset, &settings, &out("whole"), &Silent).unwrap();
+        let outcome = train_gan(dataset, &settings, &out("whole"), &Silent).unwrap();
         assert_eq!((outcome.steps, outcome.n_examples, outcome.validation.n_windows), (6, 21, 4));
         assert_eq!(outcome.validation.split, "validation");
         let uninterrupted = bytes(&out("whole"));
@@ -67,9 +67,10 @@ fn a_training_stopped_at_a_step_resumes_to_identical_bytes() {
         for stop in stops {
             let parts = out(&stop.to_string());
             let progress = Shared(Stop::at(stop));
-            let stopped = std::panic::catch_unwind(AssertUnwindSafe(|| train(dataset, &settings, &parts, &progress)));
+            let stopped =
+                std::panic::catch_unwind(AssertUnwindSafe(|| train_gan(dataset, &settings, &parts, &progress)));
             assert!(stopped.is_err());
-            let resumed = train(dataset, &settings, &parts, &Silent).unwrap();
+            let resumed = train_gan(dataset, &settings, &parts, &Silent).unwrap();
             assert_eq!((resumed.began_at, resumed.steps), ([0, 0, 2, 3, 4, 4][stop as usize - 1], 6));
             for ((name, expected), (_, resumed)) in uninterrupted.iter().zip(bytes(&parts)) {
                 assert!(*expected == resumed, "{name} differs after a stop at step {stop}");
@@ -83,7 +84,7 @@ fn settings_of_the_checkpoint_are_used_and_differences_reported() {
     let folder = tempfile::tempdir().unwrap();
     let dataset = dataset(&folder.path().join("dataset"));
     let out = folder.path().join("out");
-    train(&dataset, &GanConfig { steps: 3.into(), ..settings() }, &out, &Silent).unwrap();
+    train_gan(&dataset, &GanConfig { steps: 3.into(), ..settings() }, &out, &Silent).unwrap();
     let stop = Stop::at(u64::MAX);
     let other = GanConfig {
         learning_rate: 1e-3.into(),
@@ -91,13 +92,13 @@ fn settings_of_the_checkpoint_are_used_and_differences_reported() {
         representation: MotionRepresentation::Positions,
         ..settings()
     };
-    train(&dataset, &other, &out, &Shared(stop.clone())).unwrap();
+    train_gan(&dataset, &other, &out, &Shared(stop.clone())).unwrap();
     let log = stop.said.lock().unwrap().join("\n");
     for key in ["gan.learning_rate", "gan.preset", "gan.representation"] {
         assert!(log.contains(key), "{log}");
     }
     let uninterrupted = folder.path().join("whole");
-    train(&dataset, &settings(), &uninterrupted, &Silent).unwrap();
+    train_gan(&dataset, &settings(), &uninterrupted, &Silent).unwrap();
     let last = |folder: &Path| std::fs::read(orator_formats::checkpoint::path(folder, 6)).unwrap();
     assert!(last(&out) == last(&uninterrupted), "the checkpoint's settings were not used");
 
@@ -110,11 +111,11 @@ fn settings_of_the_checkpoint_are_used_and_differences_reported() {
     write_dataset(&second, "host", FPS, &other_samples).unwrap();
     let stop = Stop::at(u64::MAX);
     let longer = GanConfig { steps: 7.into(), ..settings() };
-    train(&Dataset::open(&second).unwrap(), &longer, &out, &Shared(stop.clone())).unwrap();
+    train_gan(&Dataset::open(&second).unwrap(), &longer, &out, &Shared(stop.clone())).unwrap();
     assert!(stop.said.lock().unwrap().join("\n").contains("the dataset has changed"));
     let third = folder.path().join("third");
     write_dataset(&third, "guest", FPS, &other_samples).unwrap();
-    let error = train(&Dataset::open(&third).unwrap(), &longer, &out, &Silent).unwrap_err();
+    let error = train_gan(&Dataset::open(&third).unwrap(), &longer, &out, &Silent).unwrap_err();
     assert!(format!("{error:#}").contains("guest"), "{error:#}");
 }
 
@@ -132,10 +133,10 @@ fn patience_ends_a_training_whose_score_does_not_fall() {
         lambda_gan: 0.0.into(),
         ..settings()
     };
-    let outcome = train(&dataset, &settings, &out, &Silent).unwrap();
+    let outcome = train_gan(&dataset, &settings, &out, &Silent).unwrap();
     assert!(outcome.stopped_early && outcome.steps < 60, "{outcome:?}");
     assert_eq!(outcome.steps, outcome.best_step + 3);
-    let again = train(&dataset, &settings, &out, &Silent).unwrap();
+    let again = train_gan(&dataset, &settings, &out, &Silent).unwrap();
     assert!(again.stopped_early && again.began_at == outcome.steps);
 }
 
@@ -156,7 +157,7 @@ fn windows_of_60_frames_are_trained_with_all_losses_of_rebol2021() {
         ..GanConfig::default()
     };
     let out = folder.path().join("out");
-    let outcome = train(&dataset, &settings, &out, &Silent).unwrap();
+    let outcome = train_gan(&dataset, &settings, &out, &Silent).unwrap();
     assert_eq!((outcome.steps, outcome.n_examples), (10, 8));
     let log = std::fs::read_to_string(out.join("metrics.jsonl")).unwrap();
     let lines = log.lines().map(|line| serde_json::from_str::<serde_json::Value>(line).unwrap());
@@ -188,7 +189,7 @@ fn a_few_windows_are_memorised_and_generated() {
         ..GanConfig::default()
     };
     let out = folder.path().join("out");
-    let outcome = train(&dataset, &settings, &out, &Silent).unwrap();
+    let outcome = train_gan(&dataset, &settings, &out, &Silent).unwrap();
     let validation = outcome.validation;
     let (generated, mean_pose) = (validation.generator, validation.mean_pose);
     assert_eq!((validation.split.as_str(), outcome.n_examples), ("train", 8));
@@ -223,11 +224,11 @@ fn a_diverging_training_and_unusable_windows_are_errors() {
     let dataset = dataset(&folder.path().join("dataset"));
     let out = folder.path().join("out");
     let diverging = GanConfig { learning_rate: 1e30.into(), checkpoint_every: 1, steps: 50.into(), ..settings() };
-    let error = format!("{:#}", train(&dataset, &diverging, &out, &Silent).unwrap_err());
+    let error = format!("{:#}", train_gan(&dataset, &diverging, &out, &Silent).unwrap_err());
     assert!(error.contains("the training diverged") && error.contains("learning_rate"), "{error}");
     let too_long = GanConfig { window_frames: 128, ..settings() };
-    assert!(format!("{:#}", train(&dataset, &too_long, &out, &Silent).unwrap_err()).contains("window"));
-    assert!(train(&dataset, &GanConfig { window_frames: 31, ..settings() }, &out, &Silent).is_err());
+    assert!(format!("{:#}", train_gan(&dataset, &too_long, &out, &Silent).unwrap_err()).contains("window"));
+    assert!(train_gan(&dataset, &GanConfig { window_frames: 31, ..settings() }, &out, &Silent).is_err());
 }
 
 #[test]
@@ -235,10 +236,10 @@ fn a_resumed_training_removes_leftover_checkpoints() {
     let folder = tempfile::tempdir().unwrap();
     let dataset = dataset(&folder.path().join("dataset"));
     let out = folder.path().join("out");
-    train(&dataset, &settings(), &out, &Silent).unwrap();
+    train_gan(&dataset, &settings(), &out, &Silent).unwrap();
     let path = |step| orator_formats::checkpoint::path(&out, step);
     assert!(path(4).exists() && path(6).exists());
     std::fs::copy(path(4), path(2)).unwrap();
-    train(&dataset, &settings(), &out, &Silent).unwrap();
+    train_gan(&dataset, &settings(), &out, &Silent).unwrap();
     assert!(!path(2).exists() && path(4).exists() && path(6).exists());
 }

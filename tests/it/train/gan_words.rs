@@ -4,7 +4,8 @@
 
 use crate::fixtures::faults::stop::{Shared, Stop, bytes};
 use crate::fixtures::gesture_dataset::{FPS, dataset, sample};
-use crate::fixtures::untrained::generate;
+use crate::fixtures::models::training::train_gan;
+use crate::fixtures::models::untrained::generate;
 use crate::fixtures::write_dataset::write_dataset;
 use ndarray::{ArrayView2, Axis, s};
 use orator_base::stage::progress::Silent;
@@ -17,7 +18,7 @@ use orator_formats::{checkpoint, wav};
 use orator_gesture::evaluate::clips::checkpoint::EvaluatedCheckpoint;
 use orator_gesture::generate::GestureGenerator;
 use orator_gesture::generate::model::{BEST, GENERATOR};
-use orator_gesture::train::gan::train::{TrainingStart, train, train_with_callback};
+use orator_gesture::train::gan::train::{TrainingStart, train};
 use orator_nn::weights::Contents;
 use std::panic::AssertUnwindSafe;
 use std::path::Path;
@@ -91,7 +92,7 @@ fn a_model_with_words_follows_the_words() {
     let folder = tempfile::tempdir().unwrap();
     let dataset = dataset_of_words(&folder.path().join("dataset"));
     let out = folder.path().join("out");
-    train(&dataset, &GanConfig { checkpoint_every: 100, ..settings(80) }, &out, &Silent).unwrap();
+    train_gan(&dataset, &GanConfig { checkpoint_every: 100, ..settings(80) }, &out, &Silent).unwrap();
     let speaker = GestureGenerator::open(&out).unwrap();
     let held_out = with_words("d-00000000-000000", 240, 3);
     let poses = POSES.map(|t| sample("d-00000000-000000", 240, 0.0).motion.joints.index_axis(Axis(0), t).to_owned());
@@ -118,12 +119,13 @@ fn a_training_with_words_resumes_exactly_and_stores_its_vocabulary() {
     let dataset = dataset_of_words(&folder.path().join("dataset"));
     let out = |name: &str| folder.path().join(name);
     let stop = Stop::at(u64::MAX);
-    train(&dataset, &settings(6), &out("whole"), &Shared(stop.clone())).unwrap();
+    train_gan(&dataset, &settings(6), &out("whole"), &Shared(stop.clone())).unwrap();
     assert!(stop.said.lock().unwrap().join("\n").contains("vocabulary of 2 words"));
     let progress = Shared(Stop::at(4));
-    let stopped = std::panic::catch_unwind(AssertUnwindSafe(|| train(&dataset, &settings(6), &out("part"), &progress)));
+    let stopped =
+        std::panic::catch_unwind(AssertUnwindSafe(|| train_gan(&dataset, &settings(6), &out("part"), &progress)));
     assert!(stopped.is_err());
-    train(&dataset, &settings(6), &out("part"), &Silent).unwrap();
+    train_gan(&dataset, &settings(6), &out("part"), &Silent).unwrap();
     for ((name, expected), (_, resumed)) in bytes(&out("whole")).iter().zip(bytes(&out("part"))) {
         assert!(*expected == resumed, "{name}");
     }
@@ -131,7 +133,7 @@ fn a_training_with_words_resumes_exactly_and_stores_its_vocabulary() {
     assert_eq!(facts("whole")["speaker"]["words"]["vocabulary"], serde_json::json!(WORDS));
     assert_eq!(facts("whole")["speaker"]["network"]["vocabulary"], 4);
     // Without the key nothing in a checkpoint mentions words.
-    train(&dataset, &GanConfig { words: false, ..settings(2) }, &out("audio"), &Silent).unwrap();
+    train_gan(&dataset, &GanConfig { words: false, ..settings(2) }, &out("audio"), &Silent).unwrap();
     let audio = facts("audio");
     assert!(!audio.to_string().contains("word") && !audio.to_string().contains("vocabulary"), "{audio}");
 }
@@ -141,7 +143,7 @@ fn common_words_keep_their_vectors_in_another_training() {
     let folder = tempfile::tempdir().unwrap();
     let dir = folder.path();
     let anna = dataset_of_words(&dir.join("anna"));
-    train(&anna, &settings(2), &dir.join("of_anna"), &Silent).unwrap();
+    train_gan(&anna, &settings(2), &dir.join("of_anna"), &Silent).unwrap();
     let renamed = |mut interval: Sample| {
         let words = interval.words.as_mut().unwrap();
         words.iter_mut().filter(|word| word.word == "left").for_each(|word| word.word = "up".to_owned());
@@ -157,7 +159,7 @@ fn common_words_keep_their_vectors_in_another_training() {
     let table = WordVectors::open(&dir.join("table.safetensors")).unwrap();
     let start = |from: Option<&Path>, vectors: Option<&WordVectors>, out: &str| {
         let settings = GanConfig { learning_rate: 1e-9.into(), ..settings(2) };
-        train_with_callback(
+        train(
             &[&ben],
             &settings,
             &TrainingStart { from, vectors, ..TrainingStart::default() },
@@ -201,12 +203,12 @@ fn settings_and_data_that_do_not_fit_are_errors() {
     let folder = tempfile::tempdir().unwrap();
     let dataset = dataset(&folder.path().join("dataset"));
     let out = folder.path().join("out");
-    let error = train(&dataset, &settings(2), &out, &Silent).unwrap_err().to_string();
+    let error = train_gan(&dataset, &settings(2), &out, &Silent).unwrap_err().to_string();
     assert!(error.contains("has no words") && error.contains("gan.words = false"), "{error}");
     let table = folder.path().join("table.safetensors");
     glove::convert(&b"up 1 2\n"[..], &table).unwrap();
     let (table, audio) = (WordVectors::open(&table).unwrap(), GanConfig { words: false, ..settings(2) });
-    let error = train_with_callback(
+    let error = train(
         &[&dataset],
         &audio,
         &TrainingStart { vectors: Some(&table), ..TrainingStart::default() },
@@ -223,7 +225,7 @@ fn the_program_and_evaluations_pass_words_on() {
     let folder = tempfile::tempdir().unwrap();
     let dir = folder.path();
     let dataset = dataset_of_words(&dir.join("dataset"));
-    train(&dataset, &settings(4), &dir.join("model"), &Silent).unwrap();
+    train_gan(&dataset, &settings(4), &dir.join("model"), &Silent).unwrap();
     let held_out = with_words("d-00000000-000000", 96, 3);
     wav::write(&dir.join("speech.wav"), &held_out.sound).unwrap();
     let row = |word: &Word| format!("{}\t{}\t{}\n", word.start_secs, word.end_secs, word.word);

@@ -165,7 +165,12 @@ fn seq2seq_without_a_held_out_split_reports_the_reason() {
     let settings =
         orator_dataset::config::Seq2seqConfig { steps: 0.into(), batch: 3.into(), hidden: 8, ..Default::default() };
     let out = folder.path().join("out");
-    let result =
-        orator_gesture::train::seq2seq::train::train(TrainingSource::Dataset(&dataset), None, &settings, &out, &Silent);
+    let result = crate::fixtures::models::training::train_seq2seq(
+        TrainingSource::Dataset(&dataset),
+        None,
+        &settings,
+        &out,
+        &Silent,
+    );
     assert!(format!("{:#}", result.unwrap_err()).contains("nothing to train"));
 }

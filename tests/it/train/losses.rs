@@ -7,7 +7,7 @@ use orator_dataset::config::{BoneLoss, Seq2seqSettings};
 use orator_gesture::generate::normalisation::{N_FEATURES, Normalisation};
 use orator_gesture::train::gan::losses::{BoneConstancy, energy, l1, speed, velocity};
 use orator_gesture::train::seq2seq::losses::{adversarial_settings, continuity_of_poses, total, variance_loss_of_code};
-use orator_nn::ops::gradcheck::{pattern, worst};
+use orator_test_support::gradcheck::{pattern, worst};
 
 #[test]
 fn totals_match_hand_computed_values() -> Result<()> {

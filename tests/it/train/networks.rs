@@ -11,8 +11,8 @@ use orator_nn::gan::generator::{Config, Generator, Preset};
 use orator_nn::lifter::temporal;
 use orator_nn::lifter::temporal::TemporalLifter;
 use orator_nn::motion_encoder;
-use orator_nn::ops::gradcheck::pattern;
 use orator_nn::params::Params;
+use orator_test_support::gradcheck::pattern;
 use std::collections::BTreeMap;
 
 #[derive(serde::Deserialize)]

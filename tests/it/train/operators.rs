@@ -2,7 +2,7 @@
 //! operators with wrong or missing gradients.
 
 use candle_core::{DType, Device, Result, Tensor};
-use orator_nn::ops::gradcheck::{pattern, worst};
+use orator_test_support::gradcheck::{pattern, worst};
 use std::fs;
 use std::path::{Path, PathBuf};
 

@@ -4,6 +4,7 @@
 use crate::fixtures::animation::captures::{bvh, tone, write_capture, write_stereo};
 use crate::fixtures::faults::stop::{Shared, Stop, bytes};
 use crate::fixtures::gesture_dataset::{dataset, sample};
+use crate::fixtures::models::training::train_seq2seq;
 use orator_base::stage::progress::Silent;
 use orator_dataset::config::{Seq2seqConfig, SequenceNetwork};
 use orator_formats::bvh::exponential_maps::JointMapping;
@@ -14,7 +15,6 @@ use orator_gesture::generate::model::BEST;
 use orator_gesture::generate::seq2seq::SequenceGenerator;
 use orator_gesture::train::seq2seq::captures::CaptureFolder;
 use orator_gesture::train::seq2seq::source::TrainingSource;
-use orator_gesture::train::seq2seq::train::train;
 use std::panic::AssertUnwindSafe;
 use std::path::Path;
 
@@ -54,7 +54,7 @@ fn a_training_stopped_at_a_step_resumes_to_identical_bytes() {
     ] {
         let settings = settings(network);
         let out = |part: &str| folder.path().join(format!("{network:?}-{part}"));
-        let outcome = train(source, None, &settings, &out("whole"), &Silent).unwrap();
+        let outcome = train_seq2seq(source, None, &settings, &out("whole"), &Silent).unwrap();
         // 99 and 64 frames: a segment of 8 + 15 frames every five frames.
         assert_eq!((outcome.steps, outcome.n_examples, outcome.n_words), (6, 16 + 9, 0));
         assert_eq!((outcome.validation.split.as_str(), outcome.validation.n_segments), ("validation", 8));
@@ -68,9 +68,9 @@ fn a_training_stopped_at_a_step_resumes_to_identical_bytes() {
         for stop in stops {
             let parts = out(&stop.to_string());
             let progress = Shared(Stop::at(stop));
-            let run = || train(source, None, &settings, &parts, &progress);
+            let run = || train_seq2seq(source, None, &settings, &parts, &progress);
             assert!(std::panic::catch_unwind(AssertUnwindSafe(run)).is_err());
-            let resumed = train(source, None, &settings, &parts, &Silent).unwrap();
+            let resumed = train_seq2seq(source, None, &settings, &parts, &Silent).unwrap();
             assert_eq!((resumed.began_at, resumed.steps), ([0, 0, 2, 3, 4, 4][stop as usize - 1], 6));
             for ((name, expected), (_, resumed)) in uninterrupted.iter().zip(bytes(&parts)) {
                 assert!(*expected == resumed, "{name} of {network:?} differs after a stop at step {stop}");
@@ -82,10 +82,11 @@ fn a_training_stopped_at_a_step_resumes_to_identical_bytes() {
     write_capture(&captures, "a", 4.0, 0.0, false);
     let captures = open(&captures, &[]).unwrap();
     let out = folder.path().join("Contextual-whole");
-    let text = train(TrainingSource::Captures(&captures), None, &settings(SequenceNetwork::Contextual), &out, &Silent);
+    let text =
+        train_seq2seq(TrainingSource::Captures(&captures), None, &settings(SequenceNetwork::Contextual), &out, &Silent);
     assert!(format!("{:#}", text.unwrap_err()).contains("choose another --out"));
     let stop = Stop::at(u64::MAX);
-    train(source, None, &settings(SequenceNetwork::Words), &out, &Shared(stop.clone())).unwrap();
+    train_seq2seq(source, None, &settings(SequenceNetwork::Words), &out, &Shared(stop.clone())).unwrap();
     assert!(stop.said.lock().unwrap().join("\n").contains("seq2seq.network"));
 }
 
@@ -104,7 +105,8 @@ fn the_loss_falls_and_the_model_generates() {
         ..settings(SequenceNetwork::Contextual)
     };
     let out = folder.path().join("out");
-    let validation = train(TrainingSource::Dataset(&dataset), None, &settings, &out, &Silent).unwrap().validation;
+    let validation =
+        train_seq2seq(TrainingSource::Dataset(&dataset), None, &settings, &out, &Silent).unwrap().validation;
     assert!(validation.l1 < validation.mean_pose_l1 && validation.energy > 0.3, "{validation:?}");
     let log = std::fs::read_to_string(out.join("metrics.jsonl")).unwrap();
     let line = |line: &str| serde_json::from_str::<serde_json::Value>(line).unwrap()["l1"].as_f64();
@@ -134,7 +136,7 @@ fn models_of_captures_generate_for_audio_of_any_length() {
     {
         let out = folder.path().join(format!("{network:?} {audio_context}"));
         let settings = Seq2seqConfig { audio_context, ..settings(network) };
-        let outcome = train(TrainingSource::Captures(&captures), None, &settings, &out, &Silent).unwrap();
+        let outcome = train_seq2seq(TrainingSource::Captures(&captures), None, &settings, &out, &Silent).unwrap();
         assert_eq!((outcome.validation.split.as_str(), outcome.n_words), ("validation", 2));
         let speaker = SequenceGenerator::open(&out).unwrap();
         let words = Transcript::read(&dir.join("a.tsv")).unwrap().words;
@@ -168,7 +170,7 @@ fn errors_in_captures_name_the_file() {
         let settings = settings(SequenceNetwork::Contextual);
         let out = dir.join("out");
         let trained = open(&dir, hold_out)
-            .and_then(|captures| train(TrainingSource::Captures(&captures), None, &settings, &out, &Silent));
+            .and_then(|captures| train_seq2seq(TrainingSource::Captures(&captures), None, &settings, &out, &Silent));
         format!("{:#}", trained.unwrap_err())
     };
     let write = |dir: &Path, text: String| std::fs::write(dir.join("b.bvh"), text).unwrap();
@@ -205,7 +207,7 @@ fn errors_in_captures_name_the_file() {
 fn training_log(captures: &CaptureFolder, vectors: Option<&WordVectors>, out: &Path) -> anyhow::Result<String> {
     let stop = Stop::at(u64::MAX);
     let settings = settings(SequenceNetwork::Words);
-    train(TrainingSource::Captures(captures), vectors, &settings, out, &Shared(stop.clone()))?;
+    train_seq2seq(TrainingSource::Captures(captures), vectors, &settings, out, &Shared(stop.clone()))?;
     let log = stop.said.lock().unwrap().join("\n");
     Ok(log)
 }
@@ -234,7 +236,7 @@ fn doubtful_transcripts_and_changed_captures_are_reported() {
     assert!(SequenceGenerator::open(&out("a")).unwrap().metadata.vocabulary.words() == ["hello", "world"]);
     assert!(SequenceGenerator::open(&out("a")).unwrap().metadata.has_word_vectors);
     let audio = settings(SequenceNetwork::Audio);
-    let rejected = train(TrainingSource::Captures(&open()), Some(&english), &audio, &out("audio"), &Silent);
+    let rejected = train_seq2seq(TrainingSource::Captures(&open()), Some(&english), &audio, &out("audio"), &Silent);
     assert!(rejected.unwrap_err().to_string().contains("the network \"audio\" does not read words: omit --words"));
     let german = table("hallo 1 2\n").unwrap();
     assert!(training_log(&open(), Some(&german), &out("b")).unwrap().contains("0 of 2 words have pretrained vectors"));

@@ -3,6 +3,7 @@
 
 use crate::fixtures::faults::stop::bytes;
 use crate::fixtures::gesture_dataset::{FPS, sample};
+use crate::fixtures::models::training::train_gan;
 use crate::fixtures::write_dataset::write_dataset;
 use candle_core::{Device, Tensor};
 use ndarray::Array3;
@@ -18,7 +19,7 @@ use orator_gesture::train::epochs::ValidatedStep;
 use orator_gesture::train::gan::pretrained::PretrainedModel;
 use orator_gesture::train::gan::recipe::{self, InitialWeights, TrainingMaterial};
 use orator_gesture::train::gan::speakers;
-use orator_gesture::train::gan::train::{TrainingStart, train, train_with_callback};
+use orator_gesture::train::gan::train::{TrainingStart, train};
 use orator_gesture::train::gan::windows::JoinedWindows;
 use orator_gesture::train::gan::windows::WindowLoader;
 use orator_nn::gan::speaker_layer::{SPEAKER, SPEAKER_EMBEDDING, SPEAKER_WEIGHT};
@@ -77,7 +78,7 @@ fn each_speaker_is_generated_with_its_own_skeleton() {
     let (anna, ben) = (speaker(dir, "anna", 0.0, 1.0), speaker(dir, "ben", 1.5, 1.2));
     let ignore = &mut |_: ValidatedStep| ();
     let both = dir.join("both");
-    train_with_callback(&[&anna, &ben], &settings(), &TrainingStart::default(), &both, &Silent, ignore).unwrap();
+    train(&[&anna, &ben], &settings(), &TrainingStart::default(), &both, &Silent, ignore).unwrap();
 
     let audio = Sound { rate: 16_000, samples: (0..48_000).map(|n| (n as f32 * 0.05).sin() * 0.3).collect() };
     let motion = |name: &str| -> Array3<f32> {
@@ -99,10 +100,10 @@ fn each_speaker_is_generated_with_its_own_skeleton() {
     // Stopped and resumed, it ends with identical bytes.
     let parts = dir.join("parts");
     let half = GanConfig { steps: 3.into(), ..settings() };
-    train_with_callback(&[&anna, &ben], &half, &TrainingStart::default(), &parts, &Silent, ignore).unwrap();
-    let error = train(&anna, &settings(), &parts, &Silent).unwrap_err();
+    train(&[&anna, &ben], &half, &TrainingStart::default(), &parts, &Silent, ignore).unwrap();
+    let error = train_gan(&anna, &settings(), &parts, &Silent).unwrap_err();
     assert!(format!("{error:#}").contains("2 speakers"), "{error:#}");
-    train_with_callback(&[&anna, &ben], &settings(), &TrainingStart::default(), &parts, &Silent, ignore).unwrap();
+    train(&[&anna, &ben], &settings(), &TrainingStart::default(), &parts, &Silent, ignore).unwrap();
     let last = |out: &Path| std::fs::read(checkpoint::path(out, 6)).unwrap();
     assert!(last(&both) == last(&parts));
     let names = |out: &Path| bytes(out).into_iter().map(|(name, _)| name).collect::<Vec<_>>();
@@ -112,7 +113,7 @@ fn each_speaker_is_generated_with_its_own_skeleton() {
     let carl = speaker(dir, "carl", 0.7, 0.9);
     assert_starts_from_nearest_speaker(&both, &carl);
     let of_carl = dir.join("carl-gan");
-    train_with_callback(
+    train(
         &[&carl],
         &settings(),
         &TrainingStart { from: Some(&both), ..TrainingStart::default() },
@@ -127,7 +128,7 @@ fn each_speaker_is_generated_with_its_own_skeleton() {
     assert!(["anna", "ben", "carl"].iter().all(|name| trained_on.contains(name)), "{trained_on:?}");
     assert_trains_only_speaker_layer(&both, &carl, &dir.join("layer"));
     // Two speakers can also be initialised from a single one.
-    train_with_callback(
+    train(
         &[&anna, &ben],
         &settings(),
         &TrainingStart { from: Some(&of_carl), ..TrainingStart::default() },
@@ -138,22 +139,15 @@ fn each_speaker_is_generated_with_its_own_skeleton() {
     .unwrap();
     assert_eq!(as_speaker(&dir.join("all"), "ben").unwrap().metadata.network.n_speakers, 1);
 
-    let error = train_with_callback(
-        &[&anna, &anna],
-        &settings(),
-        &TrainingStart::default(),
-        &dir.join("twice"),
-        &Silent,
-        ignore,
-    )
-    .unwrap_err();
+    let error = train(&[&anna, &anna], &settings(), &TrainingStart::default(), &dir.join("twice"), &Silent, ignore)
+        .unwrap_err();
     assert!(format!("{error:#}").contains("both of speaker anna"), "{error:#}");
 }
 
 /// The weights shared by all speakers do not change at a learning rate of 0.
 fn assert_trains_only_speaker_layer(both: &Path, new: &Dataset, out: &Path) {
     let settings = GanConfig { shared_rate: 0.0.into(), ..settings() };
-    train_with_callback(
+    train(
         &[new],
         &settings,
         &TrainingStart { from: Some(both), ..TrainingStart::default() },

@@ -1,6 +1,6 @@
 //! The server of `orator view`: what it reads from a project, what it generates, and hostile requests.
 
-use crate::fixtures::untrained::write_untrained_speaker;
+use crate::fixtures::models::untrained::write_untrained_speaker;
 use crate::fixtures::viewer::Viewer;
 use orator_test_support::project::Project;
 use serde_json::Value;

@@ -10,9 +10,9 @@ use orator_base::types::skeleton::{L_ELBOW, L_SHOULDER, L_WRIST, R_ELBOW, R_SHOU
 use orator_base::types::time::FrameRate;
 
 /// Assumed focal length relative to the longer side of the image. If it is wrong, the body seems too near or too far.
-const FOCAL_RATIO: f64 = 1.2;
+pub const FOCAL_RATIO: f64 = 1.2;
 /// Joints with their keypoints.
-const PAIRS: [[usize; 2]; 6] = [
+pub const PAIRS: [[usize; 2]; 6] = [
     [L_SHOULDER, coco::L_SHOULDER],
     [R_SHOULDER, coco::R_SHOULDER],
     [L_ELBOW, coco::L_ELBOW],
@@ -135,55 +135,4 @@ fn between(known: &[(usize, [f64; 2])], t: usize) -> Option<[f64; 2]> {
     }
     let share = ((t - last.0) as f64 / (next.0 - last.0) as f64).min(1.0);
     Some([0, 1].map(|k| last.1[k] + share * (next.1[k] - last.1[k])))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use ndarray::Array3;
-    use orator_base::types::skeleton::N_JOINTS;
-
-    #[test]
-    fn a_walking_body_projects_onto_its_keypoints_and_gaps_are_bridged() {
-        let (n, size) = (12, [640u32, 360]);
-        let focal_px = FOCAL_RATIO * 640.0;
-        let place = |t: usize| [0.004 * t as f64 - 0.1, 0.05, 1.4];
-        let joint = |j: usize, t: usize| {
-            let side = if [L_SHOULDER, L_ELBOW, L_WRIST].contains(&j) { 1.0 } else { -1.0 };
-            let row = [[L_SHOULDER, R_SHOULDER], [L_ELBOW, R_ELBOW], [L_WRIST, R_WRIST]];
-            let part = row.iter().position(|pair| pair.contains(&j)).unwrap() as f64;
-            [side * (0.18 + 0.05 * part), 0.05 + 0.2 * part, -0.15 * part * (1.0 + 0.03 * t as f64)]
-        };
-        let (mut joints, mut body) = (Array3::zeros((n, N_JOINTS, 3)), Array3::zeros((n, 17, 3)));
-        for t in 0..n {
-            for [j, point] in PAIRS {
-                let (at, neck) = (joint(j, t), place(t));
-                (0..3).for_each(|k| joints[[t, j, k]] = at[k] as f32);
-                let per_metre = focal_px / (at[2] + neck[2]);
-                body[[t, point, 0]] = (319.5 + per_metre * (at[0] + neck[0])) as f32;
-                body[[t, point, 1]] = (179.5 + per_metre * (at[1] + neck[1])) as f32;
-                body[[t, point, 2]] = if (5..8).contains(&t) { 0.0 } else { 0.9 };
-            }
-        }
-        let fps = FrameRate::new(10, 1);
-        let motion = Motion::from_joints(fps, joints);
-        let none = Array3::zeros((n, 21, 3));
-        let keypoints =
-            Keypoints { fps, image_size: size, body, left_hand: none.clone(), right_hand: none, hand_depth: None };
-        let camera = SourceCamera::fit(&motion, &keypoints).unwrap();
-        let neck = [3.0, 140.0, 2.0];
-        for t in 1..n - 1 {
-            let view = camera.at(fps.secs(t), neck, [640, 360]);
-            for [j, point] in PAIRS {
-                let [x, y, z] = joint(j, t).map(|v| 100.0 * v);
-                let px = view.pixel(view.to_camera_axes(add(neck, [x, -y, -z])));
-                let known = [0, 1].map(|k| f64::from(keypoints.body[[t, point, k]]));
-                assert!((px[0] - known[0]).hypot(px[1] - known[1]) < 3.0, "frame {t}: {px:?} for {known:?}");
-            }
-        }
-        let mut undetected = keypoints.clone();
-        undetected.body.fill(0.0);
-        let error = SourceCamera::fit(&motion, &undetected).unwrap_err().to_string();
-        assert!(error.contains("cannot estimate the camera of the video"), "{error}");
-    }
 }

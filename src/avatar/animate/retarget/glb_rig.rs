@@ -228,7 +228,7 @@ impl SceneNode {
 }
 
 /// Translation, rotation, scale factors of a matrix, whether its axes are skewed. Those of a reflection are negative.
-fn decomposed(matrix: &[f64; 16]) -> (Vec3, Rotation, Vec3, bool) {
+pub fn decomposed(matrix: &[f64; 16]) -> (Vec3, Rotation, Vec3, bool) {
     let column = |k: usize| [matrix[4 * k], matrix[4 * k + 1], matrix[4 * k + 2]];
     let columns = [0, 1, 2].map(column);
     let sign = if dot(cross(columns[0], columns[1]), columns[2]) < 0.0 { -1.0 } else { 1.0 };
@@ -236,40 +236,4 @@ fn decomposed(matrix: &[f64; 16]) -> (Vec3, Rotation, Vec3, bool) {
     let [x, y, z] = columns.map(|axis| unit(axis, 0.0).unwrap_or_default().map(|v| sign * v));
     let is_sheared = [dot(x, y), dot(y, z), dot(z, x)].iter().any(|cos| cos.abs() > MAX_SHEAR);
     (column(3), Rotation::from_axes(x, y, z), factors, is_sheared)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use orator_base::math::vec3::{scale, sub};
-
-    /// Matrix of the images of the axes and of the origin.
-    fn matrix(axes: [Vec3; 3], origin: Vec3) -> [f64; 16] {
-        let columns = [axes[0], axes[1], axes[2], origin];
-        std::array::from_fn(|n| match n % 4 {
-            3 => f64::from(u8::from(n == 15)),
-            row => columns[n / 4][row],
-        })
-    }
-
-    #[test]
-    fn a_matrix_is_decomposed_and_shear_and_reflections_are_found() {
-        for n in 0..40 {
-            let angles = [0.4, -0.7, 1.1].map(|step| step * f64::from(n));
-            let turn = Rotation::from_euler([2, 0, 1], angles);
-            let factor = 0.01 + 0.3 * f64::from(n);
-            let (offset, rest, factors, is_sheared) =
-                decomposed(&matrix(turn.axes().map(|axis| scale(axis, factor)), [1.0, -2.0, f64::from(n)]));
-            assert_eq!((offset, is_sheared), ([1.0, -2.0, f64::from(n)], false));
-            assert!(factors.iter().all(|found| (found - factor).abs() < 1e-9 * factor), "{factors:?}");
-            for v in [[1.0, 2.0, -0.5], [0.0, 0.3, 4.0]] {
-                assert!(norm(sub(rest.turn(v), turn.turn(v))) < 1e-9, "{rest:?} {turn:?}");
-            }
-        }
-        let [x, y, z] = [[2.0, 0.0, 0.0], [0.0, 2.0, 0.0], [0.0, 0.0, 2.0]];
-        assert_eq!(decomposed(&matrix([scale(x, -1.0), y, z], [0.0; 3])).2, [-2.0; 3]);
-        assert!(decomposed(&matrix([x, [0.5, 2.0, 0.0], z], [0.0; 3])).3);
-        let (_, rest, factors, _) = decomposed(&[0.0; 16]);
-        assert!(rest.w.is_finite() && rest.v.iter().all(|v| v.is_finite()) && factors == [0.0; 3]);
-    }
 }

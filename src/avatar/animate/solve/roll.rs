@@ -9,7 +9,7 @@ use orator_base::math::vec3::{Vec3, across, cross, dot, unit};
 /// Elbow angles, degrees (0 is straight), between which the weight of the measured plane rises from 0 to 1.
 const STRAIGHT_DEGREES: [f64; 2] = [8.0, 20.0];
 /// Left upper arm and its elbow axis at rest.
-const REST: (Vec3, Vec3) = ([1.0, 0.0, 0.0], [0.0, -1.0, 0.0]);
+pub const REST: (Vec3, Vec3) = ([1.0, 0.0, 0.0], [0.0, -1.0, 0.0]);
 /// Weight of roll changes relative to the measured planes.
 const SMOOTHNESS: f64 = 0.02;
 /// Weight of the transported roll, small enough to matter only without any measurement.
@@ -48,7 +48,7 @@ pub fn upper_arm_rotations(upper: &[Option<Vec3>], forearm: &[Option<Vec3>]) -> 
 
 /// Rolls close to the measured ones (value, weight) that change evenly where nothing is measured: the minimum of `sum w
 /// (r - m)^2 + SMOOTHNESS sum (r[t] - r[t - 1])^2`, a tridiagonal system.
-fn smoothed_rolls(measured: &[[f64; 2]]) -> Vec<f64> {
+pub fn smoothed_rolls(measured: &[[f64; 2]]) -> Vec<f64> {
     let n = measured.len();
     let mut ahead: Vec<[f64; 2]> = Vec::with_capacity(n);
     for (t, &[roll, weight]) in measured.iter().enumerate() {
@@ -69,33 +69,4 @@ fn smoothed_rolls(measured: &[[f64; 2]]) -> Vec<f64> {
 
 fn wrapped(angle: f64) -> f64 {
     angle - std::f64::consts::TAU * (angle / std::f64::consts::TAU).round()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn measured_rolls_are_kept_and_gaps_are_interpolated() {
-        let measured: Vec<[f64; 2]> =
-            (0..40).map(|t| if (10..30).contains(&t) { [9.0, 0.0] } else { [f64::from(t / 20), 1.0] }).collect();
-        let rolls = smoothed_rolls(&measured);
-        assert!(rolls[0].abs() < 1e-3 && (rolls[39] - 1.0).abs() < 1e-3);
-        assert!(rolls.windows(2).all(|pair| (-1e-9..0.06).contains(&(pair[1] - pair[0]))), "{rolls:?}");
-        assert!((rolls[19] + rolls[20] - 1.0).abs() < 1e-4);
-        assert_eq!(smoothed_rolls(&[]), Vec::<f64>::new());
-        assert!(smoothed_rolls(&[[3.0, 0.0]; 5]).iter().all(|roll| roll.abs() < 1e-6));
-    }
-
-    #[test]
-    fn the_elbow_bends_about_its_axis() {
-        let upper = vec![unit([0.3, -0.9, 0.1], 0.0); 20];
-        let forearm = vec![unit([0.2, 0.1, 0.9], 0.0); 20];
-        for rotation in upper_arm_rotations(&upper, &forearm) {
-            let rotation = rotation.unwrap();
-            assert!(dot(rotation.turn(REST.0), upper[0].unwrap()) > 1.0 - 1e-9);
-            let into = rotation.inverse().turn(forearm[0].unwrap());
-            assert!(into[1].abs() < 1e-4 && into[2] > 0.0, "{into:?}");
-        }
-    }
 }

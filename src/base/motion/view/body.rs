@@ -147,7 +147,7 @@ pub fn mirror_mean(output: &[f32], of_mirrored: &[f32]) -> Vec<f32> {
 }
 
 /// Interpolates points at `time` between two frames linearly; a point visible in one only is the nearer frame's.
-fn at(seen: &[BodyPoints], time: f64) -> BodyPoints {
+pub fn at(seen: &[BodyPoints], time: f64) -> BodyPoints {
     let (before, after) = (&seen[time.floor() as usize], &seen[time.ceil() as usize]);
     let share = time.fract() as f32;
     std::array::from_fn(|j| match (before[j], after[j]) {
@@ -194,16 +194,4 @@ fn longest(frames: &[BodyPoints]) -> [f32; N_KINDS] {
 /// Returns the value that a tenth of the values exceed; 0 if there are none.
 fn large(lengths: impl Iterator<Item = f32>) -> f32 {
     Ordered::new(lengths).high_end(10).unwrap_or(0.0)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn points_between_two_frames_are_interpolated() {
-        let frames: Vec<BodyPoints> = vec![[Some([0.0, 4.0]); 9], [Some([2.0, 8.0]); 9], [None; 9]];
-        assert_eq!(at(&frames, 0.25)[0], Some([0.5, 5.0]));
-        assert_eq!((at(&frames, 1.4)[0], at(&frames, 1.6)[0]), (Some([2.0, 8.0]), None));
-    }
 }

@@ -18,7 +18,7 @@ use std::path::Path;
 /// Prefix of the network's tensors in a checkpoint.
 pub const NETWORK: &str = "network.";
 /// Name and version of the checkpoint layout; any other is rejected.
-const KIND: &str = "orator sequence 1";
+pub const KIND: &str = "orator sequence 1";
 /// Largest accepted dimension of hidden states and word embeddings.
 const MAX_WIDTH: usize = 4096;
 
@@ -81,7 +81,7 @@ impl SequenceMetadata {
     }
 
     /// Fails unless the metadata is consistent and supported by this program.
-    fn check(&self) -> Result<()> {
+    pub fn check(&self) -> Result<()> {
         let (fps, network) = (self.fps, &self.network);
         ensure!(fps.is_plausible(), "the frame rate is {fps}, expected 1 to 1000 fps");
         ensure!(RATES.contains(&self.rate), "the sample rate is {} Hz, expected one of {RATES:?}", self.rate);
@@ -147,45 +147,4 @@ fn build(contents: &Contents, device: &Device) -> Result<(SequenceMetadata, Para
     let network = architecture::network(metadata.architecture, &mut params, &metadata.network)?;
     params.load(&contents.part(NETWORK))?;
     Ok((metadata, params, network))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::generate::normalisation::{N_FEATURES, Normalisation};
-    use crate::generate::representation::Representation;
-
-    #[test]
-    fn the_number_of_discriminator_blocks_is_free_from_two_to_six() {
-        let fps = FrameRate::new(15, 1);
-        let values = |value: f32| vec![value; N_FEATURES];
-        let bone_lengths = vec![0.1; N_FEATURES / 3];
-        let normalisation = Normalisation { mean: values(0.0), std: values(1.0), bone_lengths, channels: Vec::new() };
-        let representation = Representation::Bones { mean: values(0.0), std: values(1.0) };
-        let stored = serde_json::json!({
-            "kind": KIND,
-            "name": "",
-            "fps": fps,
-            "rate": 16_000,
-            "architecture": Architecture::Adversarial,
-            "network": network_config(fps, N_FEATURES, Vocabulary::default().n_indices(), [8, 8]),
-            "poses": PoseFormat::Joints { normalisation, representation },
-            "vocabulary": Vocabulary::default(),
-            "dataset": "",
-        });
-        let check = |n_blocks: Option<usize>| {
-            let mut stored = stored.clone();
-            if let Some(n_blocks) = n_blocks {
-                stored["network"]["score_blocks"] = n_blocks.into();
-            }
-            serde_json::from_value::<SequenceMetadata>(stored).unwrap().check()
-        };
-        // Checkpoints of earlier versions do not state the number.
-        for n_blocks in [None, Some(2), Some(3), Some(6)] {
-            check(n_blocks).unwrap();
-        }
-        for n_blocks in [0, 1, 7] {
-            assert!(check(Some(n_blocks)).unwrap_err().to_string().contains("expected 2..=6"));
-        }
-    }
 }

@@ -4,12 +4,12 @@
 use ndarray::{Array1, Array2, ArrayView2};
 
 /// Length of the packed moments of rows of length `d`.
-pub(crate) const fn packed_len(d: usize) -> usize {
+pub const fn packed_len(d: usize) -> usize {
     1 + d + d * (d + 1) / 2
 }
 
 /// Adds rows [n, d] to packed moments.
-pub(crate) fn add(rows: ArrayView2<f64>, packed: &mut [f64]) {
+pub fn add(rows: ArrayView2<f64>, packed: &mut [f64]) {
     let d = rows.ncols();
     packed[0] += rows.nrows() as f64;
     for row in rows.outer_iter() {
@@ -26,7 +26,7 @@ pub(crate) fn add(rows: ArrayView2<f64>, packed: &mut [f64]) {
 }
 
 /// Number of rows, mean [d] and unbiased covariance [d, d]; `None` for fewer than two rows.
-pub(crate) fn read(packed: &[f64], d: usize) -> Option<(f64, Array1<f64>, Array2<f64>)> {
+pub fn read(packed: &[f64], d: usize) -> Option<(f64, Array1<f64>, Array2<f64>)> {
     let n = packed[0];
     if n.is_nan() || n < 2.0 {
         return None;
@@ -43,23 +43,4 @@ pub(crate) fn read(packed: &[f64], d: usize) -> Option<(f64, Array1<f64>, Array2
         }
     }
     Some((n, mean, covariance))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use ndarray::{array, s};
-
-    #[test]
-    fn moments_of_parts_add_up() {
-        let rows = array![[1.0, 2.0], [3.0, 5.0], [4.0, -1.0], [0.0, 2.0]];
-        let mut packed = vec![0.0; packed_len(2)];
-        add(rows.slice(s![..1, ..]), &mut packed);
-        assert!(read(&packed, 2).is_none());
-        add(rows.slice(s![1.., ..]), &mut packed);
-        let (n, mean, covariance) = read(&packed, 2).unwrap();
-        assert_eq!((n, mean), (4.0, array![2.0, 2.0]));
-        let known = array![[10.0 / 3.0, -1.0], [-1.0, 6.0]];
-        assert!((&covariance - &known).iter().all(|v| v.abs() < 1e-12));
-    }
 }

@@ -25,9 +25,10 @@ const ROWS: usize = 256;
 
 /// Orthonormal basis of a subspace of windows.
 pub struct Basis {
-    weights: Array1<f32>,
+    /// Weight of each used joint.
+    pub weights: Array1<f32>,
     /// Basis vectors as columns [window x coordinates, N].
-    directions: Array2<f32>,
+    pub directions: Array2<f32>,
 }
 
 static BUILT_IN: LazyLock<Option<Basis>> = LazyLock::new(|| Basis::parse(FILE).ok());
@@ -106,51 +107,5 @@ fn origin(joint: usize) -> usize {
         _ if !is_finger(joint) => NECK,
         _ if joint < R_HAND => L_WRIST,
         _ => R_WRIST,
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::metrics::space::fixed_rate::{FPS, moving};
-    use orator_base::types::skeleton::N_JOINTS;
-
-    #[test]
-    fn the_built_in_basis_is_orthonormal() {
-        let basis = Basis::parse(FILE).unwrap();
-        let gram = basis.directions.t().dot(&basis.directions);
-        for ((i, j), v) in gram.indexed_iter() {
-            assert!((v - f32::from(u8::from(i == j))).abs() < 1e-4, "{i} {j}: {v}");
-        }
-        assert!(basis.weights.iter().all(|w| *w > 0.0));
-        let cut = format!("{:#}", Basis::parse(&FILE[..FILE.len() / 2]).err().unwrap());
-        assert!(!cut.is_empty());
-    }
-
-    #[test]
-    fn rows_match_products_of_single_windows() {
-        let (joints, mask) = (moving(1200), Array2::from_elem((1200, N_JOINTS), true));
-        let rows = windows(joints.view(), mask.view(), FPS);
-        assert_eq!(rows.dim(), ((1200 - 15) / 4 + 1, N));
-        let basis = Basis::parse(FILE).unwrap();
-        for n in [0, 1, 255, 256, 296] {
-            let window = poses(joints.slice(s![4 * n..4 * n + 15, .., ..]));
-            for k in [0, 17, 63] {
-                let number = |(i, v): (usize, &f32)| {
-                    f64::from(*v) * f64::from(basis.weights[i % N_COORDINATES / 3] * basis.directions[[i, k]])
-                };
-                let sum: f64 = window.iter().enumerate().map(number).sum();
-                assert!((sum - rows[[n, k]]).abs() < 1e-3 * (1.0 + sum.abs()), "{n} {k}: {sum} {}", rows[[n, k]]);
-            }
-        }
-    }
-
-    #[test]
-    fn translation_of_the_body_has_no_effect() {
-        let (joints, mask) = (moving(40), Array2::from_elem((40, N_JOINTS), true));
-        let original = windows(joints.view(), mask.view(), FPS);
-        let translated = windows((joints + 2.0).view(), mask.view(), FPS);
-        assert!(original.iter().zip(&translated).all(|(a, b)| (a - b).abs() < 1e-2));
-        assert_eq!(original.nrows(), 7);
     }
 }

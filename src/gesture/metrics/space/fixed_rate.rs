@@ -2,6 +2,7 @@
 //! the ranges of frames in which nothing is missing.
 
 use ndarray::{Array3, ArrayView2, ArrayView3};
+use orator_base::math::runs::true_ranges;
 use orator_base::types::skeleton::{N_JOINTS, NECK, is_duplicate};
 use orator_base::types::time::FrameRate;
 use std::ops::Range;
@@ -60,7 +61,7 @@ impl Frames {
                 (0..3).for_each(|k| frame[[joint, k]] = at(joint, k) - at(NECK, k));
             }
         }
-        Self { joints: out, complete: true_ranges(&visible) }
+        Self { joints: out, complete: true_ranges(&visible).collect() }
     }
 
     /// First frames of the windows of `window` frames, every `stride` frames within each complete range.
@@ -68,25 +69,4 @@ impl Frames {
         let of = |range: &Range<usize>| (range.start..(range.end + 1).saturating_sub(window)).step_by(stride);
         self.complete.iter().flat_map(of).collect()
     }
-}
-
-fn true_ranges(visible: &[bool]) -> Vec<Range<usize>> {
-    let mut found = Vec::new();
-    let mut from = 0;
-    for part in visible.chunk_by(|a, b| a == b) {
-        if part.first() == Some(&true) {
-            found.push(from..from + part.len());
-        }
-        from += part.len();
-    }
-    found
-}
-
-/// Artificial motion in which every joint moves, [n, 49, 3].
-#[cfg(test)]
-pub(super) fn moving(n: usize) -> Array3<f32> {
-    Array3::from_shape_fn((n, N_JOINTS, 3), |(t, joint, k)| {
-        let phase = (joint * 7 + k * 3) as f32;
-        0.1 * (phase + t as f32 * (0.05 + 0.01 * joint as f32)).sin() + 0.01 * joint as f32
-    })
 }

@@ -28,13 +28,18 @@ pub struct WindowChange {
     /// Playback speed: seconds of the interval per second of the window.
     pub speed: f64,
     pub is_mirrored: bool,
-    pitch_bands: f64,
-    gain: f32,
+    /// Mel bands by which the sound is raised.
+    pub pitch_bands: f64,
+    /// Added to the logarithms of the mels.
+    pub gain: f32,
     /// Mean magnitude of the noise relative to that of the window; 0: no noise.
-    noise: f32,
-    masked_bands: [usize; 2],
-    masked_frames: [usize; 2],
-    seed: u64,
+    pub noise: f32,
+    /// First band and the one after the last that are set to the mean.
+    pub masked_bands: [usize; 2],
+    /// Likewise the mel frames.
+    pub masked_frames: [usize; 2],
+    /// Of the noise.
+    pub seed: u64,
 }
 
 /// Augmented window: spectrogram [64, mel frames], poses [features, T] and their mask [features, T].
@@ -159,72 +164,4 @@ pub fn mirror(poses: &mut Array2<f32>, mask: &mut Array2<f32>, normal: &Normalis
 pub fn gaussian(n: usize, std: f64, seed: u64, step: usize) -> Vec<f32> {
     let mut rng = resume::step_rng(seed ^ !SEED_OF_CHANGES, step);
     (0..n).map(|_| (std * <StandardNormal as Distribution<f64>>::sample(&StandardNormal, &mut rng)) as f32).collect()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::train::gan::recipe::tests::of_minutes;
-    use orator_base::types::skeleton::{L_WRIST, R_WRIST};
-    use orator_dataset::config::GanRecipe;
-
-    fn unchanged() -> WindowChange {
-        WindowChange { speed: 1.0, seed: 1, ..WindowChange::default() }
-    }
-
-    fn sound() -> Array2<f32> {
-        Array2::from_shape_fn((mel::N_MELS, 100), |(band, t)| (0.1 * band as f32 + 0.05 * t as f32).sin() - 3.0)
-    }
-
-    #[test]
-    fn changes_are_reproducible_and_within_their_bounds() {
-        let (of, fps) = (of_minutes(GanRecipe::Auto, 10.0), FrameRate::new(15, 1));
-        let text = |step| format!("{:?}", changes(&of, step, fps));
-        assert!(text(3) == text(3) && text(3) != text(4));
-        for change in (0..50).flat_map(|step| changes(&of, step, fps)) {
-            assert!(change.speed.ln().abs() <= of.augment_speed && change.pitch_bands.abs() <= of.augment_pitch);
-            assert!(change.shift_secs.abs() <= 0.5 * fps.secs(of.stride_frames));
-            let [first, last] = change.masked_bands;
-            assert!(last - first <= of.augment_mask_bands && last <= mel::N_MELS);
-        }
-        assert!(changes(&of_minutes(GanRecipe::Rebol2021, 10.0), 3, fps).is_empty());
-    }
-
-    #[test]
-    fn each_change_has_its_effect() {
-        let changed = |change: WindowChange| {
-            let mut mels = sound();
-            change.change_sound(&mut mels);
-            mels
-        };
-        assert_eq!(changed(unchanged()), sound());
-        let louder = changed(WindowChange { gain: 0.5, ..unchanged() });
-        assert!((&louder - &sound()).iter().all(|gain| (gain - 0.5).abs() < 1e-6));
-        let higher = changed(WindowChange { pitch_bands: 2.0, ..unchanged() });
-        assert_eq!(higher.row(10), sound().row(8));
-        let noisy = changed(WindowChange { noise: 0.1, ..unchanged() });
-        assert!(noisy.iter().zip(&sound()).all(|(noisy, own)| noisy > own && noisy - own < 3.0));
-        let masked = changed(WindowChange { masked_bands: [4, 9], masked_frames: [10, 20], ..unchanged() });
-        let mean = sound().mean().unwrap();
-        assert!(masked.slice(s![4..9, ..]).iter().all(|x| *x == mean) && masked[[30, 15]] == mean);
-        assert_eq!(masked[[3, 9]], sound()[[3, 9]]);
-    }
-
-    #[test]
-    fn mirroring_swaps_the_hands_and_is_an_involution() {
-        let mean = Array2::from_shape_fn((N_JOINTS, 3), |(joint, k)| 0.01 * joint as f32 - 0.1 * k as f32);
-        let std = Array2::from_shape_fn((N_JOINTS, 3), |(joint, k)| 0.1 + 0.001 * (joint + k) as f32);
-        let normal = Normalisation::new(&mean, &std, vec![0.1; N_JOINTS - 1]);
-        let before = Array2::from_shape_fn((3 * (N_JOINTS - 1), 4), |(i, t)| (i as f32 * 0.3 + t as f32).sin());
-        let (mut poses, mut mask) = (before.clone(), Array2::ones(before.dim()));
-        mirror(&mut poses, &mut mask, &normal);
-        let metres = |of: &Array2<f32>, joint: usize, k: usize| {
-            let row = 3 * (joint - 1) + k;
-            of[[row, 2]] * normal.std[row] + normal.mean[row]
-        };
-        assert!((metres(&poses, L_WRIST, 0) + metres(&before, R_WRIST, 0)).abs() < 1e-5);
-        assert!((metres(&poses, L_WRIST, 1) - metres(&before, R_WRIST, 1)).abs() < 1e-5);
-        mirror(&mut poses, &mut mask, &normal);
-        assert!(poses.iter().zip(&before).all(|(a, b)| (a - b).abs() < 1e-4));
-    }
 }

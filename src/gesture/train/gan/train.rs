@@ -50,24 +50,14 @@ impl Default for TrainingStart<'_> {
 /// Largest number of threads that read batches for a GPU.
 const MAX_READERS: usize = 8;
 
-/// Trains on `dataset` until `requested.steps`, resuming from the newest checkpoint in `folder` if there is one; then
-/// the settings of that checkpoint apply, and differences are reported.
+/// Trains one speaker or several, a dataset each, until `requested.steps`, resuming from the newest checkpoint in
+/// `folder` if there is one; then its settings apply, and differences are reported. Calls `validated` after each
+/// validation, when its log line and checkpoint have been written.
 ///
 /// # Errors
 /// No window to train on; a checkpoint of another speaker or version; another training running in `folder`; a loss that
 /// is not finite or explodes (the last good checkpoint is kept); `StoppedTraining` if `progress` requests a stop.
 pub fn train(
-    dataset: &Dataset,
-    requested: &GanConfig,
-    folder: &Path,
-    progress: &dyn Progress,
-) -> Result<TrainingOutcome<Validation>> {
-    train_with_callback(&[dataset], requested, &TrainingStart::default(), folder, progress, &mut |_| ())
-}
-
-/// Like [`train`], for one speaker or several, a dataset each; calls `validated` after each validation, when its log
-/// line and checkpoint have been written.
-pub fn train_with_callback(
     datasets: &[&Dataset],
     requested: &GanConfig,
     start: &TrainingStart,

@@ -29,26 +29,15 @@ use orator_nn::seq2seq::config::Config;
 use orator_nn::weights::Contents;
 use std::path::Path;
 
-/// Trains to the last step of `requested`, resuming from the newest checkpoint in `folder` if there is one; then its
-/// settings apply, and differences are reported. `vectors` initialise the word embeddings; else they are random.
+/// Trains on `device` to the last step of `requested`, resuming from the newest checkpoint in `folder` if there is one;
+/// then its settings apply, and differences are reported. `vectors` initialise the word embeddings; else they are
+/// random. Calls `validated` after each validation, when its log line and checkpoint have been written.
 ///
 /// # Errors
 /// Data that cannot be read, with the name of the file; no segment to train on; a checkpoint of other data; another
 /// training running in `folder`; a loss that is not finite or explodes (the last good checkpoint is kept);
 /// `StoppedTraining` if `progress` requests a stop.
 pub fn train(
-    source: TrainingSource,
-    vectors: Option<&WordVectors>,
-    requested: &Seq2seqConfig,
-    folder: &Path,
-    progress: &dyn Progress,
-) -> Result<TrainingOutcome<SequenceValidation>> {
-    train_with_callback(source, vectors, requested, &Device::Cpu, folder, progress, &mut |_| ())
-}
-
-/// Like [`train`], on `device`; calls `validated` after each validation, when its log line and checkpoint have been
-/// written.
-pub fn train_with_callback(
     source: TrainingSource,
     vectors: Option<&WordVectors>,
     requested: &Seq2seqConfig,

@@ -46,7 +46,7 @@ impl LineChart {
     }
 
     /// Ranges of the axes: first to last step with the marked one, and 0 (or the smallest value below) to the largest.
-    fn ranges(&self) -> [[f64; 2]; 2] {
+    pub fn ranges(&self) -> [[f64; 2]; 2] {
         let levels = self.levels.iter().map(|level| level.value).filter(|value| value.is_finite());
         let range_of = |values: &mut dyn Iterator<Item = f64>, low: f64| {
             values.fold([low, f64::NEG_INFINITY], |[low, high], value| [low.min(value), high.max(value)])
@@ -138,35 +138,4 @@ pub fn curve(label: &str, values: &[f64], max: f64, marked: usize) -> Node {
         .child(line("axis", [LEFT, FLOOR], [RIGHT, FLOOR]))
         .child(line("configured", [at[0], TOP], [at[0], FLOOR]))
         .child(circle("dot", at, 4.5))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn lines_levels_and_the_marked_step_are_drawn() {
-        let points = vec![[0.0, 4.0], [50.0, f64::NAN], [100.0, 2.0]];
-        let chart = LineChart {
-            title: "A < b".to_owned(),
-            lines: vec![ChartLine { name: "generated".to_owned(), colour: 0, points }],
-            levels: vec![ChartLevel { name: "mean pose".to_owned(), colour: 1, value: 1.0 }],
-            marked: Some(100.0),
-            ..LineChart::default()
-        };
-        assert_eq!(chart.ranges(), [[0.0, 100.0], [0.0, 4.0]]);
-        let drawn = chart.card().to_string();
-        assert!(drawn.contains("d=\"M44 12 L350 86\""), "{drawn}");
-        assert!(drawn.contains("y1=\"123\" x2=\"350\" y2=\"123\"") && drawn.contains("A &lt; b"), "{drawn}");
-        let empty = LineChart::default();
-        assert!(empty.is_empty() && empty.card().to_string().contains("<svg") && !chart.is_empty());
-        assert_eq!(empty.ranges(), [[0.0, 1.0], [0.0, 1.0]]);
-    }
-
-    #[test]
-    fn the_marked_step_is_on_the_line() {
-        let drawn = curve("", &[0.0, 5.0, 10.0], 10.0, 1).to_string();
-        assert!(drawn.contains("cx=\"150\" cy=\"28\"") && drawn.contains("data-xs=\"8 150 292\""), "{drawn}");
-        assert!(curve("", &[], 0.0, 3).to_string().contains("<svg"));
-    }
 }

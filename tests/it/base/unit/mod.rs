@@ -1,6 +1,7 @@
 //! Tests of single modules of `orator-base`.
 
 mod artifacts;
+mod audio;
 mod cholesky;
 mod eigen;
 mod exponential_map;
@@ -12,6 +13,8 @@ mod image;
 mod input;
 mod jerk;
 mod lock;
+mod math;
+mod motion;
 mod skeleton;
 mod sound;
 mod upper_body;

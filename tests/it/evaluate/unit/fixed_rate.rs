@@ -5,6 +5,14 @@ use orator_base::types::skeleton::{L_HAND, N_JOINTS, NECK, R_WRIST};
 use orator_base::types::time::FrameRate;
 use orator_gesture::metrics::space::fixed_rate::{FPS, Frames, N_JOINTS_USED, joints_used};
 
+/// Artificial motion in which every joint moves, [n, 49, 3].
+pub(super) fn moving(n: usize) -> Array3<f32> {
+    Array3::from_shape_fn((n, N_JOINTS, 3), |(t, joint, k)| {
+        let phase = (joint * 7 + k * 3) as f32;
+        0.1 * (phase + t as f32 * (0.05 + 0.01 * joint as f32)).sin() + 0.01 * joint as f32
+    })
+}
+
 fn line(n: usize, per_frame: f32) -> Array3<f32> {
     Array3::from_shape_fn((n, N_JOINTS, 3), |(t, joint, k)| joint as f32 + k as f32 + t as f32 * per_frame)
 }

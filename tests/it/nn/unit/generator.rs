@@ -3,8 +3,8 @@
 use candle_core::DType;
 use candle_core::{Result, Tensor};
 use orator_nn::gan::generator::{Config, Generator, Preset};
-use orator_nn::ops::gradcheck::{pattern, worst};
 use orator_nn::params::Params;
+use orator_test_support::gradcheck::{pattern, worst};
 
 #[test]
 fn output_has_the_requested_number_of_frames() -> Result<()> {

@@ -17,9 +17,9 @@ use orator_gesture::train::gan::windows::WindowBatch;
 use orator_gesture::train::optim::adam::{self, Adam};
 use orator_nn::gan::generator::{Config, Preset};
 use orator_nn::gan::words::{N_TIMES, WordFrames};
-use orator_nn::ops::gradcheck::pattern;
 use orator_nn::params::{Init, Params};
 use orator_nn::weights::Contents;
+use orator_test_support::gradcheck::pattern;
 use std::path::Path;
 
 const N_FRAMES: usize = 64;

@@ -1,3 +1,5 @@
 //! Tests of single modules.
 
 mod average;
+mod gan;
+mod seq2seq;

@@ -1,5 +1,5 @@
 //! Checks of operators for tests: gradients by backpropagation against central differences in f64, equality of two
-//! implementations, and identical bits for any number of threads. Public, so that the tests of other crates can use it.
+//! implementations, and identical bits for any number of threads.
 
 use candle_core::{DType, Device, Result, Tensor, Var};
 

@@ -1,0 +1,3 @@
+//! Tests of single modules of `orator_avatar::animate::avatar`.
+
+mod posing;

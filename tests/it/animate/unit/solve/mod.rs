@@ -1,0 +1,4 @@
+//! Tests of single modules of `orator_avatar::animate::solve`.
+
+mod roll;
+mod smoothing;

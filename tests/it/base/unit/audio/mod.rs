@@ -1,0 +1,4 @@
+//! Tests of single modules of `orator_base::audio`.
+
+mod onset;
+mod pauses;

@@ -1,0 +1,4 @@
+//! Tests of single modules of `orator-onnx`.
+
+mod manifest;
+mod runtime;

@@ -1,0 +1,4 @@
+//! Tests of single modules of `orator_dataset::config`.
+
+mod keypoints;
+mod videos;

@@ -1,0 +1,3 @@
+//! Tests of single modules of `orator_gesture::evaluate::clips`.
+
+mod sound_features;

@@ -1,0 +1,5 @@
+//! Tests of single modules of `orator_gesture::evaluate::table`.
+
+mod blocks;
+mod bootstrap;
+mod sign_flips;

@@ -1,0 +1,3 @@
+//! Tests of single modules of `orator_formats::mocap`.
+
+mod fingers;

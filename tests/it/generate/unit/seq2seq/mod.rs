@@ -1,0 +1,3 @@
+//! Tests of single modules of `orator_gesture::generate::seq2seq`.
+
+mod metadata;

@@ -1,0 +1,3 @@
+//! Tests of single modules of `orator_nn::cpu`.
+
+mod vectorised;

@@ -1,0 +1,4 @@
+//! Tests of single modules of `orator_report::html`.
+
+mod lines;
+mod timeline;

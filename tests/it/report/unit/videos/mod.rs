@@ -1,0 +1,4 @@
+//! Tests of single modules of `orator_report::videos`.
+
+mod movement;
+mod timelines;

@@ -1,0 +1,3 @@
+//! Tests of single modules of `orator-pipeline`.
+
+mod process_limits;

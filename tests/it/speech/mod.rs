@@ -1,0 +1,3 @@
+//! Speech activity and recognition of speech.
+
+mod unit;

@@ -1,0 +1,3 @@
+//! Tests of single modules of `orator-pipeline`.
+
+mod speech_activity;

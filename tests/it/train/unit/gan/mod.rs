@@ -1,0 +1,5 @@
+//! Tests of single modules of `orator_gesture::train::gan`.
+
+mod augment;
+mod recipe;
+mod speakers;

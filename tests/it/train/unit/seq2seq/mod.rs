@@ -1,0 +1,4 @@
+//! Tests of single modules of `orator_gesture::train::seq2seq`.
+
+mod segments;
+mod step;
