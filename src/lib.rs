@@ -22,7 +22,9 @@
 //! | `orator-pipeline` | the six stages, their order, and their processes |
 //! | `orator-gesture` | training, generation, metrics, evaluation |
 //! | `orator-report` | HTML pages |
+//! | `orator-web` | HTTP servers: connections, limits, security headers |
 //! | `orator-study` | user studies: films, server, statistics |
+//! | `orator-view` | the local page of `orator view` |
 //! | `orator-cluster` | several machines that share one work folder |
 //! | `orator` | this library and the program |
 //! | `orator-test-support` | inputs with known truth for tests |

@@ -18,10 +18,11 @@ macro_rules! topic {
 }
 
 /// Every page, in reading order.
-pub const TOPICS: [Topic; 19] = [
+pub const TOPICS: [Topic; 20] = [
     topic!("tutorial", "from videos to generated motion: every command with its output"),
     topic!("questions", "minutes of video, own rig, own language, phone videos, seated speakers"),
     topic!("dataset", "files of a dataset, rejected seconds, transcripts, splits, import and removal"),
+    topic!("view", "a local page: videos with keypoints and avatar, decisions, trainings, results"),
     topic!("lifting", "2D keypoints to 3D joints: input, output, errors, custom lifters"),
     topic!("keypoints", "keypoints of OpenPose, MMPose, AlphaPose, MediaPipe and PATS instead of videos"),
     topic!("training", "training: settings, recipes, fine-tuning, validation, checkpoints; generating motion"),
@@ -53,6 +54,6 @@ mod tests {
             assert_eq!(wide, None, "{}", topic.name);
         }
         let n_lines: usize = TOPICS.iter().map(|topic| topic.text.lines().count()).sum();
-        assert!(n_lines <= 2000, "{n_lines} lines");
+        assert!(n_lines <= 2030, "{n_lines} lines");
     }
 }

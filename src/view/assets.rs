@@ -1,11 +1,9 @@
 //! Files of the page by path below the token, with their content types.
 
 const SCRIPT: &str = "text/javascript; charset=utf-8";
-const PAGE: &str = "text/html; charset=utf-8";
 
 /// Path, content type and content of every file.
-pub const ASSETS: [(&str, &str, &str); 15] = [
-    ("/", PAGE, include_str!("page/page.html")),
+pub const ASSETS: [(&str, &str, &str); 14] = [
     ("/page.css", "text/css; charset=utf-8", include_str!("page/page.css")),
     ("/app.js", SCRIPT, include_str!("page/app.js")),
     ("/avatar.js", SCRIPT, include_str!("page/avatar.js")),

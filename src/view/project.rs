@@ -14,30 +14,31 @@ use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-/// Opened configuration; the work folder is read anew for every request.
+/// Project of a configuration; videos, decisions and the work folder are read anew for every request.
 pub struct Project {
-    pipeline: Pipeline,
+    config: Config,
 }
 
 impl Project {
     /// # Errors
     /// Those of [`Pipeline::open`].
     pub fn open(config: Config) -> Result<Self> {
-        Ok(Self { pipeline: Pipeline::open(config)? })
+        Pipeline::open(config.clone())?;
+        Ok(Self { config })
     }
 
-    pub fn config(&self) -> &Config {
-        self.pipeline.config()
+    fn pipeline(&self) -> Result<Pipeline> {
+        Pipeline::open(self.config.clone())
     }
 
     /// Work folder.
     pub fn work(&self) -> &Path {
-        &self.config().settings.work.dir
+        &self.config.settings.work.dir
     }
 
     /// Facts that do not change while the server runs.
     pub fn facts(&self) -> Value {
-        let config = self.config();
+        let config = &self.config;
         let speakers: Vec<&str> = config.settings.speaker.iter().map(|speaker| speaker.name.as_str()).collect();
         let folder = config.file.parent().and_then(Path::file_name).unwrap_or_default().to_string_lossy();
         json!({ "title": folder, "config": config.file.display().to_string(), "speakers": speakers })
@@ -49,9 +50,9 @@ impl Project {
     /// Decisions that cannot be read.
     pub fn videos(&self) -> Result<Value> {
         let mut rows = Vec::new();
-        for of_speaker in self.pipeline.videos(&[])? {
+        for of_speaker in self.pipeline()?.videos(&[])? {
             for unit in &of_speaker.units {
-                let video = VideoSummary::read(&self.config().settings, unit);
+                let video = VideoSummary::read(&self.config.settings, unit);
                 let is_waiting = video.ledger.accepted.is_empty() && video.ledger.rejected.is_empty();
                 let state = match (video.has_failed, is_waiting) {
                     (true, _) => "failed",
@@ -78,11 +79,11 @@ impl Project {
     /// # Errors
     /// The videos cannot be listed.
     pub fn video(&self, speaker: &str, name: &str) -> Result<Option<VideoView>> {
-        for mut of_speaker in self.pipeline.videos(&[])?.into_iter().filter(|of| of.speaker == speaker) {
+        for mut of_speaker in self.pipeline()?.videos(&[])?.into_iter().filter(|of| of.speaker == speaker) {
             if let Some(unit) = of_speaker.units.iter().find(|unit| unit.video == name) {
                 let transcripts: Vec<PathBuf> = of_speaker.transcripts.remove(name).unwrap_or_default();
                 let decisions = of_speaker.decisions.iter().filter(|one| one.video == name).cloned().collect();
-                return Ok(Some(VideoView::new(unit.clone(), &self.config().settings, transcripts, decisions)));
+                return Ok(Some(VideoView::new(unit.clone(), &self.config.settings, transcripts, decisions)));
             }
         }
         Ok(None)
@@ -99,7 +100,7 @@ impl Project {
         let (id, time) = (String::new(), String::new());
         let (speaker, video, author) = (speaker.to_owned(), name.to_owned(), author.to_owned());
         let decision = Decision { id, speaker, video, action, start_secs, end_secs, x, y, text, author, time };
-        Ok(json!({ "id": decisions::add(&self.config().file, &decision)?.id }))
+        Ok(json!({ "id": decisions::add(&self.config.file, &decision)?.id }))
     }
 
     /// Removes the decision `id`.
@@ -107,7 +108,7 @@ impl Project {
     /// # Errors
     /// There is no such decision, or the file cannot be written.
     pub fn undo(&self, id: &str) -> Result<Value> {
-        decisions::remove(&self.config().file, id)?;
+        decisions::remove(&self.config.file, id)?;
         Ok(json!({ "removed": true }))
     }
 
@@ -116,7 +117,7 @@ impl Project {
     /// # Errors
     /// A video that is being deleted.
     pub fn stages(&self) -> Result<Value> {
-        let status = self.pipeline.status(&[])?;
+        let status = self.pipeline()?.status(&[])?;
         let count = |stage: StageName, states: &[UnitState]| {
             status.units.iter().filter(|unit| unit.stage == stage && states.contains(&unit.state)).count()
         };

@@ -90,7 +90,9 @@ fn router(viewer: Viewer, token: &str) -> Router {
     for (path, content_type, text) in ASSETS {
         pages = pages.route(path, get(async move || text_reply(content_type, text)));
     }
-    Router::new().nest(&format!("/{token}"), pages).with_state(Arc::new(viewer))
+    let page = get(async || text_reply("text/html; charset=utf-8", include_str!("page/page.html")));
+    let router = Router::new().route(&format!("/{token}/"), page).nest(&format!("/{token}"), pages);
+    router.with_state(Arc::new(viewer))
 }
 
 /// Runs `work` on a thread that may block; its errors are shown to the user.

@@ -168,6 +168,7 @@ fn of_project(args: &Args, locks: &mut Vec<FolderLock>) -> Result<ForgetTask> {
     }
     let others: Vec<&KnownVideo> = all.iter().filter(|k| !videos.contains(k)).collect();
     let mut removal = Removal::of_work(work, &speaker, &videos, &others, whole)?;
+    removal.add_decisions(&config.file, &videos)?;
     let plans = plans_naming(work, &removal.terms)?;
     if is_locked {
         let own = models_dirs(work, &speaker);

@@ -5,6 +5,7 @@
 use super::dataset;
 use super::known::KnownVideo;
 use super::search::SearchTerm;
+use crate::decisions::{self, Decision};
 use crate::file_name;
 use crate::split::SplitRecord;
 use anyhow::{Context, Result};
@@ -60,6 +61,8 @@ pub struct Removal {
     pub hashes: Option<(PathBuf, usize)>,
     /// Split record, and the number of videos to remove from it.
     pub splits: Option<(PathBuf, usize)>,
+    /// Configuration file, and the decisions beside it to remove.
+    pub decisions: Option<(PathBuf, Vec<String>)>,
     /// Names and hashes of the videos, which must not be found afterwards.
     pub terms: Vec<SearchTerm>,
 }
@@ -129,6 +132,20 @@ impl Removal {
         Ok(removal)
     }
 
+    /// Adds the decisions beside `config` about `videos`.
+    ///
+    /// # Errors
+    /// An invalid `decisions.toml`.
+    pub fn add_decisions(&mut self, config: &Path, videos: &[&KnownVideo]) -> Result<()> {
+        let is_about = |one: &Decision| {
+            videos.iter().any(|video| video.speaker == one.speaker && video.work.as_ref() == Some(&one.video))
+        };
+        let about: Vec<Decision> = decisions::read(config)?.into_iter().filter(is_about).collect();
+        let ids: Vec<String> = about.into_iter().map(|one| one.id).collect();
+        self.decisions = (!ids.is_empty()).then(|| (config.to_owned(), ids));
+        Ok(())
+    }
+
     /// Plans the removal of `videos` from a dataset folder without a work folder.
     pub fn of_dataset(dir: &Path, videos: &[&KnownVideo], others: &[&KnownVideo]) -> Self {
         let names = videos.iter().flat_map(|video| video.parts.iter().cloned()).collect();
@@ -143,6 +160,7 @@ impl Removal {
             && self.dataset.is_none()
             && self.hashes.is_none()
             && self.splits.is_none()
+            && self.decisions.is_none()
     }
 
     /// One line for each thing that is removed.
@@ -153,6 +171,9 @@ impl Removal {
         }
         if let Some((path, n)) = &self.splits {
             lines.push(format!("{} of {}", counted(*n, "entry"), path.display()));
+        }
+        if let Some((config, ids)) = &self.decisions {
+            lines.push(format!("{} of {}", counted(ids.len(), "decision"), decisions::path(config).display()));
         }
         if let Some((dir, names)) = &self.dataset {
             lines.extend(names.iter().map(|name| format!("{name} of the dataset {}", dir.display())));
@@ -190,6 +211,9 @@ impl Removal {
         }
         if let Some((dir, names)) = &self.dataset {
             dataset::without(dir, names)?;
+        }
+        if let Some((config, ids)) = &self.decisions {
+            ids.iter().try_for_each(|id| decisions::remove(config, id).map(drop))?;
         }
         Ok(())
     }

@@ -3,6 +3,7 @@
 
 use crate::fixtures::media::recogniser::project_with_words;
 use orator_base::stage::progress::Silent;
+use orator_dataset::decisions::{self, Decision, DecisionAction};
 use orator_dataset::forget::removal::PENDING;
 use orator_dataset::verify::verify::verify;
 use orator_test_support::project::{Project, files_under};
@@ -48,8 +49,27 @@ fn forgetting_removes_all_data_of_a_video_and_no_other_data() {
         );
     }
 
+    let stem_of_forgotten = forgotten.file_stem().unwrap().to_str().unwrap().replace('_', "-");
+    let folder = project.written("extract", &stem_of_forgotten, "audio.wav");
+    let decision = Decision {
+        speaker: "host".to_owned(),
+        video: folder.parent().unwrap().file_name().unwrap().to_str().unwrap().to_owned(),
+        action: DecisionAction::Reject,
+        end_secs: 1.0,
+        author: "ana".to_owned(),
+        id: String::new(),
+        time: String::new(),
+        start_secs: 0.0,
+        x: None,
+        y: None,
+        text: None,
+    };
+    decisions::add(&project.dir().join("pipeline.toml"), &decision).unwrap();
+
     let answer = project.answer(&["forget", "--video", name]);
     assert_eq!(answer.code, 0, "{} {}", answer.json, answer.errors);
+    assert!(answer.json["removed"].to_string().contains("1 decision of "), "{}", answer.json);
+    assert!(!project.dir().join("decisions.toml").exists());
     assert!(answer.json["found"].as_array().unwrap().is_empty());
     assert!(answer.json["searched"]["files"].as_u64().unwrap() > 20, "{}", answer.json);
     let advice = answer.json["advice"].to_string();

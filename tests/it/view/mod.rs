@@ -1,3 +1,4 @@
 //! The local page of `orator view`.
 
+mod browser;
 mod server;

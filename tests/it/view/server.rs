@@ -10,12 +10,12 @@ use std::net::TcpStream;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-fn view(project: &Project, more: &[&str]) -> Viewer {
+pub(super) fn view(project: &Project, more: &[&str]) -> Viewer {
     Viewer::start(project.command(&[&["view"], more].concat()))
 }
 
 /// Project with a processed video and an untrained model of the speaker.
-fn processed() -> Project {
+pub(super) fn processed() -> Project {
     let project = Project::with_clips("view", 1, 12.0);
     let run = project.run(&[]);
     assert_eq!(run.code, 0, "{}", run.errors);
@@ -105,7 +105,7 @@ fn a_project_is_shown_and_its_model_generates() {
     );
 
     // A dropped sound, and a clip of the dataset beside the truth.
-    let wav = fs::read(project.written("extract", "clip-000", "audio.wav")).unwrap();
+    let wav = fs::read(project.written("extract", "clip-1", "audio.wav")).unwrap();
     let (status, reply) =
         viewer.post("api/results?checkpoint=gan/host&seed=3&name=talk.wav", "application/octet-stream", &wav);
     assert_eq!(status, 200, "{reply}");
