@@ -10,6 +10,7 @@ use orator_base::stage::{Unit, workdir};
 use orator_base::types::device::DeviceChoice;
 use orator_dataset::config::videos::Videos;
 use orator_dataset::config::{Config, GanConfig, Seq2seqConfig};
+use orator_dataset::decisions;
 use orator_pipeline::Pipeline;
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
@@ -320,5 +321,11 @@ pub fn settings_hash(config: &Config) -> Result<String> {
     (settings.work.jobs, settings.work.device) = (0, DeviceChoice::default());
     settings.gan = GanConfig::default();
     settings.seq2seq = Seq2seqConfig::default();
-    Ok(blake3::hash(&serde_json::to_vec(&settings)?).to_hex().to_string())
+    let mut bytes = serde_json::to_vec(&settings)?;
+    let (decisions, mut recorded) = (decisions::read(&config.file)?, serde_json::json!({}));
+    decisions::record(&decisions.iter().collect::<Vec<_>>(), &mut recorded);
+    if !decisions.is_empty() {
+        bytes.extend(recorded.to_string().as_bytes());
+    }
+    Ok(blake3::hash(&bytes).to_hex().to_string())
 }

@@ -27,8 +27,8 @@ impl ViewedFile {
         ensure!(path.is_file(), "{} is not a file", path.display());
         let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
         let has = |path: &Path, ending: &str| path.extension().is_some_and(|own| own.eq_ignore_ascii_case(ending));
-        let stem = motion_file::stem(path);
-        let sounds = SOUND_EXTENSIONS.iter().map(|ending| path.with_file_name(stem).with_extension(ending));
+        let stem = motion_file::stem(path).to_string_lossy();
+        let sounds = SOUND_EXTENSIONS.iter().map(|ending| path.with_file_name(format!("{stem}.{ending}")));
         let sound = sounds.into_iter().find(|sound| sound.is_file());
         if has(path, "glb") || has(path, "vrm") {
             return Ok(Self { name, path: path.to_owned(), sound, _folder: None });

@@ -6,6 +6,7 @@ use orator_base::stage::Unit;
 use orator_base::stage::artifacts::StageName;
 use orator_base::stage::rejection::Rejection;
 use orator_dataset::config::Config;
+use orator_dataset::config::videos::Videos;
 use orator_dataset::decisions::{self, Decision, DecisionAction};
 use orator_pipeline::{Pipeline, UnitState};
 use orator_report::videos::gather::VideoSummary;
@@ -96,20 +97,36 @@ impl Project {
     pub fn decide(&self, request: DecisionRequest, author: &str) -> Result<Value> {
         let DecisionRequest { video, action, start_secs, end_secs, x, y, text } = request;
         let (speaker, name) = video.split_once('/').context("`video` is not SPEAKER/NAME")?;
-        ensure!(self.video(speaker, name)?.is_some(), "the project has no video {video}");
+        let is_known = |of: &Videos| of.speaker == speaker && of.units.iter().any(|unit| unit.video == name);
+        ensure!(self.pipeline()?.videos(&[])?.iter().any(is_known), "the project has no video {video}");
         let (id, time) = (String::new(), String::new());
         let (speaker, video, author) = (speaker.to_owned(), name.to_owned(), author.to_owned());
         let decision = Decision { id, speaker, video, action, start_secs, end_secs, x, y, text, author, time };
         Ok(json!({ "id": decisions::add(&self.config.file, &decision)?.id }))
     }
 
-    /// Removes the decision `id`.
+    /// Removes the decision `id`; `false`: there is none.
     ///
     /// # Errors
-    /// There is no such decision, or the file cannot be written.
-    pub fn undo(&self, id: &str) -> Result<Value> {
-        decisions::remove(&self.config.file, id)?;
-        Ok(json!({ "removed": true }))
+    /// The file cannot be read or written.
+    pub fn undo(&self, id: &str) -> Result<bool> {
+        let config = &self.config.file;
+        let is_known = decisions::read(config)?.iter().any(|one| one.id == id);
+        if is_known {
+            decisions::remove(config, id)?;
+        }
+        Ok(is_known)
+    }
+
+    /// File of the video `SPEAKER/NAME`; `None` for an unknown video and for one given as keypoints.
+    ///
+    /// # Errors
+    /// The videos cannot be listed.
+    pub fn film(&self, speaker: &str, name: &str) -> Result<Option<PathBuf>> {
+        let videos = self.pipeline()?.videos(&[])?.into_iter().find(|of| of.speaker == speaker);
+        let videos = videos.filter(|of| !of.keypoints.contains_key(name));
+        let unit = videos.and_then(|of| of.units.into_iter().find(|unit| unit.video == name));
+        Ok(unit.map(|unit| unit.source))
     }
 
     /// Number of videos by state at every stage, and the failures.

@@ -1,10 +1,10 @@
 //! Motion generated for the page: a queue of one worker that starts `generate` of this program for each request. Files
 //! are in a folder that is removed when the server ends.
 
-use anyhow::{Context, Result, bail, ensure};
+use anyhow::{Context, Result, bail};
 use orator_base::types::sound::SAMPLE_RATE;
 use orator_dataset::{Dataset, Split};
-use orator_formats::wav;
+use orator_formats::{checkpoint, wav};
 use orator_web::files::{hex, random};
 use serde::Serialize;
 use serde_json::{Value, json};
@@ -18,8 +18,8 @@ use std::sync::{Arc, Mutex};
 const MAX_CLIP_SECS: f64 = 20.0;
 /// Maximum length of the name of a sound.
 const MAX_NAME: usize = 120;
-/// Maximum number of results that are kept.
-const MAX_RESULTS: usize = 200;
+/// Maximum number of results; the oldest is removed for a new one.
+const MAX_RESULTS: usize = 50;
 /// Sound of a clip of the dataset; an uploaded sound has its own extension.
 const SPEECH: &str = "speech.wav";
 
@@ -28,12 +28,19 @@ pub struct GeneratedResult {
     pub id: String,
     /// Name of the training.
     pub checkpoint: String,
-    pub seed: u64,
+    /// Seed of the variant; `None`: the network's own motion.
+    pub seed: Option<u64>,
+    /// Speaker, for a model of several.
+    pub speaker: Option<String>,
+    /// Step of the checkpoint.
+    pub step: Value,
     /// Name of the sound.
     pub name: String,
     pub state: &'static str,
-    /// Error of a failed result.
+    /// Error of a failed result or of its video.
     pub message: String,
+    /// State of the video: empty, `queued`, `done` or `failed`.
+    pub film: &'static str,
     /// Names of the finished files, the sound first.
     pub files: Vec<String>,
     #[serde(skip)]
@@ -50,12 +57,32 @@ enum ResultJob {
     Film(String),
 }
 
-/// Results in the order of their requests.
+/// What a result is generated from.
+pub struct ResultRequest {
+    /// Name of the training.
+    pub checkpoint: String,
+    pub checkpoint_file: PathBuf,
+    pub seed: Option<u64>,
+    pub speaker: Option<String>,
+    /// Name of the sound.
+    pub name: String,
+}
+
+/// Results in the order of their requests. Their folder is removed with the last clone.
 #[derive(Clone)]
 pub struct Results {
     folder: Arc<tempfile::TempDir>,
     all: Arc<Mutex<Vec<GeneratedResult>>>,
     queue: Sender<ResultJob>,
+}
+
+/// Registered result whose sound is not complete; removed on drop unless it is queued.
+pub struct PendingResult {
+    results: Results,
+    id: String,
+    /// Path at which the sound is expected.
+    pub sound: PathBuf,
+    is_queued: bool,
 }
 
 impl Results {
@@ -67,58 +94,57 @@ impl Results {
         let folder = Arc::new(tempfile::tempdir().context("cannot create a temporary folder")?);
         let (queue, jobs) = mpsc::channel::<ResultJob>();
         let results = Self { folder, all: Arc::default(), queue };
-        let (folder, all) = (results.folder.clone(), results.all.clone());
-        std::thread::spawn(move || {
-            let worker = ResultWorker { program, folder: folder.path().to_owned(), all };
-            jobs.into_iter().for_each(|job| worker.work(&job));
-        });
+        let worker = ResultWorker { program, folder: results.folder.path().to_owned(), all: results.all.clone() };
+        std::thread::spawn(move || jobs.into_iter().for_each(|job| worker.work(&job)));
         Ok(results)
     }
 
-    /// Registers a result and returns its identifier and the path of its sound, which is written before
-    /// [`Self::generate`] or [`Self::pair`].
+    /// Registers a result; above 50, the oldest that is not being generated is removed.
     ///
     /// # Errors
-    /// Too many results, or the folder cannot be created.
-    pub fn add(&self, checkpoint: &str, checkpoint_file: PathBuf, seed: u64, name: &str) -> Result<(String, PathBuf)> {
+    /// An unreadable checkpoint, too many results in the queue, or a folder that cannot be created.
+    pub fn add(&self, request: ResultRequest) -> Result<PendingResult> {
+        let ResultRequest { checkpoint, checkpoint_file, seed, speaker, name } = request;
+        let step = checkpoint::facts(&checkpoint_file)?["step"].clone();
         let id = hex(&random::<8>()?);
         let folder = self.folder.path().join(&id);
-        fs::create_dir(&folder)?;
         let name: String = name.chars().filter(|c| !c.is_control()).take(MAX_NAME).collect();
         let extension = Path::new(&name).extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
         let is_plain = (1..=5).contains(&extension.len()) && extension.bytes().all(|byte| byte.is_ascii_alphanumeric());
         let sound = if is_plain { format!("speech.{extension}") } else { SPEECH.to_owned() };
         let path = folder.join(&sound);
-        let (checkpoint, files) = (checkpoint.to_owned(), vec![sound]);
-        let (state, message) = ("queued", String::new());
         let mut all = self.all.lock().map_err(|_| anyhow::anyhow!("the results are not available"))?;
-        ensure!(all.len() < MAX_RESULTS, "there are {MAX_RESULTS} results: restart `orator view`");
-        all.push(GeneratedResult { id: id.clone(), checkpoint, seed, name, state, message, files, checkpoint_file });
-        Ok((id, path))
-    }
-
-    /// Queues the generation of motion for the uploaded sound.
-    pub fn generate(&self, id: &str) {
-        let _ = self.queue.send(ResultJob::Generate(id.to_owned()));
-    }
-
-    /// Queues a clip of `dataset` for comparison.
-    pub fn pair(&self, id: &str, dataset: PathBuf) {
-        let _ = self.queue.send(ResultJob::Pair(id.to_owned(), dataset));
-    }
-
-    /// Queues the video of a result; `false`: there is no such result.
-    pub fn film(&self, id: &str) -> bool {
-        let is_known = self.all.lock().is_ok_and(|all| all.iter().any(|one| one.id == id && one.state == "done"));
-        is_known && self.queue.send(ResultJob::Film(id.to_owned())).is_ok()
-    }
-
-    /// Removes a result whose upload failed.
-    pub fn remove(&self, id: &str) {
-        if let Ok(mut all) = self.all.lock() {
-            all.retain(|one| one.id != id);
+        if all.len() >= MAX_RESULTS {
+            let is_idle = |one: &GeneratedResult| ["done", "failed"].contains(&one.state) && one.film != "queued";
+            let oldest = all.iter().position(is_idle).context("too many results are in the queue: wait for one")?;
+            let _ = fs::remove_dir_all(self.folder.path().join(all.remove(oldest).id));
         }
-        let _ = fs::remove_dir_all(self.folder.path().join(id));
+        fs::create_dir(&folder)?;
+        let (files, state, film, message) = (vec![sound], "queued", "", String::new());
+        let result = GeneratedResult {
+            id: id.clone(),
+            checkpoint,
+            seed,
+            speaker,
+            step,
+            name,
+            state,
+            message,
+            film,
+            files,
+            checkpoint_file,
+        };
+        all.push(result);
+        Ok(PendingResult { results: self.clone(), id, sound: path, is_queued: false })
+    }
+
+    /// Queues the video of a finished result that has none; `false`: there is no such result.
+    pub fn film(&self, id: &str) -> bool {
+        let Ok(mut all) = self.all.lock() else { return false };
+        let without_film = |one: &&mut GeneratedResult| one.id == id && one.state == "done" && one.film != "done";
+        let Some(result) = all.iter_mut().find(without_film) else { return false };
+        let was_queued = std::mem::replace(&mut result.film, "queued") == "queued";
+        was_queued || self.queue.send(ResultJob::Film(id.to_owned())).is_ok()
     }
 
     pub fn facts(&self) -> Value {
@@ -133,6 +159,37 @@ impl Results {
     }
 }
 
+impl PendingResult {
+    /// Queues the generation of motion for the sound, and returns the identifier of the result.
+    pub fn generate(self) -> String {
+        let job = ResultJob::Generate(self.id.clone());
+        self.send(job)
+    }
+
+    /// Queues a clip of `dataset` for comparison, and returns the identifier of the result.
+    pub fn pair(self, dataset: PathBuf) -> String {
+        let job = ResultJob::Pair(self.id.clone(), dataset);
+        self.send(job)
+    }
+
+    fn send(mut self, job: ResultJob) -> String {
+        self.is_queued = self.results.queue.send(job).is_ok();
+        self.id.clone()
+    }
+}
+
+impl Drop for PendingResult {
+    fn drop(&mut self) {
+        if self.is_queued {
+            return;
+        }
+        if let Ok(mut all) = self.results.all.lock() {
+            all.retain(|one| one.id != self.id);
+        }
+        let _ = fs::remove_dir_all(self.results.folder.path().join(&self.id));
+    }
+}
+
 struct ResultWorker {
     program: PathBuf,
     folder: PathBuf,
@@ -142,15 +199,26 @@ struct ResultWorker {
 impl ResultWorker {
     fn work(&self, job: &ResultJob) {
         let (ResultJob::Generate(id) | ResultJob::Pair(id, _) | ResultJob::Film(id)) = job;
-        let Some(result) = self.update(id, |one| one.state = "running") else { return };
-        let done = match job {
-            ResultJob::Generate(_) => self.run_generate(&result, &["motion.bvh", "motion.glb", "motion.vrma"]),
-            ResultJob::Pair(_, dataset) => self.pair(&result, dataset),
-            ResultJob::Film(_) => self.run_generate(&result, &["motion.mp4"]),
+        let is_film = matches!(job, ResultJob::Film(_));
+        let begin = |one: &mut GeneratedResult| {
+            if !is_film {
+                one.state = "running";
+            }
         };
-        self.update(id, |one| match done {
-            Ok(()) => one.state = "done",
-            Err(error) => (one.state, one.message) = ("failed", format!("{error:#}")),
+        let Some(result) = self.update(id, begin) else { return };
+        let done = match job {
+            ResultJob::Generate(_) => self.generate(&result, &["motion.bvh", "motion.glb", "motion.vrma"]),
+            ResultJob::Pair(_, dataset) => self.pair(&result, dataset),
+            ResultJob::Film(_) => self.film(&result),
+        };
+        self.update(id, |one| {
+            let state = if done.is_ok() { "done" } else { "failed" };
+            if is_film {
+                one.film = state;
+            } else {
+                one.state = state;
+            }
+            one.message = done.err().map(|error| format!("{error:#}")).unwrap_or_default();
         });
     }
 
@@ -180,19 +248,40 @@ impl ResultWorker {
         fs::write(folder.join("truth.glb"), crate::video::glb(&sample.motion, None)?)?;
         wav::write(&folder.join(SPEECH), &sample.sound)?;
         self.update(&result.id, |one| one.files.push("truth.glb".to_owned()));
-        self.run_generate(result, &["generated.glb"])
+        self.generate(result, &["generated.glb"])
     }
 
-    fn run_generate(&self, result: &GeneratedResult, files: &[&str]) -> Result<()> {
-        let folder = self.folder.join(&result.id);
+    fn generate(&self, result: &GeneratedResult, files: &[&str]) -> Result<()> {
         let mut command = Command::new(&self.program);
-        let sound = folder.join(result.files.first().context("the sound is missing")?);
-        command.arg("generate").arg("--checkpoint").arg(&result.checkpoint_file).arg("--audio").arg(sound);
-        if result.seed > 0 {
-            command.arg("--seed").arg(result.seed.to_string());
+        command.arg("generate").arg("--checkpoint").arg(&result.checkpoint_file);
+        command.arg("--audio").arg(self.sound(result)?);
+        if let Some(seed) = result.seed {
+            command.arg("--seed").arg(seed.to_string());
         }
+        if let Some(speaker) = &result.speaker {
+            command.arg("--speaker").arg(speaker);
+        }
+        self.run(result, command, files)
+    }
+
+    /// Video of the motion that was generated, with its sound.
+    fn film(&self, result: &GeneratedResult) -> Result<()> {
+        let mut command = Command::new(&self.program);
+        command.arg("animate").arg(self.folder.join(&result.id).join("motion.bvh"));
+        command.arg("--audio").arg(self.sound(result)?);
+        self.run(result, command, &["motion.mp4"])
+    }
+
+    fn sound(&self, result: &GeneratedResult) -> Result<PathBuf> {
+        let name = result.files.first().context("the sound is missing")?;
+        Ok(self.folder.join(&result.id).join(name))
+    }
+
+    /// Runs `command` with the output `files`, which are then listed.
+    fn run(&self, result: &GeneratedResult, mut command: Command, files: &[&str]) -> Result<()> {
+        let folder = self.folder.join(&result.id);
         let output = command.arg("--out").args(files.iter().map(|file| folder.join(file))).output();
-        let output = output.context("cannot start `orator generate`")?;
+        let output = output.context("cannot start the program")?;
         if !output.status.success() {
             let text = String::from_utf8_lossy(&output.stderr);
             let last = text.lines().rev().find(|line| !line.trim().is_empty()).unwrap_or("it ended without a message");

@@ -67,26 +67,28 @@ fn is_running(folder: &Path) -> bool {
     File::open(folder.join(".lock")).is_ok_and(|file| file.try_lock_shared().is_err())
 }
 
-/// Alarms of the last validation that has any.
+/// Alarms of the last validation.
 fn alarms(lines: &[Value]) -> Vec<&str> {
     let last = lines.iter().rev().find(|line| line["validation"].is_object());
     last.and_then(|line| line["validation"]["alarm"].as_str()).into_iter().collect()
 }
 
-/// Curves of a training after step `after`.
+/// Curves of a training after step `after`; `None`: from the start.
 ///
 /// # Errors
 /// There is no such training, or its log cannot be read.
-pub fn curves(work: &Path, name: &str, after: u64) -> Result<Value> {
+pub fn curves(work: &Path, name: &str, after: Option<u64>) -> Result<Value> {
     let lines = log::read(&folder(work, name)?)?;
     let (mut train, mut validations) = (Vec::new(), Vec::new());
-    for line in lines.iter().filter(|line| line["step"].as_u64() > Some(after)) {
+    for line in lines.iter().filter(|line| line["step"].as_u64() > after) {
         let validation = &line["validation"];
         if validation.is_object() {
-            let own = &validation["generator"];
+            // Sequence-to-sequence networks have their values at the top level.
+            let own = if validation["generator"].is_object() { &validation["generator"] } else { validation };
+            let mean_pose = &validation["mean_pose"]["l1"];
+            let mean_pose = if mean_pose.is_null() { &validation["mean_pose_l1"] } else { mean_pose };
             validations.push(json!({
-                "step": line["step"], "l1": own["l1"], "mean_pose_l1": validation["mean_pose"]["l1"],
-                "pck": own["pck"], "frechet": own["frechet"], "energy": own["energy"], "score": validation["score"],
+                "step": line["step"], "l1": own["l1"], "mean_pose_l1": mean_pose, "pck": own["pck"], "frechet": own["frechet"], "energy": own["energy"], "score": validation["score"],
             }));
         } else {
             train.push(json!({
@@ -97,14 +99,11 @@ pub fn curves(work: &Path, name: &str, after: u64) -> Result<Value> {
     Ok(json!({ "train": train, "validations": validations, "alarms": alarms(&lines) }))
 }
 
-/// Trainings with a checkpoint.
-///
-/// # Errors
-/// Never; unreadable checkpoints are left out.
+/// Trainings with a readable checkpoint, and the speakers of a model of several.
 pub fn checkpoints(work: &Path) -> Value {
     let row = |name: String| {
         let facts = checkpoint::facts(&checkpoint_file(&work.join(&name)).ok()?).ok()?;
-        Some(json!({ "name": name, "step": facts["step"] }))
+        Some(json!({ "name": name, "step": facts["step"], "speakers": speakers(&facts) }))
     };
     json!({ "checkpoints": names(work).into_iter().filter_map(row).collect::<Vec<_>>() })
 }
@@ -121,13 +120,22 @@ pub fn newest_checkpoint(work: &Path, name: &str) -> Result<PathBuf> {
     Ok(newest)
 }
 
-/// Dataset of the speaker of a training.
+/// Names of the speakers of a model of several; empty for a model of one.
+fn speakers(facts: &Value) -> Vec<&str> {
+    let others: Vec<&Value> = facts["other_speakers"].as_array().into_iter().flatten().collect();
+    let all = std::iter::once(&facts["speaker"]).chain(others.iter().copied());
+    if others.is_empty() { Vec::new() } else { all.filter_map(|speaker| speaker["name"].as_str()).collect() }
+}
+
+/// First speaker of a model of several, `None` for a model of one, and the dataset of the speaker.
 ///
 /// # Errors
-/// The dataset does not exist.
-pub fn dataset(work: &Path, name: &str) -> Result<PathBuf> {
-    let speaker = name.rsplit('/').next().unwrap_or(name);
+/// The checkpoint cannot be read, or the dataset does not exist.
+pub fn dataset(work: &Path, name: &str, checkpoint: &Path) -> Result<(Option<String>, PathBuf)> {
+    let facts = checkpoint::facts(checkpoint)?;
+    let chosen = speakers(&facts).first().map(|speaker| (*speaker).to_owned());
+    let speaker = chosen.as_deref().unwrap_or_else(|| name.rsplit('/').next().unwrap_or(name));
     let dataset = work.join(StageName::Dataset.as_str()).join(speaker);
     ensure!(dataset.is_dir(), "the dataset of {name} does not exist: expected {}", dataset.display());
-    Ok(dataset)
+    Ok((chosen, dataset))
 }

@@ -55,10 +55,6 @@ impl VideoView {
         artifact.path(&self.work, &self.unit)
     }
 
-    pub fn unit(&self) -> &Unit {
-        &self.unit
-    }
-
     /// Everything but sound, keypoints and motion.
     pub fn facts(&self) -> Value {
         let media = MediaInfo::read(&self.path(Artifact::MediaInfo)).ok();
@@ -77,6 +73,7 @@ impl VideoView {
         json!({
             "id": id(&self.unit), "file": self.summary.file, "width": width, "height": height,
             "fps": media.as_ref().map_or(0.0, |media| media.fps.per_sec()),
+            "first_image_secs": media.as_ref().map_or(0.0, |media| media.first_image_secs),
             "n_frames": media.as_ref().map_or(0, |media| media.n_frames),
             "duration_secs": ledger.duration_secs,
             "accepted": ledger.accepted.iter().map(|own| span(own.start_secs, own.end_secs)).collect::<Vec<_>>(),
@@ -159,11 +156,11 @@ impl VideoView {
         let extra = joints_npz::read_extra(&self.path(Artifact::Joints))?;
         let fps = motion.fps.per_sec();
         ensure!(
-            start_secs >= 0.0 && end_secs > start_secs && end_secs - start_secs <= MAX_MOTION_SECS,
+            start_secs >= 0.0 && end_secs > start_secs && end_secs - start_secs <= MAX_MOTION_SECS + 1e-6,
             "invalid range {start_secs} to {end_secs} s: expected at most {MAX_MOTION_SECS} s"
         );
         let frames = (start_secs * fps).round() as usize..((end_secs * fps).round() as usize).min(motion.n_frames());
-        ensure!(frames.len() > 1, "there is no motion from {start_secs} to {end_secs} s");
+        ensure!(!frames.is_empty(), "there is no motion from {start_secs} to {end_secs} s");
         let part = slice(&motion, frames.clone());
         ensure!(part.mask.iter().any(|is_visible| *is_visible), "no joint is visible in this range");
         let body = keypoints.body.slice(s![frames.clone(), .., ..]).to_owned();

@@ -4,16 +4,18 @@
 use crate::assets::ASSETS;
 use crate::file::ViewedFile;
 use crate::project::{DecisionRequest, Project};
-use crate::results::Results;
+use crate::results::{ResultRequest, Results};
 use crate::training;
 use crate::video::VideoView;
 use anyhow::{Result, ensure};
+use orator_base::stage::workdir::BusyFolder;
+use orator_gesture::generate::model::checkpoint_file;
 use orator_web::axum::Router;
 use orator_web::axum::extract::{Path, Query, Request, State};
 use orator_web::axum::http::{StatusCode, header};
 use orator_web::axum::response::{IntoResponse, Response as HttpResponse};
 use orator_web::axum::routing::{delete, get, post};
-use orator_web::files::{hex, random, serve_file};
+use orator_web::files::{hex, random, save_body, serve_file};
 use orator_web::host::AllowedHosts;
 use orator_web::reply::{ApiError, JsonBody, json_reply, text_reply};
 use orator_web::server::secured;
@@ -23,6 +25,7 @@ use std::net::SocketAddr;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Duration;
+use tokio::sync::Semaphore;
 
 /// Content security policy: everything from this server; `blob:` for files that the user drops on the page.
 const POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self'; media-src 'self' blob:; \
@@ -31,7 +34,9 @@ const POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self'; m
 const PERMISSIONS: &str = "camera=(), microphone=(self), geolocation=(), display-capture=(), usb=()";
 const MISDIRECTED: &str = "Open the address that `orator view` printed.";
 /// Time limit for a request up to the start of its reply, including reading an uploaded sound.
-const REQUEST_TIMEOUT: Duration = Duration::from_secs(120);
+const REQUEST_TIMEOUT: Duration = Duration::from_secs(600);
+/// Number of requests that read the arrays of a video at the same time, which bounds memory.
+const MAX_READERS: usize = 2;
 
 /// What the page shows and allows.
 pub struct ViewRequest {
@@ -47,6 +52,7 @@ pub struct ViewRequest {
 struct Viewer {
     request: ViewRequest,
     results: Results,
+    readers: Arc<Semaphore>,
 }
 
 type Shared = State<Arc<Viewer>>;
@@ -61,7 +67,8 @@ pub fn run(request: ViewRequest, address: SocketAddr, on_listening: impl FnOnce(
     let token = hex(&random::<16>()?);
     let hosts = AllowedHosts::new(address.ip(), &[], MISDIRECTED)?;
     let results = Results::start(request.program.clone())?;
-    let router = router(Viewer { request, results }, &token);
+    let readers = Arc::new(Semaphore::new(MAX_READERS));
+    let router = router(Viewer { request, results, readers }, &token);
     let router = secured(router, hosts, [POLICY, PERMISSIONS], REQUEST_TIMEOUT);
     orator_web::server::run(router, address, false, |address| on_listening(&format!("http://{address}/{token}/")))
 }
@@ -95,13 +102,23 @@ fn router(viewer: Viewer, token: &str) -> Router {
     router.with_state(Arc::new(viewer))
 }
 
-/// Runs `work` on a thread that may block; its errors are shown to the user.
+/// Runs `work` on a thread that may block. Its errors are shown to the user: status 409 if another program uses a
+/// folder, 500 if a file cannot be read or written, otherwise 400.
 async fn blocking<T: Send + 'static>(work: impl FnOnce() -> Result<T> + Send + 'static) -> Result<T, ApiError> {
-    let failed = |error: String| ApiError::new(StatusCode::INTERNAL_SERVER_ERROR, error);
-    match tokio::task::spawn_blocking(work).await {
-        Ok(done) => done.map_err(|error| failed(format!("{error:#}"))),
-        Err(_) => Err(failed("The request failed; see the terminal.".to_owned())),
-    }
+    let Ok(done) = tokio::task::spawn_blocking(work).await else {
+        return Err(ApiError::new(StatusCode::INTERNAL_SERVER_ERROR, "The request failed; see the terminal."));
+    };
+    done.map_err(|error| {
+        let is = |found: fn(&(dyn std::error::Error + 'static)) -> bool| error.chain().any(found);
+        let status = if is(|cause| cause.is::<BusyFolder>()) {
+            StatusCode::CONFLICT
+        } else if is(|cause| cause.is::<std::io::Error>()) {
+            StatusCode::INTERNAL_SERVER_ERROR
+        } else {
+            StatusCode::BAD_REQUEST
+        };
+        ApiError::new(status, format!("{error:#}"))
+    })
 }
 
 /// JSON that `work` reads from the project.
@@ -145,7 +162,9 @@ async fn of_video<T: Send + 'static>(
     Path((speaker, name)): Path<(String, String)>,
     work: impl FnOnce(&VideoView) -> Result<T> + Send + 'static,
 ) -> Result<T, ApiError> {
+    let permit = viewer.readers.clone().acquire_owned().await;
     let found = blocking(move || {
+        let _permit = permit;
         let Some(project) = &viewer.request.project else { return Ok(None) };
         project.video(&speaker, &name)?.as_ref().map(work).transpose()
     });
@@ -187,16 +206,18 @@ fn bytes(bytes: Vec<u8>) -> HttpResponse {
     ([(header::CONTENT_TYPE, "application/octet-stream"), (header::CACHE_CONTROL, "no-store")], bytes).into_response()
 }
 
-async fn media(State(viewer): Shared, path: VideoPath, request: Request) -> Reply {
-    let source = of_video(viewer, path, |video| Ok(video.unit().source.clone())).await?;
-    Ok(serve_file(&source, request).await)
+async fn media(State(viewer): Shared, Path((speaker, name)): VideoPath, request: Request) -> Reply {
+    let source = blocking(move || {
+        let project = viewer.request.project.as_ref();
+        project.map_or(Ok(None), |project| project.film(&speaker, &name))
+    });
+    Ok(serve_file(&source.await?.ok_or_else(unknown)?, request).await)
 }
 
 #[derive(Deserialize)]
 struct TrainingQuery {
     name: String,
-    #[serde(default)]
-    after: u64,
+    after: Option<u64>,
 }
 
 async fn curves(State(viewer): Shared, Query(query): Query<TrainingQuery>) -> Reply {
@@ -207,11 +228,11 @@ async fn curves(State(viewer): Shared, Query(query): Query<TrainingQuery>) -> Re
 async fn pair(State(viewer): Shared, Query(query): Query<TrainingQuery>) -> Reply {
     let results = viewer.results.clone();
     of_project(viewer, move |project| {
-        let checkpoint = training::newest_checkpoint(project.work(), &query.name)?;
-        let dataset = training::dataset(project.work(), &query.name)?;
-        let (id, _) = results.add(&query.name, checkpoint, 0, "speech.wav")?;
-        results.pair(&id, dataset);
-        Ok(json!({ "id": id }))
+        let checkpoint_file = training::newest_checkpoint(project.work(), &query.name)?;
+        let (speaker, dataset) = training::dataset(project.work(), &query.name, &checkpoint_file)?;
+        let (checkpoint, name) = (query.name, "speech.wav".to_owned());
+        let pending = results.add(ResultRequest { checkpoint, checkpoint_file, seed: None, speaker, name })?;
+        Ok(json!({ "id": pending.pair(dataset) }))
     })
     .await
 }
@@ -224,38 +245,35 @@ fn author(viewer: &Viewer) -> Result<String, ApiError> {
 
 async fn decide(State(viewer): Shared, body: Result<JsonBody<DecisionRequest>, ApiError>) -> Reply {
     let (author, JsonBody(request)) = (author(&viewer)?, body?);
-    let stored = of_project(viewer, move |project| project.decide(request, &author)).await;
-    stored.map_err(|error| error.with_status(StatusCode::BAD_REQUEST))
+    of_project(viewer, move |project| project.decide(request, &author)).await
 }
 
 async fn undo(State(viewer): Shared, Path(id): Path<String>) -> Reply {
     author(&viewer)?;
-    of_project(viewer, move |project| project.undo(&id)).await.map_err(|error| error.with_status(StatusCode::NOT_FOUND))
+    let removed = blocking(move || viewer.request.project.as_ref().map_or(Ok(false), |project| project.undo(&id)));
+    if removed.await? { Ok(json_reply(&json!({ "removed": true }))) } else { Err(unknown()) }
 }
 
 #[derive(Deserialize)]
 struct GenerateQuery {
     checkpoint: String,
-    #[serde(default)]
-    seed: u64,
+    seed: Option<u64>,
+    speaker: Option<String>,
     name: String,
 }
 
 /// Generates motion for the sound in the body.
 async fn generate(State(viewer): Shared, Query(query): Query<GenerateQuery>, request: Request) -> Reply {
-    let results = viewer.results.clone();
     let added = blocking(move || {
         let Some(project) = &viewer.request.project else { return Ok(None) };
-        let checkpoint = training::folder(project.work(), &query.checkpoint)?;
-        viewer.results.add(&query.checkpoint, checkpoint, query.seed, &query.name).map(Some)
+        let GenerateQuery { checkpoint, seed, speaker, name } = query;
+        let checkpoint_file = checkpoint_file(&training::folder(project.work(), &checkpoint)?)?;
+        let request = ResultRequest { checkpoint, checkpoint_file, seed, speaker, name };
+        viewer.results.add(request).map(Some)
     });
-    let (id, path) = added.await?.ok_or_else(unknown)?;
-    if let Err(error) = orator_web::files::save_body(request, &path).await {
-        results.remove(&id);
-        return Err(error);
-    }
-    results.generate(&id);
-    Ok(json_reply(&json!({ "id": id })))
+    let pending = added.await?.ok_or_else(unknown)?;
+    save_body(request, &pending.sound).await?;
+    Ok(json_reply(&json!({ "id": pending.generate() })))
 }
 
 async fn results(State(viewer): Shared) -> HttpResponse {

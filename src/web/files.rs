@@ -45,7 +45,7 @@ pub async fn save_body(request: Request, path: &Path) -> Result<(), ApiError> {
         if n_bytes > MAX_BODY_BYTES {
             return Err(too_large());
         }
-        file.write_all(&piece).map_err(not_written)?;
+        tokio::task::block_in_place(|| file.write_all(&piece)).map_err(not_written)?;
     }
     if n_bytes == 0 { Err(ApiError::bad_request("The file is empty.")) } else { Ok(()) }
 }

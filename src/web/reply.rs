@@ -53,12 +53,6 @@ impl ApiError {
         Self { retry_secs: Some(secs), ..self }
     }
 
-    /// Replaces the status of an error of the server by `status`.
-    #[must_use]
-    pub fn with_status(self, status: StatusCode) -> Self {
-        if self.status == StatusCode::INTERNAL_SERVER_ERROR { Self { status, ..self } } else { self }
-    }
-
     pub fn too_many_requests() -> Self {
         Self::new(StatusCode::TOO_MANY_REQUESTS, "Too many requests; wait a moment.").retry_after(2)
     }

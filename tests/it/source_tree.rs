@@ -60,7 +60,9 @@ fn foreign_libraries_have_one_owner_each() {
         ("opencv", "src/media/Cargo.toml"),
         ("ort", "src/onnx/Cargo.toml"),
         ("indicatif", "Cargo.toml"),
-        ("axum", "src/study/Cargo.toml"),
+        ("axum", "src/web/Cargo.toml"),
+        ("hyper", "src/web/Cargo.toml"),
+        ("tower-http", "src/web/Cargo.toml"),
         ("rusqlite", "src/study/Cargo.toml"),
     ];
     let manifests = manifests();

@@ -25,7 +25,7 @@ pub enum DecisionAction {
     Reject,
     /// Exchanges the keypoints of the left and the right hand.
     SwapHands,
-    /// Follows the person at pixel `x`, `y` of the first frame, until the range or the shot ends.
+    /// Follows the person at pixel `x`, `y` of the first frame, as players show it, until the range or the shot ends.
     Speaker,
     /// Replaces the words whose midpoints are in the range by `text`; without such words, adds it.
     Word,
@@ -45,7 +45,7 @@ pub struct Decision {
     pub start_secs: f64,
     /// End of the range, seconds, after its start.
     pub end_secs: f64,
-    /// Pixel of the full picture; only for `Speaker`.
+    /// Pixel of the full picture as players show the file; only for `Speaker`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub x: Option<f64>,
     #[serde(default, skip_serializing_if = "Option::is_none")]

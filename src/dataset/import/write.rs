@@ -51,7 +51,9 @@ const NO_SOUND: &str =
 pub fn import(plan: &ImportPlan, out: &Path, progress: &dyn Progress) -> Result<Imported> {
     let mut sources = find::find(&plan.sources, plan.kind)?;
     let unpacked = out.join("unpacked");
-    unpack_motion(&mut sources, plan.kind, &unpacked)?;
+    if plan.kind != Some(MotionKind::Shards) {
+        unpack_motion(&mut sources, plan.kind, &unpacked)?;
+    }
     if let Some(id) = plan.speaker_id {
         sources.notes.extend(genea::filter_speaker(&mut sources.takes, id)?);
     }

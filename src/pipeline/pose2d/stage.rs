@@ -203,7 +203,10 @@ impl Pose2dStage {
             pass::talkers(&video, &Artifact::Sound.path(&self.work, unit), search, &*task)
         });
         let choice = |choice: &Decision| -> Option<ChosenPerson> {
-            Some((choice.frames(self.fps, timeline.n_frames()), [choice.x? as f32, choice.y? as f32]))
+            let x = choice.x? as f32;
+            // Mirrored videos are flipped back before persons are detected.
+            let x = if media.pictures.mirrored { media.image_size[0] as f32 - 1.0 - x } else { x };
+            Some((choice.frames(self.fps, timeline.n_frames()), [x, choice.y? as f32]))
         };
         let chosen: Vec<_> = self.choices(unit).into_iter().filter_map(choice).collect();
         let talkers = talkers.transpose()?;

@@ -37,14 +37,14 @@ export class Clip {
       rateSelect((rate) => (this.film.playbackRate = rate)), el("label", { class: "field" }, points, el("span", {}, "Keypoints")));
     this.element = el("div", { class: "clip" }, el("div", { class: "pictures" }, frame, this.avatar.element), transport);
     for (const name of ["play", "pause"]) this.film.addEventListener(name, () => this.#changed());
-    for (const name of ["seeked", "ended"]) this.film.addEventListener(name, () => this.#update(this.film.currentTime));
+    for (const name of ["seeked", "ended"]) this.film.addEventListener(name, () => this.#update(this.#filmSecs));
     this.film.addEventListener("error", () => this.#fail());
     // A file with sound only in a codec that the browser reads has no picture size.
     this.film.addEventListener("loadedmetadata", () => this.film.videoWidth || this.#fail());
     this.film.src = `./media/${video.id}`;
     // Follows the frames that the browser shows while the film plays.
     const shown = (_now, { mediaTime }) => {
-      if (this.isPlaying) this.#update(mediaTime);
+      if (this.isPlaying) this.#update(mediaTime - this.video.first_image_secs);
       this.film.requestVideoFrameCallback(shown);
     };
     this.film.requestVideoFrameCallback(shown);
@@ -52,6 +52,8 @@ export class Clip {
 
   // Position in seconds, also of a film that the browser cannot play.
   get time() { return this.#secs; }
+  // Times of the page count from the first picture, as those of the ledger.
+  get #filmSecs() { return this.film.currentTime - this.video.first_image_secs; }
   get isPlaying() { return !this.film.paused; }
 
   toggle() {
@@ -68,7 +70,7 @@ export class Clip {
 
   seek(secs) {
     const time = Math.min(Math.max(secs, 0), this.video.duration_secs);
-    if (this.film.readyState > 0) this.film.currentTime = time;
+    if (this.film.readyState > 0) this.film.currentTime = time + this.video.first_image_secs;
     this.#update(time);
   }
 
@@ -95,10 +97,11 @@ export class Clip {
 
   #changed() {
     this.playButton.textContent = this.isPlaying ? "Pause" : "Play";
-    this.#update(this.film.currentTime);
+    this.#update(this.#filmSecs);
   }
 
-  #update(secs) {
+  #update(at) {
+    const secs = Math.max(at, 0);
     this.#secs = secs;
     this.place.textContent = `${clock(secs, 2)} / ${clock(this.video.duration_secs, 0)}`;
     this.#drawPoints(Math.min(Math.floor(secs * this.video.fps + 1e-3), this.video.n_frames - 1));
@@ -107,6 +110,12 @@ export class Clip {
   }
 
   redraw() { this.#update(this.time); }
+
+  // Reads the keypoints again, after a decision on the hands.
+  reload() {
+    this.#chunks.clear();
+    this.redraw();
+  }
 
   #pick(event) {
     if (!this.#isPicking) return;

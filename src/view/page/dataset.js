@@ -64,6 +64,7 @@ export class DatasetView {
       return this.detail.replaceChildren(el("p", {}, `Nothing to show of ${id}.`));
     }
     const [video, wave] = replies;
+    if (this.#second?.video.id === id) await this.#openSecond("");
     const intervals = intervalsOf(video);
     this.clip = new Clip(video, (secs) => this.#follow(secs));
     const seek = (secs) => this.clip.seek(secs);

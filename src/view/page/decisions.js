@@ -7,6 +7,8 @@ const ACTIONS = { reject: "Reject", accept: "Accept", "swap-hands": "Swap hands"
 // Number of words around the playhead that can be chosen.
 const NEAR_WORDS = 12;
 const REST_MS = 200;
+// Half the range of a decision on a word, seconds.
+const WORD_SECS = 0.001;
 
 const numberInput = (attributes) => el("input", { type: "number", step: "any", min: "0", ...attributes });
 
@@ -62,10 +64,13 @@ export class DecisionPanel {
     this.list.replaceChildren(decisions.length ? table("Decisions on this video", heads, decisions.map(cells)) : el("p", { class: "note" }, "No decisions on this video."));
   }
 
-  // Reads the decisions again; everything else of the video changes with the next run only.
+  // Reads decisions and words again, and the keypoints, which show the decisions at once; the rest follows the next run.
   async #refresh() {
-    this.video.decisions = (await getJson(`./api/videos/${this.video.id}`)).decisions;
+    const { decisions, words } = await getJson(`./api/videos/${this.video.id}`);
+    Object.assign(this.video, { decisions, words });
+    this.#firstWord = -1;
     this.#drawList();
+    this.view.clip.reload();
     this.view.timeline.refresh();
     await this.view.enter(this.video.id);
   }
@@ -108,8 +113,10 @@ export class DecisionPanel {
   #correct() {
     const word = this.video.words[this.#word];
     const text = this.text.value.trim();
-    if (!word || !text || text === word[2]) return announce("Choose a word and enter another text.", true);
-    return this.#decide("word", { text }, [word[0], word[1]]);
+    if (!word || text === word[2]) return announce("Choose a word and enter another text, or none to remove it.", true);
+    // A range around the midpoint: neighbours that overlap the word stay.
+    const middle = (word[0] + word[1]) / 2;
+    return this.#decide("word", { text }, [Math.max(middle - WORD_SECS, 0), middle + WORD_SECS]);
   }
 
   async #decide(action, detail, range = this.view.timeline.range ?? [0, this.video.duration_secs]) {

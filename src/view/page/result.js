@@ -1,18 +1,22 @@
 // Result view: speech from a file or the microphone becomes motion, which is played, compared and downloaded.
 
-import { announce, attempt, button, clock, el, getBytes, getJson, labelled, options, row, send } from "./dom.js";
+import { announce, attempt, button, el, getBytes, getJson, labelled, options, row, send } from "./dom.js";
 import { openPlayer } from "./player.js";
 import { finished } from "./run.js";
 
 const MAX_BYTES = 200e6;
 const DOWNLOADS = [["motion.bvh", "BVH"], ["motion.glb", "GLB"], ["motion.vrma", "VRMA"], ["motion.mp4", "MP4"]];
 
+// Name of a result.
+const caption = ({ name, checkpoint, speaker, step, seed }) =>
+  [name, checkpoint, speaker, `step ${step}`, seed === null ? null : `seed ${seed}`].filter((part) => part !== null).join(", ");
+
 export class ResultView {
   #visit = 0; #compared = []; #recorder = null; #open = [];
 
   constructor(panel) {
     this.checkpoint = el("select", { required: true });
-    this.seed = el("input", { type: "number", min: "0", step: "1", value: "1" });
+    this.seed = el("input", { type: "number", min: "0", step: "1", placeholder: "none" });
     const input = el("input", { type: "file", accept: "audio/*,video/*", onchange: () => this.#setSound(input.files[0]) });
     this.recordButton = button("Record", () => attempt(() => this.#record()));
     this.sound = el("p", { class: "note" }, "No sound chosen. A sound file can be dropped here.");
@@ -30,7 +34,7 @@ export class ResultView {
     const own = row(labelled("Own VRM avatar (stays on this computer)", this.avatar));
     this.stage = el("div", {});
     this.list = el("div", {});
-    panel.append(el("h2", {}, "Speech to motion"), row(labelled("Checkpoint", this.checkpoint), labelled("Seed", this.seed)), drop,
+    panel.append(el("h2", {}, "Speech to motion"), row(labelled("Checkpoint", this.checkpoint), labelled("Seed of a variant", this.seed)), drop,
       row(this.generateButton, this.progress), this.stage, own, el("h2", {}, "Results"), this.list);
   }
 
@@ -39,9 +43,11 @@ export class ResultView {
     const reply = await attempt(() => getJson("./api/checkpoints"));
     const before = this.checkpoint.value;
     const checkpoints = reply?.checkpoints ?? [];
-    const steps = new Map(checkpoints.map(({ name, step }) => [name, step]));
-    this.checkpoint.replaceChildren(...options([...steps.keys()], (name) => `${name}, step ${steps.get(name)}`));
-    if (steps.has(before)) this.checkpoint.value = before;
+    // A model of several speakers is listed once for each.
+    const choices = new Map(checkpoints.flatMap(({ name, step, speakers }) =>
+      (speakers.length ? speakers : [null]).map((speaker) => [JSON.stringify([name, speaker]), `${name}${speaker ? `, ${speaker}` : ""}, step ${step}`])));
+    this.checkpoint.replaceChildren(...options([...choices.keys()], (choice) => choices.get(choice)));
+    if (choices.has(before)) this.checkpoint.value = before;
     if (reply && !checkpoints.length) announce("There is no checkpoint yet: run `orator train`.");
     await this.#refresh();
   }
@@ -90,7 +96,10 @@ export class ResultView {
     if (!this.checkpoint.value) return announce("There is no checkpoint yet: run `orator train`.", true);
     this.generateButton.disabled = true;
     this.progress.hidden = false;
-    const query = new URLSearchParams({ checkpoint: this.checkpoint.value, seed: this.seed.value || "1", name: this.file.name });
+    const [checkpoint, speaker] = JSON.parse(this.checkpoint.value);
+    const query = new URLSearchParams({ checkpoint, name: this.file.name });
+    if (speaker) query.set("speaker", speaker);
+    if (this.seed.value) query.set("seed", this.seed.value);
     await attempt(async () => {
       announce("Sending the sound …");
       const { id } = await send("POST", `./api/results?${query}`, this.file);
@@ -108,8 +117,7 @@ export class ResultView {
   // Plays one result, or two side by side.
   async #play(results) {
     const url = ({ id }, name) => `./results/${encodeURIComponent(id)}/${name}`;
-    const caption = ({ name, checkpoint, seed }) => `${name}, ${checkpoint}, seed ${seed}`;
-    const player = await openPlayer(results.map((one) => [caption(one), url(one, "motion.glb")]), url(results[0], "speech.wav"));
+    const player = await openPlayer(results.map((one) => [caption(one), url(one, "motion.glb")]), url(results[0], results[0].files[0]));
     this.player?.close();
     this.player = player;
     this.#open = results;
@@ -137,7 +145,7 @@ export class ResultView {
     const visit = this.#visit;
     for (;;) {
       const found = (await this.#refresh()).find((one) => one.id === id);
-      if (!found || found.state === "failed" || this.#visit !== visit) throw new Error(found?.message ?? "The video is being rendered.");
+      if (!found || found.film === "failed" || this.#visit !== visit) throw new Error(found?.message || "The video is being rendered.");
       if (found.files.includes("motion.mp4")) return announce("The video is ready to download.");
       await new Promise((resolve) => setTimeout(resolve, 1000));
     }
@@ -145,7 +153,7 @@ export class ResultView {
 
   async #refresh() {
     const { results } = (await attempt(() => getJson("./api/results"))) ?? { results: [] };
-    const rows = results.filter(({ files, state }) => state !== "done" || files.includes("motion.glb")).reverse();
+    const rows = results.filter(({ files, state }) => state !== "done" || files.includes("motion.glb")).filter(({ files }) => !files.includes("truth.glb")).reverse();
     const focused = document.activeElement?.id;
     this.list.replaceChildren(rows.length ? el("ul", { class: "results" }, ...rows.map((one) => this.#item(one, results))) : el("p", { class: "note" }, "No results yet."));
     if (focused?.startsWith("result-")) document.getElementById(focused)?.focus();
@@ -153,14 +161,14 @@ export class ResultView {
   }
 
   #item(result, results) {
-    const { id, name, checkpoint, seed, state, secs, message, files } = result;
-    const title = `${name}, ${checkpoint}, seed ${seed}`;
+    const { id, name, seed, state, film: filmState, message, files } = result;
+    const title = caption(result);
     if (state !== "done") return el("li", {}, el("b", {}, title), el("span", { class: state === "failed" ? "wrong" : "note" }, message ? `${state}: ${message}` : state));
     const box = el("input", { type: "checkbox", id: `result-${id}-compare`, checked: this.#compared.includes(id), onchange: () => this.#compare(id, box.checked, results) });
-    const link = ([file, kind]) => files.includes(file) && el("a", { href: `./results/${encodeURIComponent(id)}/${file}`, download: `${name.replace(/\.\w+$/, "")}-seed-${seed}.${file.split(".").pop()}`, "aria-label": `${kind} of ${title}` }, kind);
+    const link = ([file, kind]) => files.includes(file) && el("a", { href: `./results/${encodeURIComponent(id)}/${file}`, download: `${name.replace(/\.\w+$/, "")}${seed === null ? "" : `-seed-${seed}`}.${file.split(".").pop()}`, "aria-label": `${kind} of ${title}` }, kind);
     const links = DOWNLOADS.map(link).filter(Boolean);
-    const film = files.includes("motion.mp4") ? null : button("Make MP4", () => attempt(() => this.#makeVideo(id)), { id: `result-${id}-mp4`, "aria-label": `Make MP4 of ${title}` });
-    return el("li", {}, el("b", {}, title), secs ? el("span", { class: "note" }, clock(secs)) : null,
+    const film = files.includes("motion.mp4") || filmState === "queued" ? null : button("Make MP4", () => attempt(() => this.#makeVideo(id)), { id: `result-${id}-mp4`, "aria-label": `Make MP4 of ${title}` });
+    return el("li", {}, el("b", {}, title), filmState === "failed" ? el("span", { class: "wrong" }, `no video: ${message}`) : null,
       row(button("Open", () => attempt(() => this.#play([result])), { id: `result-${id}-open`, "aria-label": `Open ${title}` }),
         el("label", { class: "field" }, box, el("span", {}, "Compare")), ...links, film));
   }

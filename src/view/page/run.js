@@ -118,12 +118,13 @@ export class RunView {
 
   // Adds the rows since the last validation: a validation may be written after the training row of its step.
   async #follow({ name, state, step, steps, best_step: best, best_score: score }) {
-    const after = Math.max(0, ...this.#rows.validations.keys());
-    const reply = await getJson(`./api/training?name=${encodeURIComponent(name)}&after=${after}`);
+    const known = [...this.#rows.validations.keys()];
+    const after = known.length ? `&after=${Math.max(...known)}` : "";
+    const reply = await getJson(`./api/training?name=${encodeURIComponent(name)}${after}`);
     if (name !== this.#name) return;
     for (const kind of ["train", "validations"]) for (const one of reply[kind]) this.#rows[kind].set(one.step, one);
-    const words = `${state}, step ${step} of ${steps}${best === null ? "" : `; best: step ${best}, score ${number(score)}`}`;
-    this.#replace(this.progress, [words], () => [el("progress", { max: `${steps}`, value: `${step}`, "aria-label": "Training" }), el("p", {}, words)]);
+    const words = `${state}, step ${step ?? 0}${steps === null ? "" : ` of ${steps}`}${best === null ? "" : `; best: step ${best}, score ${number(score)}`}`;
+    this.#replace(this.progress, [words], () => [steps === null ? null : el("progress", { max: `${steps}`, value: `${step ?? 0}`, "aria-label": "Training" }), el("p", {}, words)].filter(Boolean));
     if (this.state && this.state !== state && state === "ended") announce(`The training ${name} has ended.`);
     this.state = state;
     const { alarms } = reply;

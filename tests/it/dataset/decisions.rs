@@ -375,7 +375,7 @@ fn a_dataset_contains_corrected_words_and_hands_and_its_card_the_decisions() {
     assert_eq!(settings(&renamed), settings(&decided));
 
     let after = talk.write(&decided);
-    let dataset = Dataset::open(&talk.settings.work.dir.join("dataset/host")).unwrap();
+    let dataset = Dataset::open(talk.settings.work.dir.join("dataset/host")).unwrap();
     let samples: Vec<_> = dataset.samples(Split::Train).into_iter().map(|s| dataset.read(&s).unwrap()).collect();
     let words: Vec<String> = samples.iter().flat_map(|s| s.words.clone().unwrap()).map(|word| word.word).collect();
     assert_eq!(words[2..6], ["w2", "hello", "w4", "w6"], "{words:?}");

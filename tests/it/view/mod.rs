@@ -1,4 +1,4 @@
 //! The local page of `orator view`.
 
-mod browser;
+mod pages;
 mod server;

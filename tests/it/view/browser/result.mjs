@@ -57,5 +57,10 @@ await visit("result", async ({ page }) => {
   await press("Stop recording");
   await waitForStatus(page, "is chosen");
   const recorded = await page.$eval(".drop .note", (node) => node.textContent);
-  return { before, made, links, drawn, ownAvatar, recorded, findings, findingsOfTwo };
+  await generate();
+  await page.waitForSelector(".player");
+  await press("Play");
+  await page.waitForFunction(() => Number(document.querySelector(".player input[type=range]").value) > 0.5);
+  const heard = await page.$eval(".player .clock", (node) => node.textContent);
+  return { heard, before, made, links, drawn, ownAvatar, recorded, findings, findingsOfTwo };
 });

@@ -78,7 +78,7 @@ fn a_project_is_corrected_in_the_page_and_the_next_run_applies_it() {
     assert!(!project.dir().join("decisions.toml").exists(), "all decisions were undone");
 
     let secs = || -> f64 {
-        let dataset = Dataset::open(&project.work().join("dataset/host")).unwrap();
+        let dataset = Dataset::open(project.work().join("dataset/host")).unwrap();
         dataset.samples(Split::Train).iter().map(|sample| sample.n_frames as f64 / 15.0).sum()
     };
     let before = secs();
