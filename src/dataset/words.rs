@@ -65,8 +65,8 @@ impl VideoWords {
         Self { words, account: TranscriptReport { file: Some(file_name(path)), count, notes } }
     }
 
-    /// Applies the decisions on words, in order. A new word has the time of those that it replaces; without any, that of
-    /// the range.
+    /// Applies the decisions on words, in order. A new word has the time of those that it replaces, within the range of
+    /// the decision; without any, that of the range.
     #[must_use]
     pub fn corrected(mut self, decisions: &[&Decision]) -> Self {
         for decision in decisions.iter().filter(|decision| decision.action == DecisionAction::Word) {
@@ -76,7 +76,7 @@ impl VideoWords {
             let first = replaced.iter().map(|word| word.start_secs).min_by(f64::total_cmp).unwrap_or(start);
             let last = replaced.iter().map(|word| word.end_secs).max_by(f64::total_cmp).unwrap_or(end);
             if let Some(word) = decision.text.clone().filter(|text| !text.is_empty()) {
-                let (start_secs, end_secs) = (first, last);
+                let (start_secs, end_secs) = (first.max(start), last.min(end));
                 words.push(Word { word, start_secs, end_secs, source: WordSource::Given, confidence: None });
                 words.sort_by(|a, b| midpoint_secs(a).total_cmp(&midpoint_secs(b)));
             }

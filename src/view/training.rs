@@ -92,7 +92,8 @@ pub fn curves(work: &Path, name: &str, after: Option<u64>) -> Result<Value> {
             }));
         } else {
             train.push(json!({
-                "step": line["step"], "l1": line["l1"], "adv": line["adversarial"], "d": line["discriminator"],
+                "step": line["step"], "l1": line["l1"], "adversarial": line["adversarial"],
+                "discriminator": line["discriminator"],
             }));
         }
     }

@@ -7,7 +7,7 @@ const ACTIONS = { reject: "Reject", accept: "Accept", "swap-hands": "Swap hands"
 // Number of words around the playhead that can be chosen.
 const NEAR_WORDS = 12;
 const REST_MS = 200;
-// Half the range of a decision on a word, seconds.
+// Least time between the range of a decision on a word and the midpoints of its neighbours, seconds.
 const WORD_SECS = 0.001;
 
 const numberInput = (attributes) => el("input", { type: "number", step: "any", min: "0", ...attributes });
@@ -114,9 +114,12 @@ export class DecisionPanel {
     const word = this.video.words[this.#word];
     const text = this.text.value.trim();
     if (!word || text === word[2]) return announce("Choose a word and enter another text, or none to remove it.", true);
-    // A range around the midpoint: neighbours that overlap the word stay.
-    const middle = (word[0] + word[1]) / 2;
-    return this.#decide("word", { text }, [Math.max(middle - WORD_SECS, 0), middle + WORD_SECS]);
+    // The midpoint is in the range, and those of neighbours that overlap the word are not.
+    const middle = (at) => (this.video.words[at] ? (this.video.words[at][0] + this.video.words[at][1]) / 2 : null);
+    const [before, own, after] = [-1, 0, 1].map((k) => middle(this.#word + k));
+    const start = Math.min(Math.max(word[0], (before ?? -1) + WORD_SECS), own);
+    const end = Math.max(Math.min(word[1], (after ?? Infinity) - WORD_SECS), own + WORD_SECS);
+    return this.#decide("word", { text }, [Math.max(start, 0), end]);
   }
 
   async #decide(action, detail, range = this.view.timeline.range ?? [0, this.video.duration_secs]) {

@@ -8,7 +8,7 @@ const IDLE_MS = 10_000;
 const MAX_ROWS = 200;
 // Key, heading, and whether the curve is one of validations.
 const CURVES = [
-  ["l1", "L1 loss", false], ["adv", "Adversarial loss", false], ["d", "Discriminator loss", false],
+  ["l1", "L1 loss", false], ["adversarial", "Adversarial loss", false], ["discriminator", "Discriminator loss", false],
   ["score", "Validation score", true], ["pck", "Validation PCK", true],
 ];
 const VALIDATION_KEYS = ["step", "score", "l1", "mean_pose_l1", "pck", "frechet", "energy"];
@@ -150,7 +150,7 @@ export class RunView {
     const every = Math.ceil(lists[0].length / MAX_ROWS);
     const train = lists[0].filter((_, k) => k % every === 0 || k === lists[0].length - 1);
     const cells = (list, keys) => list.map((one) => keys.map((key) => number(one[key])));
-    const keys = ["step", "l1", "adv", "d"];
+    const keys = ["step", "l1", "adversarial", "discriminator"];
     this.#replace(this.tables, [train.at(-1), lists[1].at(-1)], () => [
       el("h3", {}, "Validations"), table("Validations", ["Step", "Score", "L1", "L1 of the mean pose", "PCK", "Fréchet distance", "Energy distance"], cells(lists[1], VALIDATION_KEYS)),
       el("h3", {}, "Training losses"), table("Training losses", ["Step", "L1", "Adversarial", "Discriminator"], cells(train, keys))]);

@@ -98,7 +98,7 @@ fn a_project_is_shown_and_its_model_generates() {
     );
     assert_eq!((&training["best_step"], &training["alarms"][0]), (&2.into(), &"collapsed".into()));
     let curves = viewer.json("api/training?name=gan/host&after=1");
-    assert_eq!((curves["train"].as_array().unwrap().len(), &curves["train"][0]["d"]), (1, &0.6.into()));
+    assert_eq!((curves["train"].as_array().unwrap().len(), &curves["train"][0]["discriminator"]), (1, &0.6.into()));
     assert_eq!(
         (&curves["validations"][0]["mean_pose_l1"], &curves["validations"][0]["pck"]),
         (&0.9.into(), &0.4.into())
@@ -107,14 +107,17 @@ fn a_project_is_shown_and_its_model_generates() {
     // A dropped sound, and a clip of the dataset beside the truth.
     let wav = fs::read(project.written("extract", "clip-1", "audio.wav")).unwrap();
     let (status, reply) =
-        viewer.post("api/results?checkpoint=gan/host&seed=3&name=talk.MP3", "application/octet-stream", &wav);
+        viewer.post("api/results?checkpoint=gan/host&name=talk.MP3", "application/octet-stream", &wav);
     assert_eq!(status, 200, "{reply}");
     let id = reply["id"].as_str().unwrap();
     let result = finished(&viewer, id);
     assert_eq!(result["files"], json!(["speech.mp3", "motion.bvh", "motion.glb", "motion.vrma"]), "{result}");
     assert!(viewer.get(&format!("results/{id}/motion.glb")).1.starts_with(b"glTF"));
     assert!(viewer.get(&format!("results/{id}/motion.bvh")).1.starts_with(b"HIERARCHY"));
-    assert_eq!((&result["seed"], &result["film"]), (&3.into(), &"".into()));
+    assert_eq!((&result["seed"], &result["film"], &result["speaker"]), (&Value::Null, &"".into(), &Value::Null));
+    let seeded = viewer.post("api/results?checkpoint=gan/host&seed=3&name=x.wav", "application/octet-stream", &wav).1;
+    let seeded = finished(&viewer, seeded["id"].as_str().unwrap());
+    assert!(seeded["message"].as_str().unwrap().contains("has no variants"), "{seeded}");
     assert_eq!(viewer.get(&format!("results/{id}/motion.mp4")).0, 404);
     assert_eq!(viewer.post(&format!("api/results/{id}/video"), "", b"").0, 200);
     assert!(finished(&viewer, id)["files"].as_array().unwrap().contains(&"motion.mp4".into()));
