@@ -59,6 +59,7 @@ check:
 test: dist models readers aligner browser blender validator vrm web driver spelling
 	@rm -f $(SKIPPED)
 	cargo fmt --check
+	.ci/setup/page.sh --check
 	$(ORATOR_SPELLING)/bin/typos
 	cargo clippy --release --locked --workspace --all-targets -- -D warnings
 	cargo test --release --locked --workspace

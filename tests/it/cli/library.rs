@@ -61,7 +61,13 @@ fn errors_that_stop_a_run_have_types() {
     let pipeline = Pipeline::open(load_config(&file, &[]).unwrap()).unwrap();
     let missing = pipeline.run(&Selection::only(StageName::Extract), &Silent).unwrap();
     assert!(missing.failures[0].cause.is_some() && missing.stages[&StageName::Extract].failed == 1);
-    let _lock = workdir::lock(&pipeline.config().settings.work.dir).unwrap();
+    // A process that another test is starting may hold a copy of the run's lock for a moment.
+    let lock = |_| {
+        let lock = workdir::lock(&pipeline.config().settings.work.dir).ok();
+        std::thread::sleep(std::time::Duration::from_millis(if lock.is_none() { 50 } else { 0 }));
+        lock
+    };
+    let _lock = (0..200).find_map(lock).unwrap();
     let error = pipeline.run(&Selection::only(StageName::Extract), &Silent).unwrap_err();
     assert!(error.is::<BusyFolder>(), "{error:#}");
 }
