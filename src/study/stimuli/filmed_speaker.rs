@@ -20,7 +20,7 @@ use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::f64::consts::{PI, TAU};
 
-/// Target loudness of all films, LUFS (EBU R 128); lowered if a clip would exceed [`MAX_AMPLITUDE`].
+/// Target loudness of all films, LUFS (EBU R 128); lowered if a clip would exceed `MAX_AMPLITUDE`.
 pub const LOUDNESS_LUFS: f64 = -23.0;
 /// Maximum amplitude, relative to full scale.
 const MAX_AMPLITUDE: f64 = 0.9;

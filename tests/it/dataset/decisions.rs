@@ -90,7 +90,7 @@ fn invalid_entries_are_named_with_what_was_expected() {
         ("end_secs = 2.5", "end_secs = \"2.5\"", "end_secs"),
         ("end_secs = 2.5\n", "", "end_secs"),
         ("\"reject\"", "\"refuse\"", "swap-hands"),
-        ("author", "autor", "unknown field `autor`"),
+        ("author", "writer", "unknown field `writer`"),
         ("\"0000000a\"", "\"0000000G\"", "8 hex digits"),
         ("\"0000000a\"", "\"\"", "expected an `id`"),
         ("15:20:00Z", "15:20:00", "`time`: expected UTC"),
