@@ -15,7 +15,7 @@ use std::path::PathBuf;
 /// Longest author of a decision, characters.
 const MAX_AUTHOR: usize = 80;
 
-/// Look at a project in the browser: videos, decisions, trainings and generated motion.
+/// Look at videos, decisions, trainings and results in the browser.
 ///
 /// A page on this machine shows every video with its keypoints and the avatar in sync, which seconds were accepted or
 /// rejected and why, running trainings, and motion that a checkpoint generates for a dropped or recorded sound. With
