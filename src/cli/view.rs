@@ -5,15 +5,13 @@ use crate::cli::config_args::ConfigArgs;
 use crate::cli::sandbox::this_program;
 use crate::cli::ui::Ui;
 use anyhow::{Result, ensure};
+use orator_dataset::decisions::MAX_CHARS;
 use orator_view::file::ViewedFile;
 use orator_view::project::Project;
 use orator_view::view_server::{self, ViewRequest};
 use serde_json::json;
 use std::net::{Ipv4Addr, SocketAddr};
 use std::path::PathBuf;
-
-/// Longest author of a decision, characters.
-const MAX_AUTHOR: usize = 80;
 
 /// Look at videos, decisions, trainings and results in the browser.
 ///
@@ -51,8 +49,8 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     let project = if file.is_none() { Some(Project::open(args.config.load()?)?) } else { None };
     let user = || std::env::var("USER").ok().filter(|name| !name.is_empty()).unwrap_or_else(|| "unknown".to_owned());
     let author = args.edit.then(|| args.author.unwrap_or_else(user));
-    let is_valid = |name: &String| name.chars().count() <= MAX_AUTHOR && !name.contains(char::is_control);
-    ensure!(author.as_ref().is_none_or(is_valid), "--author: expected at most {MAX_AUTHOR} characters on one line");
+    let is_valid = |name: &String| name.chars().count() <= MAX_CHARS && !name.contains(char::is_control);
+    ensure!(author.as_ref().is_none_or(is_valid), "--author: expected at most {MAX_CHARS} characters on one line");
     let request = ViewRequest { project, file, author, program };
     let address = SocketAddr::from((Ipv4Addr::LOCALHOST, args.port));
     view_server::run(request, address, |url| {

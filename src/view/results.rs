@@ -5,6 +5,7 @@ use anyhow::{Context, Result, bail};
 use orator_base::types::sound::SAMPLE_RATE;
 use orator_dataset::{Dataset, Split};
 use orator_formats::{checkpoint, wav};
+use orator_report::videos::gestures::part;
 use orator_web::files::{hex, random};
 use serde::Serialize;
 use serde_json::{Value, json};
@@ -242,10 +243,9 @@ impl ResultWorker {
         let fps = sample.motion.fps;
         let n_frames = sample.n_frames().min((MAX_CLIP_SECS * fps.per_sec()) as usize);
         let secs = fps.secs(n_frames);
-        sample.motion.joints = sample.motion.joints.slice(ndarray::s![..n_frames, .., ..]).to_owned();
-        sample.motion.mask = sample.motion.mask.slice(ndarray::s![..n_frames, ..]).to_owned();
+        let truth = part(&sample.motion, 0, n_frames);
         sample.sound.samples.truncate((secs * f64::from(SAMPLE_RATE)) as usize);
-        fs::write(folder.join("truth.glb"), crate::video::glb(&sample.motion, None)?)?;
+        fs::write(folder.join("truth.glb"), crate::video::glb(&truth, None)?)?;
         wav::write(&folder.join(SPEECH), &sample.sound)?;
         self.update(&result.id, |one| one.files.push("truth.glb".to_owned()));
         self.generate(result, &["generated.glb"])

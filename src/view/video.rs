@@ -1,7 +1,7 @@
 //! A video of the viewer: intervals, words, strokes, sound wave, keypoints, and the avatar of an accepted interval.
 
 use crate::project::id;
-use anyhow::{Context, Result, ensure};
+use anyhow::{Result, ensure};
 use ndarray::{Axis, s};
 use orator_avatar::animate::export::file::{ExportContent, ExportFormat};
 use orator_avatar::animate::{AnimationOptions, perform};
@@ -17,14 +17,13 @@ use orator_base::types::posture::Posture;
 use orator_base::types::sound::SAMPLE_RATE;
 use orator_dataset::config::Settings;
 use orator_dataset::decisions::{self, Decision, DecisionAction};
+use orator_formats::joints_npz;
 use orator_formats::media_json::MediaInfo;
-use orator_formats::{joints_npz, wav};
 use orator_gesture::phases::{GesturePhase, HANDS, WristTrack, find_phases};
-use orator_report::videos::gather::VideoSummary;
+use orator_pipeline::sound;
+use orator_report::videos::gather::{self, VideoSummary};
+use orator_report::videos::gestures::part;
 use serde_json::{Value, json};
-use std::fs::File;
-use std::io::{BufReader, Read as _};
-use std::ops::Range;
 use std::path::PathBuf;
 
 /// Peaks of the sound wave per second.
@@ -87,14 +86,9 @@ impl VideoView {
         })
     }
 
-    /// Joints of the whole video, and its accepted intervals.
     fn motion(&self) -> Result<(Motion, Intervals)> {
         ensure!(self.summary.is_lifted, "the video is not lifted yet");
-        let path = self.path(Artifact::LiftIntervals);
-        let bytes = std::fs::read(&path).with_context(|| format!("cannot read {}", path.display()))?;
-        let intervals =
-            serde_json::from_slice(&bytes).with_context(|| format!("{} is not a list of intervals", path.display()))?;
-        Ok((joints_npz::read(&self.path(Artifact::Joints))?, intervals))
+        gather::motion(&self.work, &self.unit)
     }
 
     /// Peak of the sound in every twentieth of a second, 0 to 255.
@@ -102,16 +96,13 @@ impl VideoView {
     /// # Errors
     /// The audio file is damaged. A video without audio has no peaks.
     pub fn wave(&self) -> Result<Vec<u8>> {
-        let path = self.path(Artifact::Sound);
-        let Ok(file) = File::open(&path) else { return Ok(Vec::new()) };
-        let mut reader = BufReader::with_capacity(1 << 16, file);
-        let mut header = [0; wav::HEADER_BYTES];
-        reader.read_exact(&mut header).with_context(|| format!("{} is truncated", path.display()))?;
-        let mut piece = vec![0; 2 * SAMPLE_RATE as usize / PEAKS_PER_SEC];
-        let mut peaks = Vec::new();
-        while reader.read_exact(&mut piece).is_ok() {
-            let samples = piece.chunks_exact(2).map(|pair| i16::from_le_bytes([pair[0], pair[1]]).unsigned_abs());
-            peaks.push((samples.max().unwrap_or(0) / 128).min(255) as u8);
+        let (path, mut peaks) = (self.path(Artifact::Sound), Vec::new());
+        if path.exists() {
+            sound::pieces(&path, SAMPLE_RATE as usize / PEAKS_PER_SEC, |samples| {
+                let peak = samples.iter().fold(0.0_f32, |peak, sample| peak.max(sample.abs()));
+                peaks.push((256.0 * peak).min(255.0) as u8);
+                Ok(())
+            })?;
         }
         Ok(peaks)
     }
@@ -161,7 +152,7 @@ impl VideoView {
         );
         let frames = (start_secs * fps).round() as usize..((end_secs * fps).round() as usize).min(motion.n_frames());
         ensure!(!frames.is_empty(), "there is no motion from {start_secs} to {end_secs} s");
-        let part = slice(&motion, frames.clone());
+        let part = part(&motion, frames.start, frames.end);
         ensure!(part.mask.iter().any(|is_visible| *is_visible), "no joint is visible in this range");
         let body = keypoints.body.slice(s![frames.clone(), .., ..]).to_owned();
         let extra = extra.map(|extra| extra.slice(s![frames, .., ..]).to_owned());
@@ -190,7 +181,7 @@ fn strokes((motion, intervals): &(Motion, Intervals)) -> Vec<Value> {
         .intervals
         .iter()
         .filter(inside)
-        .map(|own| (motion.fps.secs(own.start), slice(motion, own.start..own.end)))
+        .map(|own| (motion.fps.secs(own.start), part(motion, own.start, own.end)))
         .collect();
     let mut phases = Vec::new();
     for (side, name) in HANDS {
@@ -203,14 +194,6 @@ fn strokes((motion, intervals): &(Motion, Intervals)) -> Vec<Value> {
         }
     }
     phases
-}
-
-fn slice(motion: &Motion, frames: Range<usize>) -> Motion {
-    Motion {
-        fps: motion.fps,
-        joints: motion.joints.slice(s![frames.clone(), .., ..]).to_owned(),
-        mask: motion.mask.slice(s![frames, ..]).to_owned(),
-    }
 }
 
 /// Lines between keypoints of body, left hand and right hand.

@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 use std::ops::Range;
 
 /// Longest author and word, characters.
-const MAX_CHARS: usize = 80;
+pub const MAX_CHARS: usize = 80;
 /// Latest end of a range, seconds.
 const MAX_SECS: f64 = 1e9;
 /// Share of a frame that a range may overlap without affecting the frame, so that rounded times are harmless.

@@ -5,6 +5,6 @@ pub mod decision;
 pub mod file;
 pub mod hands;
 
-pub use decision::{Decision, DecisionAction, counts, of_unit, record};
+pub use decision::{Decision, DecisionAction, MAX_CHARS, counts, of_unit, record};
 pub use file::{FILE_NAME, add, attach, path, read, remove, time_text};
 pub use hands::{read_keypoints, swapped};

@@ -163,7 +163,11 @@ fn bone_change(work: &Path, unit: &Unit) -> Result<Vec<f32>> {
     Ok(values.into_iter().collect())
 }
 
-fn motion(work: &Path, unit: &Unit) -> Result<(orator_base::types::pose3d::Motion, Intervals)> {
+/// Joints of a lifted video, and its accepted intervals.
+///
+/// # Errors
+/// A file of the stage is missing or unreadable.
+pub fn motion(work: &Path, unit: &Unit) -> Result<(orator_base::types::pose3d::Motion, Intervals)> {
     let path = Artifact::LiftIntervals.path(work, unit);
     let bytes = std::fs::read(&path).with_context(|| format!("cannot read {}", path.display()))?;
     let intervals =

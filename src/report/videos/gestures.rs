@@ -7,15 +7,19 @@ use orator_base::types::interval::Interval;
 use orator_base::types::pose3d::Motion;
 use orator_gesture::phases::{HANDS, PhaseKind, PhaseTotals, WristTrack, find_phases};
 
+/// Frames `start..end` of a motion.
+pub fn part(motion: &Motion, start: usize, end: usize) -> Motion {
+    Motion {
+        fps: motion.fps,
+        joints: motion.joints.slice(s![start..end, .., ..]).to_owned(),
+        mask: motion.mask.slice(s![start..end, ..]).to_owned(),
+    }
+}
+
 /// Adds the phases of the accepted intervals of a video to the totals of the left and the right hand.
 pub fn add(hands: &mut [PhaseTotals; 2], motion: &Motion, intervals: &[Interval]) {
     let intervals = intervals.iter().filter(|interval| interval.end <= motion.n_frames());
-    let parts = intervals.map(|interval| Motion {
-        fps: motion.fps,
-        joints: motion.joints.slice(s![interval.start..interval.end, .., ..]).to_owned(),
-        mask: motion.mask.slice(s![interval.start..interval.end, ..]).to_owned(),
-    });
-    let parts: Vec<Motion> = parts.collect();
+    let parts: Vec<Motion> = intervals.map(|interval| part(motion, interval.start, interval.end)).collect();
     for (hand, (side, _)) in hands.iter_mut().zip(HANDS) {
         let tracks: Vec<WristTrack> = parts.iter().map(|part| WristTrack::new(part, side)).collect();
         for (part, phases) in parts.iter().zip(find_phases(&tracks)) {

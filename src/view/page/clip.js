@@ -183,7 +183,7 @@ export class Clip {
     pen.stroke();
   }
 
-  // Shows the motion at a time; loads the GLB of its accepted interval, at most a minute of it, when the position rests.
+  // Moves the avatar to a time. Its GLB covers at most a minute of the accepted interval and is loaded once scrubbing pauses.
   #moveAvatar(secs) {
     if (!this.video.has_motion) return;
     const { accepted } = this.video;

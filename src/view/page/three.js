@@ -3867,7 +3867,6 @@ void main() {
 
 		#include <common>
 
-		// Van der Corput radical inverse
 		float radicalInverse_VdC( uint bits ) {
 
 			bits = ( bits << 16u ) | ( bits >> 16u );
@@ -3879,7 +3878,6 @@ void main() {
 
 		}
 
-		// Hammersley sequence
 		vec2 hammersley( uint i, uint N ) {
 
 			return vec2( float( i ) / float( N ), radicalInverse_VdC( i ) );
@@ -3890,7 +3888,6 @@ void main() {
 
 			vec3 N = normalize( vWorldDirection );
 
-			// For very low roughness, just sample the environment directly
 			if ( roughness < 0.001 ) {
 
 				gl_FragColor = vec4( textureLod( envMap, N, 0.0 ).rgb, 1.0 );
@@ -3901,7 +3898,6 @@ void main() {
 			float alpha = roughness * roughness;
 			float alpha2 = alpha * alpha;
 
-			// Tangent space basis for VNDF sampling
 			vec3 up = abs( N.z ) < 0.999 ? vec3( 0.0, 0.0, 1.0 ) : vec3( 1.0, 0.0, 0.0 );
 			vec3 tangent = normalize( cross( up, N ) );
 			vec3 bitangent = cross( N, tangent );
@@ -3913,7 +3909,6 @@ void main() {
 
 				vec2 Xi = hammersley( i, GGX_SAMPLES );
 
-				// With V = N, sample the reflected direction directly.
 				float invQ = 1.0 / ( 1.0 - Xi.x + alpha2 * Xi.x );
 				float NdotL = ( 1.0 - Xi.x - alpha2 * Xi.x ) * invQ;
 
@@ -3923,12 +3918,9 @@ void main() {
 					float sinTheta = 2.0 * alpha * sqrt( Xi.x * ( 1.0 - Xi.x ) ) * invQ;
 					vec3 L = N * NdotL + ( tangent * cos( phi ) + bitangent * sin( phi ) ) * sinTheta;
 
-					// Match the source mip to the sample's solid angle. The terms
-					// independent of the sample are precomputed in lodBias.
 					float d = alpha2 * invQ;
 					float lod = max( log2( d ) + lodBias, 0.0 );
 
-					// Weight by NdotL for the split-sum approximation
 					prefilteredColor += textureLod( envMap, L, lod ).rgb * NdotL;
 					totalWeight += NdotL;
 
@@ -3960,7 +3952,6 @@ void main() {
 			vec3 prefilteredColor = vec3( 0.0 );
 			float totalWeight = 0.0;
 
-			// Pair opposite texels: only the one in N's hemisphere contributes.
 			for ( int face = 0; face < 3; face ++ ) {
 
 				for ( int y = 0; y < sourceSize; y ++ ) {
@@ -3975,8 +3966,6 @@ void main() {
 						texelDirection *= NdotL < 0.0 ? - 1.0 : 1.0;
 						NdotL = abs( NdotL ) * invDistance;
 
-						// With V = N, NdotH squared is ( 1 + NdotL ) / 2. Common factors
-						// in the GGX distribution and texel solid angle cancel when normalized.
 						float d = 1.0 + alpha2 + ( alpha2 - 1.0 ) * NdotL;
 						float weight = NdotL * invDistance * invDistance * invDistance / ( d * d );
 
@@ -4012,7 +4001,6 @@ void main() {
 			vec3 tangent = normalize( cross( up, outputDirection ) );
 			vec3 bitangent = cross( outputDirection, tangent );
 
-			// Truncate the kernel at three standard deviations or at the antipode.
 			float thetaMax = min( 3.0 * sigma, PI );
 			float truncation = 1.0 - exp( - 0.5 * thetaMax * thetaMax / ( sigma * sigma ) );
 
@@ -4021,7 +4009,6 @@ void main() {
 
 			for ( int i = 0; i < SAMPLES; i ++ ) {
 
-				// Stratified inverse-CDF sampling of the Gaussian, placed on a golden-angle spiral.
 				float stratum = ( float( i ) + 0.5 ) / float( SAMPLES );
 				float theta = sigma * sqrt( - 2.0 * log( 1.0 - stratum * truncation ) );
 				float phi = float( i ) * GOLDEN_ANGLE;
@@ -4029,7 +4016,6 @@ void main() {
 				vec3 offset = cos( phi ) * tangent + sin( phi ) * bitangent;
 				vec3 sampleDirection = cos( theta ) * outputDirection + sin( theta ) * offset;
 
-				// Correct the planar sample density to solid angle.
 				float weight = sin( theta ) / theta;
 
 				accumColor += weight * textureLod( envMap, sampleDirection, 0.0 ).rgb;
@@ -4050,7 +4036,6 @@ void main() {
 
 		void main() {
 
-			// Average four subpixel samples to preserve small, bright features.
 			vec3 direction = normalize( vWorldDirection );
 			vec3 dx = dFdx( direction ) * 0.25;
 			vec3 dy = dFdy( direction ) * 0.25;
@@ -4232,18 +4217,14 @@ varying vec3 vViewPosition;
 
 #include <common>
 
-// #include <uv_pars_vertex>
 #ifdef MTOON_USE_UV
   varying vec2 vUv;
 
-  // COMPAT: pre-r151 uses a common uvTransform
   #if THREE_VRM_THREE_REVISION < 151
     uniform mat3 uvTransform;
   #endif
 #endif
 
-// #include <uv2_pars_vertex>
-// COMAPT: pre-r151 uses uv2 for lightMap and aoMap
 #if THREE_VRM_THREE_REVISION < 151
   #if defined( USE_LIGHTMAP ) || defined( USE_AOMAP )
     attribute vec2 uv2;
@@ -4252,8 +4233,6 @@ varying vec3 vViewPosition;
   #endif
 #endif
 
-// #include <displacementmap_pars_vertex>
-// #include <envmap_pars_vertex>
 #include <color_pars_vertex>
 #include <fog_pars_vertex>
 #include <morphtarget_pars_vertex>
@@ -4271,9 +4250,7 @@ uniform float outlineWidthFactor;
 
 void main() {
 
-  // #include <uv_vertex>
   #ifdef MTOON_USE_UV
-    // COMPAT: pre-r151 uses a common uvTransform
     #if THREE_VRM_THREE_REVISION >= 151
       vUv = uv;
     #else
@@ -4281,8 +4258,6 @@ void main() {
     #endif
   #endif
 
-  // #include <uv2_vertex>
-  // COMAPT: pre-r151 uses uv2 for lightMap and aoMap
   #if THREE_VRM_THREE_REVISION < 151
     #if defined( USE_LIGHTMAP ) || defined( USE_AOMAP )
       vUv2 = ( uv2Transform * vec3( uv2, 1 ) ).xy;
@@ -4296,7 +4271,6 @@ void main() {
   #include <skinbase_vertex>
   #include <skinnormal_vertex>
 
-  // we need this to compute the outline properly
   objectNormal = normalize( objectNormal );
 
   #include <defaultnormal_vertex>
@@ -4309,7 +4283,6 @@ void main() {
 
   #include <morphtarget_vertex>
   #include <skinning_vertex>
-  // #include <displacementmap_vertex>
   #include <project_vertex>
   #include <logdepthbuf_vertex>
   #include <clipping_planes_vertex>
@@ -4336,7 +4309,6 @@ void main() {
   #endif
 
   #include <worldpos_vertex>
-  // #include <envmap_vertex>
   #include <shadowmap_vertex>
   #include <fog_vertex>
 
@@ -4398,13 +4370,10 @@ uniform float uvAnimationRotationPhase;
 #include <dithering_pars_fragment>
 #include <color_pars_fragment>
 
-// #include <uv_pars_fragment>
 #if ( defined( MTOON_USE_UV ) && !defined( MTOON_UVS_VERTEX_ONLY ) )
   varying vec2 vUv;
 #endif
 
-// #include <uv2_pars_fragment>
-// COMAPT: pre-r151 uses uv2 for lightMap and aoMap
 #if THREE_VRM_THREE_REVISION < 151
   #if defined( USE_LIGHTMAP ) || defined( USE_AOMAP )
     varying vec2 vUv2;
@@ -4417,25 +4386,18 @@ uniform float uvAnimationRotationPhase;
   uniform mat3 mapUvTransform;
 #endif
 
-// #include <alphamap_pars_fragment>
 
 #include <alphatest_pars_fragment>
 
 #include <aomap_pars_fragment>
-// #include <lightmap_pars_fragment>
 #include <emissivemap_pars_fragment>
 
 #ifdef USE_EMISSIVEMAP
   uniform mat3 emissiveMapUvTransform;
 #endif
 
-// #include <envmap_common_pars_fragment>
-// #include <envmap_pars_fragment>
-// #include <cube_uv_reflection_fragment>
 #include <fog_pars_fragment>
 
-// #include <bsdfs>
-// COMPAT: pre-r151 doesn't have BRDF_Lambert in <common>
 #if THREE_VRM_THREE_REVISION < 151
   vec3 BRDF_Lambert( const in vec3 diffuseColor ) {
     return RECIPROCAL_PI * diffuseColor;
@@ -4446,7 +4408,6 @@ uniform float uvAnimationRotationPhase;
 
 #include <normal_pars_fragment>
 
-// #include <lights_phong_pars_fragment>
 varying vec3 vViewPosition;
 
 struct MToonMaterial {
@@ -4488,7 +4449,6 @@ vec3 getDiffuse(
 
   vec3 col = lightColor * BRDF_Lambert( mix( material.shadeColor, material.diffuseColor, shading ) );
 
-  // The "comment out if you want to PBR absolutely" line
   #ifdef V0_COMPAT_SHADE
     col = min( col, material.diffuseColor );
   #endif
@@ -4496,28 +4456,23 @@ vec3 getDiffuse(
   return col;
 }
 
-// COMPAT: pre-r156 uses a struct GeometricContext
 #if THREE_VRM_THREE_REVISION >= 157
   void RE_Direct_MToon( const in IncidentLight directLight, const in vec3 geometryPosition, const in vec3 geometryNormal, const in vec3 geometryViewDir, const in vec3 geometryClearcoatNormal, const in MToonMaterial material, const in float shadow, inout ReflectedLight reflectedLight ) {
     float dotNL = clamp( dot( geometryNormal, directLight.direction ), -1.0, 1.0 );
     vec3 irradiance = directLight.color;
 
-    // directSpecular will be used for rim lighting, not an actual specular
     reflectedLight.directSpecular += irradiance;
 
     irradiance *= dotNL;
 
     float shading = getShading( dotNL, shadow, material.shadingShift );
 
-    // toon shaded diffuse
     reflectedLight.directDiffuse += getDiffuse( material, shading, directLight.color );
   }
 
   void RE_IndirectDiffuse_MToon( const in vec3 irradiance, const in vec3 geometryPosition, const in vec3 geometryNormal, const in vec3 geometryViewDir, const in vec3 geometryClearcoatNormal, const in MToonMaterial material, inout ReflectedLight reflectedLight ) {
-    // indirect diffuse will use diffuseColor, no shadeColor involved
     reflectedLight.indirectDiffuse += irradiance * BRDF_Lambert( material.diffuseColor );
 
-    // directSpecular will be used for rim lighting, not an actual specular
     reflectedLight.directSpecular += irradiance;
   }
 #else
@@ -4525,22 +4480,18 @@ vec3 getDiffuse(
     float dotNL = clamp( dot( geometry.normal, directLight.direction ), -1.0, 1.0 );
     vec3 irradiance = directLight.color;
 
-    // directSpecular will be used for rim lighting, not an actual specular
     reflectedLight.directSpecular += irradiance;
 
     irradiance *= dotNL;
 
     float shading = getShading( dotNL, shadow, material.shadingShift );
 
-    // toon shaded diffuse
     reflectedLight.directDiffuse += getDiffuse( material, shading, directLight.color );
   }
 
   void RE_IndirectDiffuse_MToon( const in vec3 irradiance, const in GeometricContext geometry, const in MToonMaterial material, inout ReflectedLight reflectedLight ) {
-    // indirect diffuse will use diffuseColor, no shadeColor involved
     reflectedLight.indirectDiffuse += irradiance * BRDF_Lambert( material.diffuseColor );
 
-    // directSpecular will be used for rim lighting, not an actual specular
     reflectedLight.directSpecular += irradiance;
   }
 #endif
@@ -4550,9 +4501,7 @@ vec3 getDiffuse(
 #define Material_LightProbeLOD( material ) (0)
 
 #include <shadowmap_pars_fragment>
-// #include <bumpmap_pars_fragment>
 
-// #include <normalmap_pars_fragment>
 #ifdef USE_NORMALMAP
 
   uniform sampler2D normalMap;
@@ -4561,24 +4510,16 @@ vec3 getDiffuse(
 
 #endif
 
-// COMPAT: pre-r151
-// USE_NORMALMAP_OBJECTSPACE used to be OBJECTSPACE_NORMALMAP in pre-r151
 #if defined( USE_NORMALMAP_OBJECTSPACE ) || defined( OBJECTSPACE_NORMALMAP )
 
   uniform mat3 normalMatrix;
 
 #endif
 
-// COMPAT: pre-r151
-// USE_NORMALMAP_TANGENTSPACE used to be TANGENTSPACE_NORMALMAP in pre-r151
 #if ! defined ( USE_TANGENT ) && ( defined ( USE_NORMALMAP_TANGENTSPACE ) || defined ( TANGENTSPACE_NORMALMAP ) )
 
-  // Per-Pixel Tangent Space Normal Mapping
-  // http://hacksoflife.blogspot.ch/2009/11/per-pixel-tangent-space-normal-mapping.html
 
-  // three-vrm specific change: it requires \`uv\` as an input in order to support uv scrolls
 
-  // Temporary compat against shader change @ Three.js r126, r151
   #if THREE_VRM_THREE_REVISION >= 151
 
     mat3 getTangentFrame( vec3 eye_pos, vec3 surf_norm, vec2 uv ) {
@@ -4620,8 +4561,6 @@ vec3 getDiffuse(
       vec3 T = q1perp * st0.x + q0perp * st1.x;
       vec3 B = q1perp * st0.y + q0perp * st1.y;
 
-      // three-vrm specific change: Workaround for the issue that happens when delta of uv = 0.0
-      // TODO: Is this still required? Or shall I make a PR about it?
       if ( length( T ) == 0.0 || length( B ) == 0.0 ) {
         return surf_norm;
       }
@@ -4637,11 +4576,9 @@ vec3 getDiffuse(
 
 #endif
 
-// #include <specularmap_pars_fragment>
 #include <logdepthbuf_pars_fragment>
 #include <clipping_planes_pars_fragment>
 
-// == post correction ==========================================================
 void postCorrection() {
   #include <tonemapping_fragment>
   #include <colorspace_fragment>
@@ -4650,7 +4587,6 @@ void postCorrection() {
   #include <dithering_fragment>
 }
 
-// == main procedure ===========================================================
 void main() {
   #include <clipping_planes_fragment>
 
@@ -4685,7 +4621,6 @@ void main() {
 
   #include <logdepthbuf_fragment>
 
-  // #include <map_fragment>
   #ifdef USE_MAP
     vec2 mapUv = ( mapUvTransform * vec3( uv, 1 ) ).xy;
     vec4 sampledDiffuseColor = texture2D( map, mapUv );
@@ -4695,18 +4630,14 @@ void main() {
     diffuseColor *= sampledDiffuseColor;
   #endif
 
-  // #include <color_fragment>
   #if ( defined( USE_COLOR ) && !defined( IGNORE_VERTEX_COLOR ) )
     diffuseColor.rgb *= vColor;
   #endif
 
-  // #include <alphamap_fragment>
 
   #include <alphatest_fragment>
 
-  // #include <specularmap_fragment>
 
-  // #include <normal_fragment_begin>
   float faceDirection = gl_FrontFacing ? 1.0 : -1.0;
 
   #ifdef FLAT_SHADED
@@ -4775,7 +4706,6 @@ void main() {
 
   #endif
 
-  // non perturbed normal for clearcoat among others
 
   vec3 nonPerturbedNormal = normal;
 
@@ -4783,10 +4713,7 @@ void main() {
     normal *= -1.0;
   #endif
 
-  // #include <normal_fragment_maps>
 
-  // COMPAT: pre-r151
-  // USE_NORMALMAP_OBJECTSPACE used to be OBJECTSPACE_NORMALMAP in pre-r151
   #if defined( USE_NORMALMAP_OBJECTSPACE ) || defined( OBJECTSPACE_NORMALMAP )
 
     normal = texture2D( normalMap, normalMapUv ).xyz * 2.0 - 1.0; // overrides both flatShading and attribute normals
@@ -4805,14 +4732,11 @@ void main() {
 
     normal = normalize( normalMatrix * normal );
 
-  // COMPAT: pre-r151
-  // USE_NORMALMAP_TANGENTSPACE used to be TANGENTSPACE_NORMALMAP in pre-r151
   #elif defined( USE_NORMALMAP_TANGENTSPACE ) || defined( TANGENTSPACE_NORMALMAP )
 
     vec3 mapN = texture2D( normalMap, normalMapUv ).xyz * 2.0 - 1.0;
     mapN.xy *= normalScale;
 
-    // COMPAT: pre-r151
     #if THREE_VRM_THREE_REVISION >= 151 || defined( USE_TANGENT )
 
       normal = normalize( tbn * mapN );
@@ -4825,7 +4749,6 @@ void main() {
 
   #endif
 
-  // #include <emissivemap_fragment>
   #ifdef USE_EMISSIVEMAP
     vec2 emissiveMapUv = ( emissiveMapUvTransform * vec3( uv, 1 ) ).xy;
     totalEmissiveRadiance *= texture2D( emissiveMap, emissiveMapUv ).rgb;
@@ -4836,9 +4759,6 @@ void main() {
     return;
   #endif
 
-  // -- MToon: lighting --------------------------------------------------------
-  // accumulation
-  // #include <lights_phong_fragment>
   MToonMaterial material;
 
   material.diffuseColor = diffuseColor.rgb;
@@ -4859,13 +4779,8 @@ void main() {
     material.shadingShift += texture2D( shadingShiftTexture, shadingShiftTextureUv ).r * shadingShiftTextureScale;
   #endif
 
-  // #include <lights_fragment_begin>
 
-  // MToon Specific changes:
-  // Since we want to take shadows into account of shading instead of irradiance,
-  // we had to modify the codes that multiplies the results of shadowmap into color of direct lights.
 
-  // COMPAT: pre-r156 uses a struct GeometricContext
   #if THREE_VRM_THREE_REVISION >= 157
     vec3 geometryPosition = - vViewPosition;
     vec3 geometryNormal = normal;
@@ -4894,7 +4809,6 @@ void main() {
 
   IncidentLight directLight;
 
-  // since these variables will be used in unrolled loop, we have to define in prior
   float shadow;
 
   #if ( NUM_POINT_LIGHTS > 0 ) && defined( RE_Direct )
@@ -4909,7 +4823,6 @@ void main() {
 
       pointLight = pointLights[ i ];
 
-      // COMPAT: pre-r156 uses a struct GeometricContext
       #if THREE_VRM_THREE_REVISION >= 157
         getPointLightInfo( pointLight, geometryPosition, directLight );
       #else
@@ -4919,8 +4832,6 @@ void main() {
       shadow = 1.0;
       #if defined( USE_SHADOWMAP ) && ( UNROLLED_LOOP_INDEX < NUM_POINT_LIGHT_SHADOWS )
       pointLightShadow = pointLightShadows[ i ];
-      // COMPAT: pre-r166
-      // r166 introduced shadowIntensity
       #if THREE_VRM_THREE_REVISION >= 166
         shadow = all( bvec2( directLight.visible, receiveShadow ) ) ? getPointShadow( pointShadowMap[ i ], pointLightShadow.shadowMapSize, pointLightShadow.shadowIntensity, pointLightShadow.shadowBias, pointLightShadow.shadowRadius, vPointShadowCoord[ i ], pointLightShadow.shadowCameraNear, pointLightShadow.shadowCameraFar ) : 1.0;
       #else
@@ -4928,7 +4839,6 @@ void main() {
       #endif
       #endif
 
-      // COMPAT: pre-r156 uses a struct GeometricContext
       #if THREE_VRM_THREE_REVISION >= 157
         RE_Direct( directLight, geometryPosition, geometryNormal, geometryViewDir, geometryClearcoatNormal, material, shadow, reflectedLight );
       #else
@@ -4943,7 +4853,6 @@ void main() {
   #if ( NUM_SPOT_LIGHTS > 0 ) && defined( RE_Direct )
 
     SpotLight spotLight;
-    // COMPAT: pre-r144 uses NUM_SPOT_LIGHT_SHADOWS, r144+ uses NUM_SPOT_LIGHT_COORDS
     #if THREE_VRM_THREE_REVISION >= 144
       #if defined( USE_SHADOWMAP ) && NUM_SPOT_LIGHT_COORDS > 0
       SpotLightShadow spotLightShadow;
@@ -4957,7 +4866,6 @@ void main() {
 
       spotLight = spotLights[ i ];
 
-      // COMPAT: pre-r156 uses a struct GeometricContext
       #if THREE_VRM_THREE_REVISION >= 157
         getSpotLightInfo( spotLight, geometryPosition, directLight );
       #else
@@ -4965,8 +4873,6 @@ void main() {
       #endif
 
       shadow = 1.0;
-      // COMPAT: pre-r144 uses NUM_SPOT_LIGHT_SHADOWS and vSpotShadowCoord, r144+ uses NUM_SPOT_LIGHT_COORDS and vSpotLightCoord
-      // COMPAT: pre-r166 does not have shadowIntensity, r166+ has shadowIntensity
       #if THREE_VRM_THREE_REVISION >= 166
         #if defined( USE_SHADOWMAP ) && ( UNROLLED_LOOP_INDEX < NUM_SPOT_LIGHT_COORDS )
         spotLightShadow = spotLightShadows[ i ];
@@ -4982,7 +4888,6 @@ void main() {
       shadow = all( bvec2( directLight.visible, receiveShadow ) ) ? getShadow( spotShadowMap[ i ], spotLightShadow.shadowMapSize, spotLightShadow.shadowBias, spotLightShadow.shadowRadius, vSpotShadowCoord[ i ] ) : 1.0;
       #endif
 
-      // COMPAT: pre-r156 uses a struct GeometricContext
       #if THREE_VRM_THREE_REVISION >= 157
         RE_Direct( directLight, geometryPosition, geometryNormal, geometryViewDir, geometryClearcoatNormal, material, shadow, reflectedLight );
       #else
@@ -5006,7 +4911,6 @@ void main() {
 
       directionalLight = directionalLights[ i ];
 
-      // COMPAT: pre-r156 uses a struct GeometricContext
       #if THREE_VRM_THREE_REVISION >= 157
         getDirectionalLightInfo( directionalLight, directLight );
       #else
@@ -5016,8 +4920,6 @@ void main() {
       shadow = 1.0;
       #if defined( USE_SHADOWMAP ) && ( UNROLLED_LOOP_INDEX < NUM_DIR_LIGHT_SHADOWS )
       directionalLightShadow = directionalLightShadows[ i ];
-      // COMPAT: pre-r166
-      // r166 introduced shadowIntensity
       #if THREE_VRM_THREE_REVISION >= 166
         shadow = all( bvec2( directLight.visible, receiveShadow ) ) ? getShadow( directionalShadowMap[ i ], directionalLightShadow.shadowMapSize, directionalLightShadow.shadowIntensity, directionalLightShadow.shadowBias, directionalLightShadow.shadowRadius, vDirectionalShadowCoord[ i ] ) : 1.0;
       #else
@@ -5025,7 +4927,6 @@ void main() {
       #endif
       #endif
 
-      // COMPAT: pre-r156 uses a struct GeometricContext
       #if THREE_VRM_THREE_REVISION >= 157
         RE_Direct( directLight, geometryPosition, geometryNormal, geometryViewDir, geometryClearcoatNormal, material, shadow, reflectedLight );
       #else
@@ -5037,20 +4938,11 @@ void main() {
 
   #endif
 
-  // #if ( NUM_RECT_AREA_LIGHTS > 0 ) && defined( RE_Direct_RectArea )
 
-  //   RectAreaLight rectAreaLight;
 
-  //   #pragma unroll_loop_start
-  //   for ( int i = 0; i < NUM_RECT_AREA_LIGHTS; i ++ ) {
 
-  //     rectAreaLight = rectAreaLights[ i ];
-  //     RE_Direct_RectArea( rectAreaLight, geometry, material, reflectedLight );
 
-  //   }
-  //   #pragma unroll_loop_end
 
-  // #endif
 
   #if defined( RE_IndirectDiffuse )
 
@@ -5058,8 +4950,6 @@ void main() {
 
     vec3 irradiance = getAmbientLightIrradiance( ambientLightColor );
 
-    // COMPAT: pre-r156 uses a struct GeometricContext
-    // COMPAT: pre-r156 doesn't have a define USE_LIGHT_PROBES
     #if THREE_VRM_THREE_REVISION >= 157
       #if defined( USE_LIGHT_PROBES )
         irradiance += getLightProbeIrradiance( lightProbe, geometryNormal );
@@ -5073,7 +4963,6 @@ void main() {
       #pragma unroll_loop_start
       for ( int i = 0; i < NUM_HEMI_LIGHTS; i ++ ) {
 
-        // COMPAT: pre-r156 uses a struct GeometricContext
         #if THREE_VRM_THREE_REVISION >= 157
           irradiance += getHemisphereLightIrradiance( hemisphereLights[ i ], geometryNormal );
         #else
@@ -5087,17 +4976,12 @@ void main() {
 
   #endif
 
-  // #if defined( RE_IndirectSpecular )
 
-  //   vec3 radiance = vec3( 0.0 );
-  //   vec3 clearcoatRadiance = vec3( 0.0 );
 
-  // #endif
 
   #include <lights_fragment_maps>
   #include <lights_fragment_end>
 
-  // modulation
   #include <aomap_fragment>
 
   vec3 col = reflectedLight.directDiffuse + reflectedLight.indirectDiffuse;
@@ -5108,7 +4992,6 @@ void main() {
     return;
   #endif
 
-  // -- MToon: rim lighting -----------------------------------------
   vec3 viewDir = normalize( vViewPosition );
 
   #ifndef PHYSICALLY_CORRECT_LIGHTS
@@ -5136,12 +5019,9 @@ void main() {
 
   col += rimMix * rim;
 
-  // -- MToon: Emission --------------------------------------------------------
   col += totalEmissiveRadiance;
 
-  // #include <envmap_fragment>
 
-  // -- Almost done! -----------------------------------------------------------
   #if defined( OUTLINE )
     col = outlineColorFactor.rgb * mix( vec3( 1.0 ), col, outlineLightingMixFactor );
   #endif
