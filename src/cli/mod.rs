@@ -9,6 +9,7 @@ pub mod dataset;
 pub mod evaluate;
 mod figure_args;
 pub mod generate;
+pub mod live;
 pub mod motion;
 pub mod outputs;
 pub mod pipeline;

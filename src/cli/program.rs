@@ -8,7 +8,7 @@ use super::pipeline::{init, report, run, status};
 use super::setup::{completions, doctor, models, words};
 use super::signals;
 use super::ui::Ui;
-use super::{animate, evaluate, generate, study, train, ui, verb_groups, view};
+use super::{animate, evaluate, generate, live, study, train, ui, verb_groups, view};
 use anyhow::Result;
 use clap::{ArgMatches, CommandFactory, FromArgMatches, Parser, Subcommand};
 use orator_base::stage::workdir;
@@ -62,6 +62,7 @@ pub(super) enum Verb {
     Train(train::Args),
     Evaluate(evaluate::Args),
     Generate(generate::Args),
+    Live(live::Args),
     Animate(animate::Args),
     Study(study::Args),
     View(view::Args),
@@ -102,6 +103,7 @@ fn run(cli: Cli, ui: &Ui) -> Result<Outcome> {
         Verb::Train(args) => train::run(args, ui),
         Verb::Evaluate(args) => evaluate::run(args, ui),
         Verb::Generate(args) => generate::run(args, ui),
+        Verb::Live(args) => live::run(args, ui),
         Verb::Animate(args) => animate::run(args, ui),
         Verb::Study(args) => study::run(args, ui),
         Verb::View(args) => view::run(args, ui),

@@ -35,6 +35,11 @@ impl Ui {
         self.print(&format!("{}{next}", text.trim_end()));
     }
 
+    /// Whether results are printed as JSON.
+    pub fn is_json(&self) -> bool {
+        self.json
+    }
+
     /// Prints the error that ended the verb.
     pub fn error(&self, error: &anyhow::Error) {
         note(&format!("error: {error:#}"));

@@ -26,7 +26,7 @@ const GROUPS: [(&str, &[&str]); 5] = [
         ],
     ),
     ("Training", &["train"]),
-    ("Animation", &["generate", "animate"]),
+    ("Animation", &["generate", "live", "animate"]),
     ("Evaluation", &["evaluate", "study"]),
     ("Setup", &["doctor", "models", "words", "guide", "completions", "man"]),
 ];

@@ -51,7 +51,7 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     let author = args.edit.then(|| args.author.unwrap_or_else(user));
     let is_valid = |name: &String| name.chars().count() <= MAX_CHARS && !name.contains(char::is_control);
     ensure!(author.as_ref().is_none_or(is_valid), "--author: expected at most {MAX_CHARS} characters on one line");
-    let request = ViewRequest { project, file, author, program };
+    let request = ViewRequest { project, file, live: None, author, program };
     let address = SocketAddr::from((Ipv4Addr::LOCALHOST, args.port));
     view_server::run(request, address, |url| {
         ui.summary(&format!("open {url}\nCtrl-C ends the server"), None, json!({ "address": url }));

@@ -16,6 +16,8 @@ pub mod lifting {}
 pub mod keypoints {}
 #[doc = include_str!("training.md")]
 pub mod training {}
+#[doc = include_str!("live.md")]
+pub mod live {}
 #[doc = include_str!("onnx.md")]
 pub mod onnx {}
 #[doc = include_str!("gpu.md")]

@@ -18,7 +18,7 @@ macro_rules! topic {
 }
 
 /// Every page, in reading order.
-pub const TOPICS: [Topic; 20] = [
+pub const TOPICS: [Topic; 21] = [
     topic!("tutorial", "from videos to generated motion: every command with its output"),
     topic!("questions", "minutes of video, own rig, own language, phone videos, seated speakers"),
     topic!("dataset", "files of a dataset, rejected seconds, transcripts, splits, import and removal"),
@@ -26,6 +26,7 @@ pub const TOPICS: [Topic; 20] = [
     topic!("lifting", "2D keypoints to 3D joints: input, output, errors, custom lifters"),
     topic!("keypoints", "keypoints of OpenPose, MMPose, AlphaPose, MediaPipe and PATS instead of videos"),
     topic!("training", "training: settings, recipes, fine-tuning, validation, checkpoints; generating motion"),
+    topic!("live", "gestures while somebody speaks: microphones, VSeeFace and other programs, a page, voice agents"),
     topic!("onnx", "trained models in Python, browsers and Unity: files, example programs"),
     topic!("gpu", "training and generation on an NVIDIA GPU: building, libraries, measurements"),
     topic!("animation", "joints to BVH, GLB, JSON and MP4: rig, smoothing, constraints"),
@@ -54,6 +55,6 @@ mod tests {
             assert_eq!(wide, None, "{}", topic.name);
         }
         let n_lines: usize = TOPICS.iter().map(|topic| topic.text.lines().count()).sum();
-        assert!(n_lines <= 2030, "{n_lines} lines");
+        assert!(n_lines <= 2140, "{n_lines} lines");
     }
 }

@@ -4,6 +4,7 @@
 
 pub mod assets;
 pub mod file;
+pub mod live;
 pub mod project;
 pub mod results;
 pub mod training;

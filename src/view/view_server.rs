@@ -3,6 +3,7 @@
 
 use crate::assets::ASSETS;
 use crate::file::ViewedFile;
+use crate::live::LiveFeed;
 use crate::project::{DecisionRequest, Project};
 use crate::results::{ResultRequest, Results};
 use crate::training;
@@ -13,7 +14,7 @@ use orator_gesture::generate::model::checkpoint_file;
 use orator_web::axum::Router;
 use orator_web::axum::extract::{Path, Query, Request, State};
 use orator_web::axum::http::{StatusCode, header};
-use orator_web::axum::response::{IntoResponse, Response as HttpResponse};
+use orator_web::axum::response::{IntoResponse, Response as HttpResponse, Sse};
 use orator_web::axum::routing::{delete, get, post};
 use orator_web::files::{hex, random, save_body, serve_file};
 use orator_web::host::AllowedHosts;
@@ -42,6 +43,7 @@ const MAX_READERS: usize = 2;
 pub struct ViewRequest {
     pub project: Option<Project>,
     pub file: Option<ViewedFile>,
+    pub live: Option<LiveFeed>,
     /// Author of decisions; `None`: the page is read-only.
     pub author: Option<String>,
     /// This program.
@@ -92,6 +94,8 @@ fn router(viewer: Viewer, token: &str) -> Router {
         .route("/api/results", get(results).post(generate))
         .route("/api/results/{id}/video", post(film))
         .route("/results/{id}/{file}", get(result_file))
+        .route("/live/avatar.vrm", get(live_avatar))
+        .route("/live/poses", get(live_poses))
         .route("/file", get(file))
         .route("/file-audio", get(file_audio));
     for (path, content_type, text) in ASSETS {
@@ -132,9 +136,10 @@ fn unknown() -> ApiError {
 }
 
 async fn project(State(viewer): Shared) -> HttpResponse {
-    let ViewRequest { project, file, author, .. } = &viewer.request;
+    let ViewRequest { project, file, live, author, .. } = &viewer.request;
     let mut facts = project.as_ref().map_or_else(|| json!({ "speakers": [] }), Project::facts);
     facts["file"] = file.as_ref().map_or(Value::Null, ViewedFile::facts);
+    facts["live"] = live.as_ref().map_or(Value::Null, LiveFeed::facts);
     facts["editable"] = (project.is_some() && author.is_some()).into();
     facts["author"] = json!(author);
     json_reply(&facts)
@@ -287,6 +292,18 @@ async fn film(State(viewer): Shared, Path(id): Path<String>) -> Reply {
 async fn result_file(State(viewer): Shared, Path((id, file)): Path<(String, String)>, request: Request) -> Reply {
     let path = viewer.results.file(&id, &file).ok_or_else(unknown)?;
     Ok(serve_file(&path, request).await)
+}
+
+fn live_feed(viewer: &Viewer) -> Result<&LiveFeed, ApiError> {
+    viewer.request.live.as_ref().ok_or_else(unknown)
+}
+
+async fn live_avatar(State(viewer): Shared) -> Reply {
+    Ok(bytes(live_feed(&viewer)?.avatar.to_vec()))
+}
+
+async fn live_poses(State(viewer): Shared) -> Reply {
+    Ok(Sse::new(live_feed(&viewer)?.events()).into_response())
 }
 
 async fn file(State(viewer): Shared, request: Request) -> Reply {

@@ -21,6 +21,7 @@ mod fuzz;
 mod generate;
 mod keypoints;
 mod lift;
+mod live;
 mod media;
 mod nn;
 mod parity;

@@ -17,6 +17,7 @@ auto_section! {
         representation: MotionRepresentation = MotionRepresentation::Auto,
         channels: Vec<PostureChannel> = Vec::new(),
         words: bool = false,
+        look_ahead_secs: f64 = 0.0 => (0.0, 2.0, "seconds"),
         window_frames: usize = 64 => (32.0, 4096.0, "frames"),
         stride_frames: usize = 5 => (1.0, 4096.0, "frames"),
         batch: C = count => (2.0, 4096.0, "windows"),

@@ -86,6 +86,11 @@ pub fn export(checkpoint: &Path, choice: &GenerationChoice, out: &Path, carry_st
 impl ModelFiles<'_> {
     fn gan(&mut self, checkpoint: &Path, choice: &GenerationChoice) -> Result<()> {
         let (metadata, _, contents) = load_with_contents(checkpoint, choice, &Device::Cpu)?;
+        ensure!(
+            metadata.network.look_ahead.is_none(),
+            "{} is a network for `orator live`, which is not exported: train one without gan.look_ahead_secs",
+            checkpoint.display()
+        );
         let mels: GraphPort = ("mels", F32, "1,64,mel_frames");
         let about = [("spectrogram", serde_json::to_string(&metadata.audio)?)];
         self.write("mel.onnx", mels::front_end(metadata.fps)?, &[SAMPLES], &[mels, FRAMES], MELS_TEXT, &about)?;

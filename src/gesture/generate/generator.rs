@@ -131,15 +131,20 @@ impl GestureGenerator {
 
     /// Raw network output [features, T] in chunks of at most `chunk` frames, which [`SpeakerMetadata::motion`] converts
     /// to motion, for sound pieces as in [`Self::motion_from_stream`]. The sound is extended by its mirror image to a
-    /// multiple of 32 frames.
-    pub fn features(
-        &self,
-        pieces: impl Iterator<Item = Result<Vec<f32>>>,
+    /// multiple of 32 frames; for a network with a bounded view of the future by silence.
+    pub fn features<'a>(
+        &'a self,
+        pieces: impl Iterator<Item = Result<Vec<f32>>> + 'a,
         n_samples: usize,
         words: &[Word],
         chunk: usize,
-    ) -> Result<impl Iterator<Item = Result<Array2<f32>>>> {
+    ) -> Result<Box<dyn Iterator<Item = Result<Array2<f32>>> + 'a>> {
         let n_frames = self.n_frames(n_samples)?;
+        let n_of = move |first: usize| chunk.min(n_frames - first);
+        if self.metadata.network.look_ahead.is_some() {
+            let chunks = self.live_features(pieces, chunk)?.zip((0..n_frames).step_by(chunk));
+            return Ok(Box::new(chunks.map(move |(poses, first)| Ok(poses?.slice_move(s![.., ..n_of(first)])))));
+        }
         let padded = (n_frames / FRAMES_MULTIPLE + 1) * FRAMES_MULTIPLE;
         let n_mel_frames = mel_frames(self.fps(), padded);
         let mut stream = MelStream::new(pieces, n_samples, n_mel_frames);
@@ -147,15 +152,8 @@ impl GestureGenerator {
         let preset = self.metadata.network.preset;
         let chunks = StreamingGenerator::new(&self.generator, preset, n_mel_frames, padded, chunk, mels)?
             .with_words(self.word_frames(words, padded)?);
-        Ok(chunks.zip((0..n_frames).step_by(chunk)).map(move |(poses, first)| {
-            let n = chunk.min(n_frames - first);
-            let poses: Vec<f32> = poses?.narrow(2, 0, n)?.flatten_all()?.to_vec1()?;
-            ensure!(
-                poses.iter().all(|number| number.is_finite()),
-                "the network output is not finite from frame {first} on: the checkpoint is damaged, or its training failed"
-            );
-            Ok(Array2::from_shape_vec((self.metadata.network.n_out, n), poses)?)
-        }))
+        let chunks = chunks.zip((0..n_frames).step_by(chunk));
+        Ok(Box::new(chunks.map(move |(poses, first)| network_output(&poses?.narrow(2, 0, n_of(first))?, first))))
     }
 
     /// The words at `n_frames` pose frames; `None` if the network does not read words.
@@ -174,6 +172,17 @@ impl GestureGenerator {
         ensure!(n_frames > 0, "the audio is too short for one frame of motion: {secs:.3} s");
         Ok(n_frames)
     }
+}
+
+/// Output [1, features, T] of a network as an array [features, T]; `first` is the index of its first frame.
+pub(super) fn network_output(poses: &Tensor, first: usize) -> Result<Array2<f32>> {
+    let (_, n_features, n_frames) = poses.dims3()?;
+    let values: Vec<f32> = poses.flatten_all()?.to_vec1()?;
+    ensure!(
+        values.iter().all(|value| value.is_finite()),
+        "the network output is not finite from frame {first} on: the checkpoint is damaged, or its training failed"
+    );
+    Ok(Array2::from_shape_vec((n_features, n_frames), values)?)
 }
 
 /// Spectrogram stream of a sound of known length that is read in pieces of any length.

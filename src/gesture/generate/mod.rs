@@ -1,6 +1,7 @@
 //! Generation of motion from speech with a trained model.
 
 pub mod generator;
+pub mod live;
 pub mod model;
 pub mod normalisation;
 pub mod representation;

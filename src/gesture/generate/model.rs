@@ -26,6 +26,8 @@ use std::path::{Path, PathBuf};
 pub const GENERATOR: &str = "generator.";
 /// Name and version of the checkpoint layout; any other is rejected.
 const KIND: &str = "orator speaker 2";
+/// That of a network with a bounded view of the future, which earlier versions of the program would run as a complete one.
+const BOUNDED_KIND: &str = "orator speaker 3";
 const SKELETON: &str = "49 joints, house order";
 /// Largest accepted number of channels; the published network has 256.
 const MAX_WIDTH: usize = 1024;
@@ -98,7 +100,7 @@ impl SpeakerMetadata {
         representation: Representation,
     ) -> Self {
         Self {
-            kind: KIND.to_owned(),
+            kind: if network.look_ahead.is_some() { BOUNDED_KIND } else { KIND }.to_owned(),
             name: name.to_owned(),
             fps,
             skeleton: SKELETON.to_owned(),
@@ -202,7 +204,8 @@ fn select_speaker(contents: &mut Contents, name: Option<&str>) -> Result<()> {
 fn check(facts: &serde_json::Value) -> Result<()> {
     let kind = &facts["kind"];
     ensure!(!is_sequence_kind(kind), "it is a checkpoint of `orator train seq2seq`; use it with `orator generate`");
-    ensure!(kind == KIND, "unsupported kind {kind}: expected {KIND:?}");
+    let expected = if facts["network"].get("look_ahead").is_some() { BOUNDED_KIND } else { KIND };
+    ensure!(kind == expected, "unsupported kind {kind}: expected {expected:?}");
     Ok(())
 }
 

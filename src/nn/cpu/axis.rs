@@ -13,12 +13,37 @@ pub struct ConvAxis {
     pub pad: usize,
 }
 
+/// Zeros around the input of a convolution.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Padding {
+    /// TensorFlow's "same", see [`ConvAxis::same`].
+    Same,
+    /// Only before the input, see [`ConvAxis::causal`].
+    Causal,
+    None,
+}
+
+impl Padding {
+    pub fn axis(self, n_in: usize, kernel: usize, stride: usize) -> ConvAxis {
+        match self {
+            Self::Same => ConvAxis::same(n_in, kernel, stride),
+            Self::Causal => ConvAxis::causal(n_in, kernel, stride),
+            Self::None => ConvAxis::valid(n_in, kernel, stride),
+        }
+    }
+}
+
 impl ConvAxis {
     /// TensorFlow's "same" padding: ceil(n_in / stride) outputs; the smaller half of the padding comes first.
     pub fn same(n_in: usize, kernel: usize, stride: usize) -> Self {
         let n_out = n_in.div_ceil(stride);
         let total = ((n_out.max(1) - 1) * stride + kernel).saturating_sub(n_in);
         Self { n_in, n_out, kernel, stride, pad: total / 2 }
+    }
+
+    /// ceil(n_in / stride) outputs, where output i reads no input after the last one of its own, `stride * (i + 1) - 1`.
+    pub fn causal(n_in: usize, kernel: usize, stride: usize) -> Self {
+        Self { n_in, n_out: n_in.div_ceil(stride), kernel, stride, pad: kernel.saturating_sub(stride) }
     }
 
     /// No padding: one output for every `stride`-th position at which the kernel fits; none if it does not fit.

@@ -3,8 +3,10 @@
 //! connections maps these to motion; words enter before its last layer (`words`). Fully convolutional: any number of
 //! frames; the UNet pads them internally. Its convolution blocks are also those of the discriminator.
 
+use super::look_ahead::LookAhead;
 use super::speaker_layer::SpeakerLayer;
 use super::words::{WordFrames, WordLayer};
+use crate::cpu::axis::Padding;
 use crate::gpu::launch::is_on_device;
 use crate::gpu::layer::DeviceLayer;
 use crate::gpu::passes::{self, UnetLayers, chain};
@@ -67,6 +69,9 @@ pub struct Config {
     pub vocabulary: usize,
     #[serde(default, skip_serializing_if = "is_zero")]
     pub word: usize,
+    /// Bounded view of the future; `None`: the complete network.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub look_ahead: Option<LookAhead>,
 }
 
 fn is_zero(n: &usize) -> bool {
@@ -83,7 +88,8 @@ impl Config {
     pub fn from_preset(preset: Preset, n_out: usize) -> Self {
         let norm_momentum = if preset == Preset::Paper { 0.01 } else { 0.1 };
         let (n_speakers, speaker_weights, vocabulary, word) = (0, false, 0, 0);
-        Self { preset, n_mels: 64, width: 256, n_out, norm_momentum, n_speakers, speaker_weights, vocabulary, word }
+        let (n_mels, width, look_ahead) = (64, 256, None);
+        Self { preset, n_mels, width, n_out, norm_momentum, n_speakers, speaker_weights, vocabulary, word, look_ahead }
     }
 }
 
@@ -91,6 +97,7 @@ impl Config {
 /// per step; then a UNet over time with additive skip connections.
 pub struct Generator {
     preset: Preset,
+    look_ahead: Option<LookAhead>,
     audio_encoder: Vec<ConvBlock>,
     speakers: Option<SpeakerLayer>,
     words: Option<WordLayer>,
@@ -118,12 +125,14 @@ impl Generator {
             0 => None,
             vocabulary => Some(WordLayer::new(params, [vocabulary, config.word, n])?),
         };
+        let padding = if config.look_ahead.is_some() { Padding::Causal } else { Padding::Same };
         let mut row = |name: &str, n_blocks: usize, (kernel, stride): (usize, usize)| {
-            let block = |i| ConvBlock::new(params, &format!("{name}.{i}"), &[n, n, kernel], stride, momentum);
-            (0..n_blocks).map(block).collect::<Result<Vec<_>>>()
+            let mut block = |i| ConvBlock::new(params, &format!("{name}.{i}"), &[n, n, kernel], stride, momentum);
+            (0..n_blocks).map(|i| Ok(ConvBlock { padding, ..block(i)? })).collect::<Result<Vec<_>>>()
         };
         Ok(Self {
             preset: config.preset,
+            look_ahead: config.look_ahead,
             audio_encoder,
             speakers,
             words,
@@ -137,6 +146,10 @@ impl Generator {
 
     pub fn device(&self) -> &Device {
         self.enter.first().map_or(&Device::Cpu, |block| block.weight.device())
+    }
+
+    pub fn look_ahead(&self) -> Option<LookAhead> {
+        self.look_ahead
     }
 
     /// Maps `mels` [B, n_mels, T_mel] to poses [B, n_out, n_frames]; `n_frames` is at least 1 and covers the same time as
@@ -158,7 +171,9 @@ impl Generator {
         if n_frames == 0 {
             candle_core::bail!("no frames: expected at least 1");
         }
-        self.with_words(resize::linear(&self.encode(mels, speakers, train)?, n_frames)?, words)
+        let encoded = self.encode(mels, speakers, train)?;
+        let ratio = self.look_ahead.map_or((encoded.dim(1)?, n_frames), |of| of.encoded_per_frame);
+        self.with_words(resize::linear_with_ratio(&encoded, n_frames, ratio)?, words)
     }
 
     /// Appends words to encoded audio at the pose frames, [B, T, width], if there is word input.
@@ -213,7 +228,7 @@ impl Generator {
             skips.push(std::mem::replace(&mut x, down));
         }
         for (block, skip) in self.ups.iter().zip(skips.iter().rev()) {
-            x = block.forward(&resize::repeat_frames_and_add(&x, skip)?, train)?;
+            x = block.forward(&resize::repeat_frames_and_add(&x, skip, self.look_ahead.is_some())?, train)?;
         }
         let x = through(&self.decoder, x, train)?;
         let x = direct.map_or(Ok(x.clone()), |direct| x + direct)?;
@@ -225,12 +240,12 @@ impl Generator {
     fn decode_on_device(&self, encoded: &Tensor, direct: Option<&Tensor>, train: bool) -> Result<Tensor> {
         let [enter, downs, ups, mut decoder] =
             [&self.enter, &self.downs, &self.ups, &self.decoder].map(|blocks| on_device(blocks));
-        let last = self.last.on_device(1.0);
+        let (last, delay) = (self.last.on_device(1.0), usize::from(self.look_ahead.is_some()));
         let Some(direct) = direct else {
             decoder.push(last);
-            return passes::unet(UnetLayers { enter, downs, ups, decoder }, encoded, train);
+            return passes::unet(UnetLayers { enter, downs, ups, decoder, delay }, encoded, train);
         };
-        let decoded = passes::unet(UnetLayers { enter, downs, ups, decoder }, encoded, train)?;
+        let decoded = passes::unet(UnetLayers { enter, downs, ups, decoder, delay }, encoded, train)?;
         chain(vec![last], &(decoded + direct.t()?)?, train, 1)
     }
 }
@@ -277,8 +292,8 @@ pub struct ConvBlock {
     bias: Tensor,
     norm: BatchNorm,
     stride: usize,
-    /// Whether the kernel covers all frequencies, without padding.
-    full_height: bool,
+    /// Without padding, the kernel covers all frequencies.
+    padding: Padding,
 }
 
 impl ConvBlock {
@@ -287,13 +302,13 @@ impl ConvBlock {
     pub fn new(params: &mut Params, name: &str, shape: &[usize], stride: usize, momentum: f64) -> Result<Self> {
         let (weight, bias) = params.layer(&format!("{name}.conv"), shape, Init::Glorot, Init::Constant(0.0))?;
         let norm = BatchNorm::new(params, &format!("{name}.norm"), shape[0], EPS, momentum, SLOPE)?;
-        Ok(Self { weight, bias, norm, stride, full_height: false })
+        Ok(Self { weight, bias, norm, stride, padding: Padding::Same })
     }
 
     /// Creates a block with a weight of this `shape` [C', C, K, F], stride 1 and no padding, over all F frequencies of
     /// its input.
     pub fn full_height(params: &mut Params, name: &str, shape: [usize; 4], momentum: f64) -> Result<Self> {
-        Ok(Self { full_height: true, ..Self::new(params, name, &shape, 1, momentum)? })
+        Ok(Self { padding: Padding::None, ..Self::new(params, name, &shape, 1, momentum)? })
     }
 
     /// Maps [B, T, C] to [B, ceil(T / stride), C'], or [B, T, F, C] to [B, T', F', C'].
@@ -301,27 +316,27 @@ impl ConvBlock {
         if is_on_device(x) {
             return passes::channels_last(self.on_device(), x, train);
         }
-        let Self { weight, bias, norm, .. } = self;
-        if !self.full_height {
-            return conv_norm(x, weight, bias, norm, conv2d::same(x, weight, self.stride)?, train);
+        let Self { weight, bias, norm, stride, padding } = self;
+        if *padding != Padding::None {
+            return conv_norm(x, weight, bias, norm, conv2d::sizes(x, weight, *stride, *padding)?, train);
         }
         // The channels of all frequencies are treated as channels, which leaves a convolution over time.
         let ((batch, time, frequencies, channels), (n_out, _, kernel, _)) = (x.dims4()?, weight.dims4()?);
         let x = x.contiguous()?.reshape((batch, time, frequencies * channels))?;
         let weight = weight.permute((0, 3, 1, 2))?.contiguous()?.reshape((n_out, (), kernel))?;
-        conv_norm(&x, &weight, bias, norm, conv2d::valid(&x, &weight)?, train)?.unsqueeze(2)
+        conv_norm(&x, &weight, bias, norm, conv2d::sizes(&x, &weight, 1, Padding::None)?, train)?.unsqueeze(2)
     }
 
     /// Layer for a GPU.
     pub(super) fn on_device(&self) -> DeviceLayer {
-        let Self { weight, bias, norm, stride, full_height } = self;
+        let Self { weight, bias, norm, stride, padding } = self;
         DeviceLayer {
             weight: weight.clone(),
             bias: bias.clone(),
             slope: norm.slope,
             norm: Some(norm.clone()),
             stride: *stride,
-            is_padded: !full_height,
+            padding: *padding,
         }
     }
 }

@@ -1,8 +1,10 @@
 //! The networks of the speech-to-gesture GAN: audio encoder and motion UNet (`generator`) with speaker-specific layers
-//! (`speaker_layer`) and word input (`words`), motion discriminator, and the generator run in chunks (`streaming`).
+//! (`speaker_layer`), word input (`words`) and a bounded view of the future (`look_ahead`), motion discriminator, and the
+//! generator run in chunks (`streaming`).
 
 pub mod discriminator;
 pub mod generator;
+pub mod look_ahead;
 pub mod speaker_layer;
 pub mod streaming;
 pub mod words;

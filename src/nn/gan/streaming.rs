@@ -1,16 +1,17 @@
 //! The generator for sound of any length in constant memory: audio encoder and UNet run piece by piece, each piece
 //! with enough context that the padding at its ends does not affect the part that is used. Pieces start at multiples
 //! of all strides, and the resize between encoder and UNet counts from the start of the sound, so the result equals
-//! that of one pass.
+//! that of one pass. With a bounded view of the future (`look_ahead`) no sound is read before it is needed, so the
+//! length of the sound may be unknown, and a chunk may have any number of frames.
 
 use super::generator::{FRAMES_MULTIPLE, Generator, Preset};
 use super::words::WordFrames;
-use crate::ops::resize;
+use crate::ops::resize::{ResizedPart, linear_part};
 use candle_core::{Result, Tensor};
 use std::ops::Range;
 
 /// Number of spectrogram frames per result of the audio encoder.
-const HOPS: usize = 8;
+pub(super) const HOPS: usize = 8;
 /// Number of results of the audio encoder per piece: 20 s of sound.
 const PIECE: usize = 256;
 
@@ -24,9 +25,12 @@ const PIECE: usize = 256;
 const AUDIO_BEFORE: usize = 22;
 /// Number of frames before and after 32 pose frames that the UNet reads for them: 97, rounded up to complete pieces.
 const MARGIN: usize = 97usize.next_multiple_of(FRAMES_MULTIPLE);
+/// Number of frames before a pose frame that the UNet reads with a bounded view of the future, rounded up likewise: 8 for
+/// the decoder and 4 for `enter`, and `n -> 2 n + 6` for each of the 5 levels in between.
+const CAUSAL_MARGIN: usize = 198usize.next_multiple_of(FRAMES_MULTIPLE);
 
 /// Index of the last spectrogram frame, counted from `8 i`, on which result `i` of the audio encoder depends.
-const fn audio_after(preset: Preset) -> usize {
+pub(super) const fn audio_after(preset: Preset) -> usize {
     match preset {
         Preset::Light => 29,
         Preset::Paper => 45,
@@ -70,8 +74,9 @@ impl<'a, M: FnMut(Range<usize>) -> Result<Tensor>> StreamingGenerator<'a, M> {
         chunk: usize,
         mels: M,
     ) -> Result<Self> {
-        for (what, n) in [("the audio", n_frames), ("a chunk", chunk)] {
-            if n == 0 || !n.is_multiple_of(FRAMES_MULTIPLE) {
+        let is_bounded = generator.look_ahead().is_some();
+        for (what, n, is_free) in [("the audio", n_frames, false), ("a chunk", chunk, is_bounded)] {
+            if n == 0 || !(is_free || n.is_multiple_of(FRAMES_MULTIPLE)) {
                 candle_core::bail!("{what} has {n} frames: expected a multiple of {FRAMES_MULTIPLE}");
             }
         }
@@ -88,15 +93,24 @@ impl<'a, M: FnMut(Range<usize>) -> Result<Tensor>> StreamingGenerator<'a, M> {
     }
 
     fn chunk(&mut self, frames: Range<usize>) -> Result<Tensor> {
-        let (first, end) = (frames.start.saturating_sub(MARGIN), (frames.end + MARGIN).min(self.n_frames));
         let n_encoded = n_encoded_frames(self.preset, self.n_mel_frames);
-        let part = resize::ResizedPart { frames: first..end, n_out: self.n_frames, n_in: n_encoded };
+        let (first, end, ratio) = match self.generator.look_ahead() {
+            None => {
+                let end = (frames.end + MARGIN).min(self.n_frames);
+                (frames.start.saturating_sub(MARGIN), end, (n_encoded, self.n_frames))
+            }
+            Some(of) => {
+                let first = frames.start.saturating_sub(CAUSAL_MARGIN) / FRAMES_MULTIPLE * FRAMES_MULTIPLE;
+                (first, frames.end, of.encoded_per_frame)
+            }
+        };
+        let part = ResizedPart { ratio, ..ResizedPart::new(first..end, n_encoded, self.n_frames) };
         let needed = part.needed();
         self.encode_until(needed.clone(), n_encoded)?;
         let Some(encoded) = &self.encoded else { candle_core::bail!("no encoded audio frames are buffered") };
         let encoded = encoded.narrow(1, needed.start - self.first_encoded, needed.len())?;
         let words = self.words.as_ref().map(|words| words.part(first..end)?.on(encoded.device())).transpose()?;
-        let encoded = self.generator.with_words(resize::linear_part(&encoded, &part)?, words.as_ref())?;
+        let encoded = self.generator.with_words(linear_part(&encoded, &part)?, words.as_ref())?;
         let poses = self.generator.decode(&encoded, false)?;
         poses.narrow(2, frames.start - first, frames.len())
     }
@@ -111,7 +125,9 @@ impl<'a, M: FnMut(Range<usize>) -> Result<Tensor>> StreamingGenerator<'a, M> {
         }
         self.first_encoded = needed.start;
         while end < needed.end {
-            let piece = end..(end + PIECE).min(n_encoded);
+            // The future may not be there yet.
+            let last = if self.generator.look_ahead().is_some() { needed.end } else { n_encoded };
+            let piece = end..(end + PIECE).min(last);
             end = piece.end;
             parts.push(self.encode(piece, n_encoded)?);
         }

@@ -129,20 +129,23 @@ KERNEL(normalise_backward) {
     }
 }
 
-// Rows and columns cut, or extended by zeros, at their end: [n, rows, columns] to [n, new rows, new columns].
-KERNEL(resize_end) {
+// Rows and columns cut, or extended by zeros, at their end: [n, rows, columns] to [n, new rows, new columns], after `cut`
+// columns were removed and `added` ones inserted at the start.
+KERNEL(resize) {
     const real* x = TENSOR(0);
     real* y = TENSOR(1);
     const int n = a.ints[0], rows = a.ints[1], columns = a.ints[2], new_rows = a.ints[3], new_columns = a.ints[4];
+    const int cut = a.ints[5], added = a.ints[6];
     for EACH(i, n * new_rows * new_columns) {
-        const int column = i % new_columns, row = i / new_columns % new_rows, matrix = i / new_columns / new_rows;
-        y[i] = row < rows && column < columns ? x[(matrix * rows + row) * columns + column] : 0;
+        const int column = i % new_columns + cut - added, row = i / new_columns % new_rows, matrix = i / new_columns / new_rows;
+        y[i] = row < rows && column >= 0 && column < columns ? x[(matrix * rows + row) * columns + column] : 0;
     }
 }
 
-// Input frames and the weight of the second, for frame `t` of a linear interpolation from `n_in` frames to `n_out`.
-__device__ double source_frame(int t, int n_in, int n_out, int* before) {
-    const double at = (double)t * n_in / n_out;
+// Input frames and the weight of the second, for frame `t` of a linear interpolation from `n_in` frames, `num / den` per
+// frame of the result.
+__device__ double source_frame(int t, int n_in, int num, int den, int* before) {
+    const double at = (double)t * num / den;
     *before = (int)at < n_in - 1 ? (int)at : n_in - 1;
     return at - *before;
 }
@@ -152,11 +155,11 @@ __device__ double source_frame(int t, int n_in, int n_out, int* before) {
 KERNEL(interpolate_forward) {
     const real* x = TENSOR(0);
     real* y = TENSOR(1);
-    const int rows = a.ints[0], len = a.ints[1], new_len = a.ints[2], n_in = a.ints[3], n_out = a.ints[4];
-    const int first = a.ints[5], needed = a.ints[6];
+    const int rows = a.ints[0], len = a.ints[1], new_len = a.ints[2], n_in = a.ints[3], num = a.ints[4];
+    const int den = a.ints[5], first = a.ints[6], needed = a.ints[7];
     for EACH(i, rows * new_len) {
         int before;
-        const real share = source_frame(first + i % new_len, n_in, n_out, &before);
+        const real share = source_frame(first + i % new_len, n_in, num, den, &before);
         const int at = before - needed, next = at + 1 < len ? at + 1 : len - 1;
         const real* row = x + i / new_len * len;
         y[i] = row[at] + (row[next] - row[at]) * share;
@@ -167,18 +170,18 @@ KERNEL(interpolate_forward) {
 KERNEL(interpolate_backward) {
     const real* grad = TENSOR(0);
     real* grad_x = TENSOR(1);
-    const int rows = a.ints[0], n_in = a.ints[1], n_out = a.ints[2];
+    const int rows = a.ints[0], n_in = a.ints[1], n_out = a.ints[2], num = a.ints[3], den = a.ints[4];
     for EACH(i, rows * n_in) {
         const int frame = i % n_in;
         const real* row = grad + i / n_in * n_out;
-        int first = (int)((double)(frame - 1) * n_out / n_in) - 1;
-        int last = frame == n_in - 1 ? n_out : (int)((double)(frame + 1) * n_out / n_in) + 2;
+        int first = (int)((double)(frame - 1) * den / num) - 1;
+        int last = frame == n_in - 1 ? n_out : (int)((double)(frame + 1) * den / num) + 2;
         first = first > 0 ? first : 0;
         last = last < n_out ? last : n_out;
         double sum = 0;
         for (int t = first; t < last; t++) {
             int before;
-            const double share = source_frame(t, n_in, n_out, &before);
+            const double share = source_frame(t, n_in, num, den, &before);
             const int next = before + 1 < n_in ? before + 1 : n_in - 1;
             if (before == frame) sum += (1 - share) * row[t];
             if (next == frame) sum += share * row[t];
@@ -187,17 +190,22 @@ KERNEL(interpolate_backward) {
     }
 }
 
-// Every frame of `x` [rows, T] twice, plus `skip` [rows, 2T].
+// Every frame of `x` [rows, T] twice, `delay` frames later (0 or 1), plus `skip` [rows, 2T].
 KERNEL(repeat_and_add) {
     const real *x = TENSOR(0), *skip = TENSOR(1);
     real* y = TENSOR(2);
-    for EACH(i, a.ints[0]) y[i] = x[i / 2] + skip[i];
+    const int n = a.ints[0], len = a.ints[1], delay = a.ints[2];
+    for EACH(i, n) y[i] = i % len < delay ? skip[i] : x[(i - delay) / 2] + skip[i];
 }
 
 KERNEL(repeat_backward) {
     const real* grad = TENSOR(0);
     real* grad_x = TENSOR(1);
-    for EACH(i, a.ints[0]) grad_x[i] = grad[2 * i] + grad[2 * i + 1];
+    const int n = a.ints[0], len = a.ints[1], delay = a.ints[2];
+    for EACH(i, n) {
+        const int first = 2 * i + delay;
+        grad_x[i] = grad[first] + ((first + 1) % len == 0 ? 0 : grad[first + 1]);
+    }
 }
 
 // sum += x

@@ -2,7 +2,7 @@
 
 use super::gradients::slot;
 use super::launch::{ConvolutionPass, ConvolutionSizes, blocks, convolve, result, run};
-use crate::cpu::axis::ConvAxis;
+use crate::cpu::axis::Padding;
 use crate::ops::batch_norm::BatchNorm;
 use candle_core::{CpuStorage, CudaStorage, CustomOp2, InplaceOp1, Layout, Result, Shape, Tensor};
 use std::cell::RefCell;
@@ -16,8 +16,7 @@ pub struct DeviceLayer {
     /// Its activation is `slope`.
     pub norm: Option<BatchNorm>,
     pub stride: usize,
-    /// Whether zero padding preserves the length (divided by the stride), as in TensorFlow; otherwise no padding.
-    pub is_padded: bool,
+    pub padding: Padding,
     /// Factor of negative results.
     pub slope: f64,
 }
@@ -25,8 +24,9 @@ pub struct DeviceLayer {
 /// Values of a forward pass that the backward pass needs.
 pub struct LayerRecord {
     sizes: ConvolutionSizes,
-    /// Height and width of the input before it was extended.
+    /// Height and width of the input before it was extended, and the number of columns added before it.
     input: [usize; 2],
+    n_before: usize,
     x: Tensor,
     z: Tensor,
     statistics: Tensor,
@@ -47,10 +47,11 @@ impl DeviceLayer {
     /// normalised by itself.
     pub fn forward(&self, x: &Tensor, train: bool, groups: usize) -> Result<(Tensor, LayerRecord)> {
         let (batch, _, height, width) = x.dims4()?;
-        let (sizes, extended) = self.sizes(x)?;
+        let (sizes, n_before) = self.sizes(x)?;
+        let extended = [sizes.input[2], sizes.input[3]];
         let x = match extended == [height, width] {
             true => x.contiguous()?,
-            false => resized(x, extended)?,
+            false => resized(x, extended, [0, n_before])?,
         };
         let z = result(&sizes.result, &x)?;
         convolve(ConvolutionPass::Forward, &sizes, [&x, &self.weight, &z])?;
@@ -80,13 +81,13 @@ impl DeviceLayer {
             &[eps, momentum, self.slope],
             sizes.result[1],
         )?;
-        Ok((y, LayerRecord { sizes, input: [height, width], x, z, statistics, mode, groups }))
+        Ok((y, LayerRecord { sizes, input: [height, width], n_before, x, z, statistics, mode, groups }))
     }
 
     /// Adds the gradients of the parameters to those of the running backward pass; returns that of the input, if
     /// `needs_input`.
     pub fn backward(&self, record: &LayerRecord, grad: &Tensor, needs_input: bool) -> Result<Option<Tensor>> {
-        let LayerRecord { sizes, input, x, z, statistics, mode, groups } = record;
+        let LayerRecord { sizes, input, n_before, x, z, statistics, mode, groups } = record;
         let (norm, grad_z) = (self.norm.as_ref(), result(z.shape(), z)?);
         let [of_weight, of_bias] = [norm.and_then(|norm| slot(&norm.weight)), norm.and_then(|norm| slot(&norm.bias))];
         run(
@@ -115,22 +116,22 @@ impl DeviceLayer {
         }
         let grad_x = result(x.shape(), x)?;
         convolve(ConvolutionPass::InputGradient, sizes, [&grad_x, &self.weight, &grad_z])?;
-        if sizes.input[2..] == *input { Ok(Some(grad_x)) } else { resized(&grad_x, *input).map(Some) }
+        if sizes.input[2..] == *input { Ok(Some(grad_x)) } else { resized(&grad_x, *input, [*n_before, 0]).map(Some) }
     }
 
-    /// Sizes of the convolution, and those of its input with the zeros at its end that make the padding symmetrical.
-    fn sizes(&self, x: &Tensor) -> Result<(ConvolutionSizes, [usize; 2])> {
+    /// Sizes of the convolution of the input with the zeros at its start or end that make the padding symmetrical, and
+    /// the number of columns of zeros at its start.
+    fn sizes(&self, x: &Tensor) -> Result<(ConvolutionSizes, usize)> {
         let (batch, n_in, height, width) = x.dims4()?;
         let (n_out, kernel, strides) = match *self.weight.dims() {
             [n_out, channels, width] if channels == n_in => (n_out, [1, width], [1, self.stride]),
             [n_out, channels, height, width] if channels == n_in => (n_out, [height, width], [self.stride; 2]),
             _ => candle_core::bail!("convolution: input {:?} does not fit weight {:?}", x.dims(), self.weight.dims()),
         };
-        let axis = |k: usize, n: usize| match self.is_padded {
-            true => ConvAxis::same(n, kernel[k], strides[k]),
-            false => ConvAxis::valid(n, kernel[k], strides[k]),
-        };
-        let axes = [axis(0, height), axis(1, width)];
+        let mut axes =
+            [self.padding.axis(height, kernel[0], strides[0]), self.padding.axis(width, kernel[1], strides[1])];
+        let n_before = if self.padding == Padding::Causal { std::mem::take(&mut axes[1].pad) } else { 0 };
+        axes[1].n_in += n_before;
         if batch == 0 || axes.iter().any(|axis| axis.n_out == 0) {
             candle_core::bail!("convolution: input {:?} is too short for weight {:?}", x.dims(), self.weight.dims());
         }
@@ -142,7 +143,7 @@ impl DeviceLayer {
             padding: axes.map(|axis| axis.pad),
             stride: strides,
         };
-        Ok((sizes, extended))
+        Ok((sizes, n_before))
     }
 }
 
@@ -151,12 +152,13 @@ fn norm_ints(batch: usize, sizes: &ConvolutionSizes, groups: usize, mode: NormMo
     [batch, channels, height * width, groups, mode as usize]
 }
 
-/// Cuts height and width of `x` [B, C, H, W], or extends them by zeros, at their end.
-fn resized(x: &Tensor, [height, width]: [usize; 2]) -> Result<Tensor> {
+/// Cuts height and width of `x` [B, C, H, W], or extends them by zeros, at their end; before, `cut` columns are removed
+/// and `added` ones inserted at the start.
+fn resized(x: &Tensor, [height, width]: [usize; 2], [cut, added]: [usize; 2]) -> Result<Tensor> {
     let ((batch, channels, rows, columns), x) = (x.dims4()?, x.contiguous()?);
     let y = result((batch, channels, height, width), &x)?;
-    let ints = [batch * channels, rows, columns, height, width];
-    run("resize_end", &[Some(&x), Some(&y)], &ints, &[], blocks(y.elem_count()))?;
+    let ints = [batch * channels, rows, columns, height, width, cut, added];
+    run("resize", &[Some(&x), Some(&y)], &ints, &[], blocks(y.elem_count()))?;
     Ok(y)
 }
 

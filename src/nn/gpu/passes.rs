@@ -66,12 +66,14 @@ pub struct UnetLayers {
     pub downs: Vec<DeviceLayer>,
     pub ups: Vec<DeviceLayer>,
     pub decoder: Vec<DeviceLayer>,
+    /// Number of frames, 0 or 1, by which repeated frames are delayed; see `ops::resize::repeat_frames_and_add`.
+    pub delay: usize,
 }
 
 /// Applies a UNet to `x` [B, C, T]: each result of `enter` and `downs` but the last is added to the repeated frames of the
 /// same rate before the layer of `ups`.
 pub fn unet(layers: UnetLayers, x: &Tensor, train: bool) -> Result<Tensor> {
-    let UnetLayers { enter, downs, ups, decoder } = layers;
+    let UnetLayers { enter, downs, ups, decoder, delay } = layers;
     let none = || candle_core::Error::Msg("a UNet needs layers in all of its parts".to_owned());
     let (parameter, is_tracked) = (decoder.first().ok_or_else(none)?.weight.clone(), x.track_op());
     let (mut y, enter_records) = forward(&enter, with_height(&x.detach())?, train, 1)?;
@@ -82,7 +84,7 @@ pub fn unet(layers: UnetLayers, x: &Tensor, train: bool) -> Result<Tensor> {
         down_records.push(record);
     }
     for (layer, skip) in ups.iter().zip(skips.iter().rev()) {
-        let (up, record) = layer.forward(&repeat_and_add(&y, skip)?, train, 1)?;
+        let (up, record) = layer.forward(&repeat_and_add(&y, skip, delay)?, train, 1)?;
         y = up;
         up_records.push(record);
     }
@@ -93,7 +95,7 @@ pub fn unet(layers: UnetLayers, x: &Tensor, train: bool) -> Result<Tensor> {
         let mut of_skips = Vec::new();
         for (layer, record) in ups.iter().zip(&up_records).rev() {
             let of_sum = layer.backward(record, &grad, true)?.ok_or_else(none)?;
-            grad = repeat_backward(&of_sum)?;
+            grad = repeat_backward(&of_sum, delay)?;
             of_skips.push(of_sum);
         }
         // The last layer of `ups` has the first skip connection.

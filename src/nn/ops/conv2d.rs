@@ -2,7 +2,7 @@
 //! time and frequency. The sums are computed in `direct_conv`; `conv_norm` includes a subsequent batch norm.
 
 use super::operator::{CpuOperator, CustomOperator, Gradients, Operand};
-use crate::cpu::axis::ConvAxis;
+use crate::cpu::axis::{ConvAxis, Padding};
 use crate::cpu::direct_conv::{self, ConvSizes};
 use crate::cpu::tensor::Scalar;
 use crate::cpu::{channel_stats, weight_gradient};
@@ -12,17 +12,9 @@ use crate::gpu::passes;
 use crate::params::{Init, Params};
 use candle_core::{Result, Shape, Tensor};
 
-/// Sizes of a convolution of `x` with `weight` [O, C, K] or [O, C, K, K'], padding "same".
-pub fn same(x: &Tensor, weight: &Tensor, stride: usize) -> Result<ConvSizes> {
-    sizes(x, weight, |n, kernel| ConvAxis::same(n, kernel, stride))
-}
-
-/// Sizes of a convolution without padding, stride 1.
-pub fn valid(x: &Tensor, weight: &Tensor) -> Result<ConvSizes> {
-    sizes(x, weight, |n, kernel| ConvAxis::valid(n, kernel, 1))
-}
-
-fn sizes(x: &Tensor, weight: &Tensor, axis: impl Fn(usize, usize) -> ConvAxis) -> Result<ConvSizes> {
+/// Sizes of a convolution of `x` with `weight` [O, C, K] or [O, C, K, K'].
+pub fn sizes(x: &Tensor, weight: &Tensor, stride: usize, padding: Padding) -> Result<ConvSizes> {
+    let axis = |n, kernel| padding.axis(n, kernel, stride);
     let alone = ConvAxis::valid(1, 1, 1);
     let (batch, channels, axes) = match (x.dims(), weight.dims()) {
         ([b, t, c], [_, _, kernel]) => (*b, *c, [axis(*t, *kernel), alone]),
@@ -71,13 +63,13 @@ impl Conv {
         if is_on_device(x) {
             return passes::channels_last(self.on_device(1.0), x, false);
         }
-        conv(x, &self.weight, &self.bias, same(x, &self.weight, self.stride)?)
+        conv(x, &self.weight, &self.bias, sizes(x, &self.weight, self.stride, Padding::Same)?)
     }
 
     /// Layer for a GPU, followed by a leaky ReLU with this slope.
     pub(crate) fn on_device(&self, slope: f64) -> DeviceLayer {
         let Self { weight, bias, stride } = self.clone();
-        DeviceLayer { weight, bias, norm: None, stride, is_padded: true, slope }
+        DeviceLayer { weight, bias, norm: None, stride, padding: Padding::Same, slope }
     }
 }
 

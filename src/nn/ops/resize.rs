@@ -9,20 +9,29 @@ use crate::gpu::launch::is_on_device;
 use candle_core::{Result, Shape, Tensor};
 use std::ops::Range;
 
-/// Repeats every frame of `x` [B, T, C] twice and adds `skip` [B, 2T, C].
-pub fn repeat_frames_and_add(x: &Tensor, skip: &Tensor) -> Result<Tensor> {
-    let n_in = x.dim(1)?;
-    mix(x, Some(skip), FrameInterpolation { n_in, of: (0..2 * n_in).map(|i| (i / 2, i / 2, 0.0)).collect() })
+/// Repeats every frame of `x` [B, T, C] twice and adds `skip` [B, 2T, C]. With `is_delayed`, the repeated frames come one
+/// frame later, after zeros, so that none precedes the second of the two frames that it was computed from.
+pub fn repeat_frames_and_add(x: &Tensor, skip: &Tensor, is_delayed: bool) -> Result<Tensor> {
+    let (n_out, delay) = (2 * x.dim(1)?, usize::from(is_delayed));
+    let x = if is_delayed { x.pad_with_zeros(1, 1, 0)? } else { x.clone() };
+    let source = |i: usize| ((i + delay) / 2, (i + delay) / 2, 0.0);
+    mix(&x, Some(skip), FrameInterpolation { n_in: x.dim(1)?, of: (0..n_out).map(source).collect() })
 }
 
 /// Interpolates linearly to `n_out` frames, [B, T, C] to [B, n_out, C], like TensorFlow 1 without aligned corners:
 /// frame i of the result is at i * T / n_out, and the last frame is repeated.
 pub fn linear(x: &Tensor, n_out: usize) -> Result<Tensor> {
     let n_in = x.dim(1)?;
-    if n_in == n_out {
+    linear_with_ratio(x, n_out, (n_in, n_out))
+}
+
+/// Like [`linear`], with frame i at i * `ratio.0` / `ratio.1`, whatever the number of input frames.
+pub fn linear_with_ratio(x: &Tensor, n_out: usize, ratio: (usize, usize)) -> Result<Tensor> {
+    let n_in = x.dim(1)?;
+    if n_in == n_out && ratio.0 == ratio.1 {
         return Ok(x.clone());
     }
-    let part = ResizedPart { frames: 0..n_out, n_in, n_out };
+    let part = ResizedPart { ratio, ..ResizedPart::new(0..n_out, n_in, n_out) };
     if is_on_device(x) {
         return frames::interpolate(&x.t()?, &part)?.t();
     }
@@ -35,12 +44,18 @@ pub struct ResizedPart {
     pub frames: Range<usize>,
     pub n_in: usize,
     pub n_out: usize,
+    /// Input frames per frame of the result, as numerator and denominator.
+    pub ratio: (usize, usize),
 }
 
 impl ResizedPart {
+    pub fn new(frames: Range<usize>, n_in: usize, n_out: usize) -> Self {
+        Self { frames, n_in, n_out, ratio: (n_in, n_out) }
+    }
+
     /// The input frame at or before the position of frame `i` of the result, and the fraction of the way to the next.
     fn source(&self, i: usize) -> (usize, f64) {
-        let at = i as f64 * self.n_in as f64 / self.n_out as f64;
+        let at = i as f64 * self.ratio.0 as f64 / self.ratio.1 as f64;
         let before = (at as usize).min(self.n_in.saturating_sub(1));
         (before, at - before as f64)
     }

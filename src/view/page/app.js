@@ -3,6 +3,7 @@
 import { announce, attempt, button, byId, el, getJson } from "./dom.js";
 import { DatasetView } from "./dataset.js";
 import { FileView } from "./player.js";
+import { LiveView } from "./live.js";
 import { ResultView } from "./result.js";
 import { RunView } from "./run.js";
 
@@ -10,7 +11,10 @@ const VIEWS = [["dataset", "Dataset", DatasetView], ["run", "Run", RunView], ["r
 const panels = new Map();
 let project = null;
 
-const shownViews = () => (project.file ? [["file", "File", FileView]] : VIEWS);
+function shownViews() {
+  if (project.live) return [["live", "Live", LiveView]];
+  return project.file ? [["file", "File", FileView]] : VIEWS;
+}
 // Parts of the fragment: the view, and what it shows.
 const route = () => location.hash.slice(1).split("/");
 
@@ -53,15 +57,16 @@ async function start() {
   project = await attempt(() => getJson("./api/project"));
   if (!project) return;
   byId("main").replaceChildren();
-  const { title, config, author, editable, file } = project;
-  byId("title").textContent = file ? file.name : title;
-  document.title = `${file ? file.name : title} – orator view`;
+  const { title, config, author, editable, file, live } = project;
+  const single = file ?? live;
+  byId("title").textContent = single ? single.name : title;
+  document.title = `${single ? single.name : title} – orator`;
   const access = editable ? `editable as ${author}` : "read-only; start with --edit to correct it";
-  byId("project").textContent = file ? "" : `${config}, ${access}`;
+  byId("project").textContent = single ? "" : `${config}, ${access}`;
   const tab = ([name, label]) =>
     button(label, () => route()[0] === name || (location.hash = name), { role: "tab", id: `tab-${name}`, "aria-controls": `panel-${name}` });
   byId("tabs").replaceChildren(...shownViews().map(tab));
-  byId("tabs").hidden = Boolean(file);
+  byId("tabs").hidden = Boolean(single);
   byId("tabs").addEventListener("keydown", moveBetweenTabs);
   addEventListener("hashchange", showView);
   showView();

@@ -130,6 +130,24 @@ export class AvatarView {
     this.#draw();
   }
 
+  // Shows a pose of a VRM avatar: `rotations` by bone and position of the hips, which are at `height` in the rest pose.
+  pose({ secs, hips, rotations }, height) {
+    const humanoid = this.#vrm?.humanoid;
+    if (!humanoid) return;
+    // Avatars of VRM 0 face the other way.
+    const turned = this.#vrm.meta.metaVersion === "0" ? -1 : 1;
+    for (const [bone, [x, y, z, w]] of Object.entries(rotations)) {
+      humanoid.getNormalizedBoneNode(bone)?.quaternion.set(turned * x, y, turned * z, w);
+    }
+    const root = humanoid.getNormalizedBoneNode("hips");
+    const { position } = humanoid.normalizedRestPose.hips ?? {};
+    if (root && position) {
+      const scale = position[1] / height;
+      root.position.set(position[0] + turned * scale * hips[0], scale * hips[1], position[2] + turned * scale * hips[2]);
+    }
+    this.time = secs;
+  }
+
   // Releases the graphics memory; the view cannot be used again.
   close() {
     this.clear();

@@ -2,9 +2,9 @@
 
 use super::composed;
 use candle_core::{Result, Tensor};
-use orator_nn::cpu::axis::ConvAxis;
+use orator_nn::cpu::axis::{ConvAxis, Padding};
 use orator_nn::cpu::direct_conv::ConvSizes;
-use orator_nn::ops::conv2d::{conv, same, valid};
+use orator_nn::ops::conv2d::{conv, sizes};
 use orator_test_support::gradcheck::{check_thread_independence, max_difference, pattern, worst};
 
 /// Input, weight and bias of a batch of two.
@@ -30,6 +30,9 @@ fn results_equal_those_of_candle_and_gradients_are_correct() -> Result<()> {
         (1, 9, [same(5, 3, 1), same(6, 3, 1)]),
         (3, 2, [same(7, 4, 2), same(6, 4, 2)]),
         (2, 3, [same(6, 4, 2), same(9, 4, 2)]),
+        (2, 3, [ConvAxis::causal(9, 3, 1), alone]),
+        (2, 3, [ConvAxis::causal(8, 4, 2), alone]),
+        (8, 9, [ConvAxis::causal(13, 4, 2), alone]),
         (7, 1, [ConvAxis::valid(5, 3, 1), ConvAxis::valid(4, 4, 1)]),
     ] {
         let s = ConvSizes { batch: 2, n_in, n_out, axes };
@@ -57,16 +60,17 @@ fn panels_of_every_width_are_correct() -> Result<()> {
 #[test]
 fn any_number_of_threads_gives_the_same_bits() -> Result<()> {
     check_thread_independence(&[&[3, 21, 10, 20], &[70, 20, 4, 4], &[70]], 1, |v| {
-        conv(&v[0], &v[1], &v[2], same(&v[0], &v[1], 2)?)
+        conv(&v[0], &v[1], &v[2], sizes(&v[0], &v[1], 2, Padding::Same)?)
     })
 }
 
 #[test]
 fn mismatched_shapes_are_errors() -> Result<()> {
     let x = pattern(&[2, 3, 4], 0.0)?;
-    assert!(same(&x, &pattern(&[5, 4, 3], 0.0)?, 1).is_ok());
-    assert!(same(&x, &pattern(&[5, 3, 3], 0.0)?, 1).is_err());
-    assert!(same(&x, &pattern(&[5, 4, 3, 3], 0.0)?, 1).is_err());
-    assert!(valid(&x, &pattern(&[5, 4, 4], 0.0)?).is_err());
+    let same = |weight: &[usize]| sizes(&x, &pattern(weight, 0.0)?, 1, Padding::Same);
+    assert!(same(&[5, 4, 3]).is_ok());
+    assert!(same(&[5, 3, 3]).is_err());
+    assert!(same(&[5, 4, 3, 3]).is_err());
+    assert!(sizes(&x, &pattern(&[5, 4, 4], 0.0)?, 1, Padding::None).is_err());
     Ok(())
 }

@@ -2,6 +2,7 @@
 
 use super::composed::{self, ComposedNorm};
 use candle_core::{DType, Result, Tensor};
+use orator_nn::cpu::axis::Padding;
 use orator_nn::ops::batch_norm::BatchNorm;
 use orator_nn::ops::conv_norm::conv_norm;
 use orator_nn::ops::conv2d;
@@ -26,7 +27,7 @@ fn results_gradients_and_running_statistics_equal_those_of_candle() -> Result<()
         LAYERS.into_iter().flat_map(|layer| [(true, 0.2), (true, 1.0), (false, 0.2)].map(|settings| (layer, settings)))
     {
         let inputs = [pattern(shape, 0.0)?, pattern(kernel, 7.0)?, pattern(&kernel[..1], 3.0)?];
-        let s = conv2d::same(&inputs[0], &inputs[1], stride)?;
+        let s = conv2d::sizes(&inputs[0], &inputs[1], stride, Padding::Same)?;
         // Weights and running statistics like those of a layer in training.
         let norm = || -> Result<(Params, BatchNorm)> {
             let mut params = Params::with_dtype(0, DType::F64);
@@ -68,6 +69,6 @@ fn results_gradients_and_running_statistics_equal_those_of_candle() -> Result<()
 fn any_number_of_threads_gives_the_same_bits() -> Result<()> {
     check_thread_independence(&[&[3, 40, 10, 20], &[70, 20, 3, 3], &[70]], 1, |v| {
         let norm = BatchNorm::new(&mut Params::new(0), "n", 70, 1e-3, 0.3, 0.2)?;
-        conv_norm(&v[0], &v[1], &v[2], &norm, conv2d::same(&v[0], &v[1], 1)?, true)
+        conv_norm(&v[0], &v[1], &v[2], &norm, conv2d::sizes(&v[0], &v[1], 1, Padding::Same)?, true)
     })
 }

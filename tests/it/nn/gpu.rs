@@ -4,6 +4,7 @@ use crate::fixtures::gpu_shim::GpuShim;
 use candle_core::{DType, Device, Result, Tensor, Var};
 use orator_nn::gan::discriminator::{self, Discriminator};
 use orator_nn::gan::generator::{Config, ConvBlock, Generator, Preset};
+use orator_nn::gan::look_ahead::LookAhead;
 use orator_nn::gan::words::{N_TIMES, WordFrames};
 use orator_nn::gpu::gradients::{FlatGradients, backward};
 use orator_nn::gpu::launch::{THREADS, result, run};
@@ -136,12 +137,16 @@ fn words(n_frames: usize, dtype: DType) -> Result<WordFrames> {
 #[test]
 fn networks_equal_those_of_the_cpu() -> anyhow::Result<()> {
     let Some(gpu) = GpuShim::with_threads(1) else { return Ok(()) };
-    for (preset, vocabulary, n_speakers, n_frames) in
-        [(Preset::Light, 0, 0, 64), (Preset::Light, 4, 2, 40), (Preset::Paper, 0, 0, 32)]
-    {
+    let bounded = LookAhead { secs: 0.5, shift: 10, encoded_per_frame: (20, 24) };
+    for (preset, vocabulary, n_speakers, n_frames, look_ahead) in [
+        (Preset::Light, 0, 0, 64, None),
+        (Preset::Light, 4, 2, 40, None),
+        (Preset::Paper, 0, 0, 32, None),
+        (Preset::Light, 0, 0, 64, Some(bounded)),
+    ] {
         for (dtype, tolerance) in TOLERANCES {
             let build = move |params: &mut Params| -> Result<Network> {
-                let plain = Config { n_mels: 8, width: 8, ..Config::from_preset(preset, 6) };
+                let plain = Config { n_mels: 8, width: 8, look_ahead, ..Config::from_preset(preset, 6) };
                 let config = Config { vocabulary, word: 3, n_speakers, speaker_weights: n_speakers > 0, ..plain };
                 let network = Generator::new(params, &config)?;
                 Ok(Box::new(move |mels| {

@@ -84,6 +84,15 @@ impl PretrainedModel {
             own.width,
             own.n_out
         );
+        let secs = |of: &Config| of.look_ahead.map_or(0.0, |of| of.secs);
+        ensure!(
+            secs(own) == secs(other),
+            "{} has a view of the future of {} s (0: all), this training of {} s: set gan.look_ahead_secs = {}",
+            self.path.display(),
+            secs(other),
+            secs(own),
+            secs(other)
+        );
         ensure!(
             other.vocabulary == 0 || own.vocabulary > 0,
             "{} reads words: set gan.words = true",

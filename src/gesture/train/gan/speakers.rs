@@ -9,12 +9,16 @@ use crate::generate::normalisation::{ChannelNormalisation, Normalisation};
 use crate::generate::representation::{PoseDecoder, Representation};
 use anyhow::{Context, Result, bail, ensure};
 use candle_core::{DType, Device, Tensor};
+use orator_base::audio::mel;
 use orator_base::motion::bones;
 use orator_base::types::posture::PostureChannel;
 use orator_base::types::skeleton::N_BONES;
+use orator_base::types::sound::SAMPLE_RATE;
+use orator_base::types::time::FrameRate;
 use orator_dataset::config::{BoneLoss, GanSettings, MotionRepresentation, NetworkPreset};
 use orator_dataset::{Dataset, Split};
 use orator_nn::gan::generator::{Config, Preset};
+use orator_nn::gan::look_ahead::LookAhead;
 
 /// Speakers in the order of their rows in the network's speaker table.
 pub struct SpeakerSet {
@@ -150,6 +154,7 @@ pub fn normalisation_with_channels(dataset: &Dataset, wanted: &[PostureChannel])
     Ok(Normalisation { channels: channels(dataset, wanted)?, ..normalisation(dataset)? })
 }
 
+const MELS_PER_SEC: usize = SAMPLE_RATE as usize / mel::HOP;
 /// Frames read at a time for statistics of all poses.
 const PART_FRAMES: usize = 4096;
 
@@ -169,8 +174,9 @@ pub fn metadata(
     };
     let network = network(settings.preset, normal.n_features());
     let several = n_speakers > 1;
-    let network = Config { n_speakers: if several { n_speakers } else { 0 }, speaker_weights: several, ..network };
     let (info, hash) = (dataset.info(), dataset.hash()?);
+    let (n_speakers, look_ahead) = (if several { n_speakers } else { 0 }, look_ahead(settings, info.fps));
+    let network = Config { n_speakers, speaker_weights: several, look_ahead, ..network };
     let mut metadata = SpeakerMetadata::new(&info.speaker, info.fps, &hash, network, normal.clone(), representation);
     metadata.add_videos(pretrained::videos(dataset));
     Ok(metadata)
@@ -211,6 +217,15 @@ pub fn network(preset: NetworkPreset, n_out: usize) -> Config {
         NetworkPreset::Small => Config { width: light.width / 2, ..light },
         NetworkPreset::Paper => Config::from_preset(Preset::Paper, n_out),
     }
+}
+
+/// View of the future of a network with these settings; `None`: the complete speech.
+pub fn look_ahead(settings: &GanSettings, fps: FrameRate) -> Option<LookAhead> {
+    let Config { preset, .. } = network(settings.preset, 0);
+    let mels_per_frame = (MELS_PER_SEC * fps.den as usize, fps.num as usize);
+    let window = mel::WINDOW as f64 / mel::HOP as f64;
+    let secs = settings.look_ahead_secs;
+    (secs > 0.0).then(|| LookAhead::new(preset, secs, mels_per_frame, MELS_PER_SEC as f64, window))
 }
 
 fn channels(dataset: &Dataset, wanted: &[PostureChannel]) -> Result<Vec<ChannelNormalisation>> {

@@ -47,6 +47,8 @@ impl Default for TrainingStart<'_> {
     }
 }
 
+/// Smallest view of the future with which a network can follow the speech.
+const MIN_LOOK_AHEAD_SECS: f64 = 0.25;
 /// Largest number of threads that read batches for a GPU.
 const MAX_READERS: usize = 8;
 
@@ -107,8 +109,9 @@ pub fn train(
     let loaders: Vec<WindowLoader> = normalised_datasets
         .iter()
         .map(|(dataset, normal)| {
-            WindowLoader::load(dataset, Split::Train, normal, settings.window_frames, settings.stride_frames)?
-                .with_words(vocabulary)
+            let loader =
+                WindowLoader::load(dataset, Split::Train, normal, settings.window_frames, settings.stride_frames)?;
+            loader.with_look_ahead(speakers::look_ahead(&settings, dataset.info().fps)).with_words(vocabulary)
         })
         .collect::<Result<_>>()?;
     let n_windows: usize = loaders.iter().map(WindowLoader::len).sum();
@@ -328,6 +331,16 @@ fn check(settings: &GanConfig) -> Result<()> {
         settings.window_frames >= FRAMES_MULTIPLE,
         "gan.window_frames is {}: expected at least {FRAMES_MULTIPLE}",
         settings.window_frames
+    );
+    let secs = settings.look_ahead_secs;
+    ensure!(
+        secs == 0.0 || secs >= MIN_LOOK_AHEAD_SECS,
+        "gan.look_ahead_secs is {secs}: expected {MIN_LOOK_AHEAD_SECS} to 2, or 0 for a network that reads the whole speech"
+    );
+    ensure!(
+        secs == 0.0 || !settings.words,
+        "gan.words is true, but a network with gan.look_ahead_secs reads no words, which are not known in time: set one of \
+         the two to its default"
     );
     if let Some(batch) = settings.batch.given() {
         ensure!(batch > 1, "gan.batch is {batch}: expected at least 2 (for batch norm)");

@@ -6,6 +6,7 @@ use super::block_metrics::{
     bone_changes, mean_error, reduction,
 };
 use super::score::{self, Validation};
+use super::speakers;
 use super::step::GanTrainer;
 use super::windows::{WindowBatch, WindowLoader, needed};
 use crate::generate::normalisation::{N_FEATURES, Normalisation};
@@ -79,7 +80,8 @@ impl ValidationIntervals {
             split = Split::Train;
             loader = WindowLoader::load(dataset, split, normal, n_frames, n_frames)?;
         }
-        let loader = loader.with_words(vocabulary)?;
+        let look_ahead = speakers::look_ahead(settings, dataset.info().fps);
+        let loader = loader.with_look_ahead(look_ahead).with_words(vocabulary)?;
         let longest = PIECE.max(n_frames);
         let parts: Vec<_> = loader.parts(longest).into_iter().filter(|part| part.1.len() >= n_frames).collect();
         let all: usize = parts.iter().map(|part| part.1.len()).sum();

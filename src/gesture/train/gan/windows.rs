@@ -17,6 +17,7 @@ use orator_base::types::sound::SAMPLE_RATE;
 use orator_base::types::time::FrameRate;
 use orator_dataset::{Dataset, Split};
 use orator_nn::gan::generator::FRAMES_MULTIPLE;
+use orator_nn::gan::look_ahead::LookAhead;
 use orator_nn::gan::words::WordFrames;
 use rayon::prelude::*;
 use std::ops::Range;
@@ -35,6 +36,8 @@ pub struct WindowLoader<'d> {
     starts: Vec<(usize, usize)>,
     /// Words of every interval, for a network with word input.
     words: Option<Vec<Vec<NumberedWord>>>,
+    /// Number of spectrogram frames by which the sound is moved to earlier times, see `LookAhead`.
+    sound_shift: i64,
 }
 
 pub struct WindowBatch {
@@ -95,7 +98,14 @@ impl<'d> WindowLoader<'d> {
         };
         let starts = (0..intervals.n_intervals()).flat_map(of_interval).collect();
         let (n_features, normal, words) = (normal.n_features(), normal.clone(), None);
-        Ok(Self { fps, n_frames, n_features, normal, intervals, starts, words })
+        Ok(Self { fps, n_frames, n_features, normal, intervals, starts, words, sound_shift: 0 })
+    }
+
+    /// Moves the sound of all windows for a network with this view of the future. Sound beyond an interval is its mirror
+    /// image.
+    pub fn with_look_ahead(mut self, look_ahead: Option<LookAhead>) -> Self {
+        self.sound_shift = look_ahead.map_or(0, |of| of.shift);
+        self
     }
 
     /// Adds the words of the intervals to the windows, as indices of `vocabulary`; `None`: no word input.
@@ -140,16 +150,13 @@ impl<'d> WindowLoader<'d> {
     pub fn part(&self, interval: usize, frames: Range<usize>) -> Result<WindowBatch> {
         let (first, n_mels) = (mel_frames(self.fps, frames.start), mel_frames(self.fps, frames.len()));
         let n_padded = mel_frames(self.fps, frames.len().next_multiple_of(FRAMES_MULTIPLE)).max(n_mels);
-        let last = self.intervals.n_mels(interval) - 1;
-        let source = |k: usize| if first + k <= last { first + k } else { (2 * last).saturating_sub(first + k) };
-        let lowest = (0..n_padded).map(source).min().unwrap_or(first);
-        let rows = self.intervals.rows(interval, frames.clone(), lowest..(first + n_padded).min(last + 1))?;
+        let sources = self.mel_sources(interval, first, n_padded);
+        let rows = self.intervals.rows(interval, frames.clone(), spanned(&sources))?;
         let IntervalRows { features, mask, mels, first_frame, first_mel } = &*rows;
         let words =
             self.words_of(&[(interval, frames.start as f64, 1.0)], frames.len().next_multiple_of(FRAMES_MULTIPLE))?;
-        let source = |k: usize| source(k) - first_mel;
         let frames = frames.start - first_frame..frames.end - first_frame;
-        let sound = Array2::from_shape_fn((mel::N_MELS, n_padded), |(band, k)| mels[[band, source(k)]]);
+        let sound = Array2::from_shape_fn((mel::N_MELS, n_padded), |(band, k)| mels[[band, sources[k] - first_mel]]);
         let shape = (self.n_features, frames.len());
         let poses = Array2::from_shape_fn(shape, |(i, t)| features[[i, frames.start + t]]);
         let mask = Array2::from_shape_fn(shape, |(i, t)| f32::from(mask[[mask_row(i), frames.start + t]]));
@@ -158,6 +165,12 @@ impl<'d> WindowLoader<'d> {
             Ok(Tensor::from_vec(of.into_raw_vec_and_offset().0, (1, rows, columns), &Device::Cpu)?)
         };
         Ok(WindowBatch { mels: tensor(sound)?, poses: tensor(poses)?, mask: tensor(mask)?, speakers: vec![0], words })
+    }
+
+    /// Indices in an interval of the spectrogram frames of a window of `n` frames that begins at frame `first`.
+    fn mel_sources(&self, interval: usize, first: usize, n: usize) -> Vec<usize> {
+        let last = self.intervals.n_mels(interval) - 1;
+        (0..n).map(|k| mirrored((first + k) as f64 + self.sound_shift as f64, last as f64) as usize).collect()
     }
 
     pub fn fps(&self) -> FrameRate {
@@ -222,9 +235,13 @@ impl<'d> WindowLoader<'d> {
         let at = |t: usize| first + t as f64 * speed;
         let first_mel = first * (f64::from(SAMPLE_RATE) / mel::HOP as f64) / self.fps.per_sec();
         let n_mels = mel_frames(self.fps, n);
-        let mel_at = |t: usize| first_mel + t as f64 * speed;
+        let mel_at = |t: usize| match self.sound_shift {
+            0 => first_mel + t as f64 * speed,
+            shift => mirrored(first_mel + (t as f64 + shift as f64) * speed, last_mel as f64),
+        };
         let frames = between(at(0), last).0..between(at(n - 1), last).1 + 1;
-        let mel_range = between(mel_at(0), last_mel).0..between(mel_at(n_mels.max(1) - 1), last_mel).1 + 1;
+        let ends: Vec<usize> = (0..n_mels).map(|t| between(mel_at(t), last_mel)).flat_map(|(a, b, _)| [a, b]).collect();
+        let mel_range = spanned(&ends);
         let rows = self.intervals.rows(interval, frames, mel_range)?;
         let IntervalRows { features, mask, mels, .. } = &*rows;
         let mut poses = Array2::zeros((self.n_features, n));
@@ -269,14 +286,17 @@ impl<'d> WindowLoader<'d> {
         let (mut mels, mut poses, mut mask) = (Vec::new(), Vec::new(), Vec::new());
         let read = |i: &usize| {
             let (interval, start) = self.starts[*i];
-            let first_mel = mel_frames(self.fps, start);
-            let rows = self.intervals.rows(interval, start..start + self.n_frames, first_mel..first_mel + n_mels)?;
-            anyhow::Ok((rows, start, first_mel))
+            let sources = self.mel_sources(interval, mel_frames(self.fps, start), n_mels);
+            let rows = self.intervals.rows(interval, start..start + self.n_frames, spanned(&sources))?;
+            anyhow::Ok((rows, start, sources))
         };
-        for (rows, start, first_mel) in which.par_iter().map(read).collect::<Result<Vec<_>>>()? {
+        for (rows, start, sources) in which.par_iter().map(read).collect::<Result<Vec<_>>>()? {
             let start = start - rows.first_frame;
-            append_columns(&mut mels, &rows.mels, first_mel - rows.first_mel, n_mels);
-            append_columns(&mut poses, &rows.features, start, self.n_frames);
+            for band in rows.mels.outer_iter() {
+                mels.extend(sources.iter().map(|source| band[source - rows.first_mel]));
+            }
+            let columns = Slice::from(start..start + self.n_frames);
+            poses.extend(rows.features.slice_axis(Axis(1), columns).iter());
             let known = rows.mask.slice_axis(Axis(1), Slice::from(start..start + self.n_frames));
             for (row, known) in known.outer_iter().enumerate() {
                 let n_features = if row < N_BONES { 3 } else { 1 };
@@ -367,8 +387,15 @@ fn between(at: f64, last: usize) -> (usize, usize, f32) {
     (low, (low + 1).min(last), if low < last { (at - low as f64) as f32 } else { 0.0 })
 }
 
-fn append_columns(to: &mut Vec<f32>, from: &Array2<f32>, first: usize, n: usize) {
-    to.extend(from.slice_axis(Axis(1), Slice::from(first..first + n)).iter());
+/// Position in a sequence from 0 to `last` for one in its continuation by mirror images.
+fn mirrored(at: f64, last: f64) -> f64 {
+    last - (at.rem_euclid(2.0 * last.max(1.0)) - last).abs()
+}
+
+/// Smallest range that contains these indices.
+fn spanned(indices: &[usize]) -> Range<usize> {
+    let [low, high] = [indices.iter().min(), indices.iter().max()];
+    low.copied().unwrap_or(0)..high.map_or(0, |high| high + 1)
 }
 
 #[cfg(test)]

@@ -11,11 +11,13 @@ fn gradients_are_correct_even_if_the_input_is_used_twice() -> Result<()> {
     for n_out in [3, 5, 7, 11] {
         assert!(worst(std::slice::from_ref(&x), |v| linear(&v[0].sqr()?, n_out))? < 1e-7);
     }
-    let skip = |v: &[Tensor]| {
-        let early = v[0].sqr()?;
-        repeat_frames_and_add(&early.sin()?, &(linear(&early, 6)? * linear(&early.sin()?, 6)?)?)
-    };
-    assert!(worst(std::slice::from_ref(&x), skip)? < 1e-7);
+    for is_delayed in [false, true] {
+        let skip = |v: &[Tensor]| {
+            let early = v[0].sqr()?;
+            repeat_frames_and_add(&early.sin()?, &(linear(&early, 6)? * linear(&early.sin()?, 6)?)?, is_delayed)
+        };
+        assert!(worst(std::slice::from_ref(&x), skip)? < 1e-7);
+    }
     assert!(worst(&[x], |v| transposed(&v[0].sqr()?)? * transposed(&v[0])?)? < 1e-7);
     Ok(())
 }
@@ -36,7 +38,7 @@ fn results_equal_those_of_candle() -> Result<()> {
     let own = |v: &[Tensor]| mix(&v[0], Some(&v[1]), FrameInterpolation { n_in: 3, of: of.clone() });
     let off = max_difference(&[x, skip], own, composed)?;
     assert!(off < 1e-12, "{off:e}");
-    assert!(repeat_frames_and_add(&pattern(&[2, 3, 5], 0.0)?, &pattern(&[2, 5, 5], 0.0)?).is_err());
+    assert!(repeat_frames_and_add(&pattern(&[2, 3, 5], 0.0)?, &pattern(&[2, 5, 5], 0.0)?, false).is_err());
     Ok(())
 }
 
@@ -46,12 +48,12 @@ fn positions_equal_those_of_tensorflow() -> Result<()> {
     let at = |n_out| linear(&x, n_out)?.flatten_all()?.to_vec1::<f64>();
     assert_eq!(at(8)?, [0.0, 0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 3.0]);
     assert_eq!(at(2)?, [0.0, 2.0]);
-    let part = ResizedPart { frames: 3..6, n_in: 4, n_out: 8 };
+    let part = ResizedPart::new(3..6, 4, 8);
     assert_eq!(part.needed(), 1..4);
     let some = linear_part(&x.narrow(1, 1, 3)?, &part)?.flatten_all()?.to_vec1::<f64>()?;
     assert_eq!(some, [1.5, 2.0, 2.5]);
     assert!(linear_part(&x, &part).is_err());
-    let repeated = repeat_frames_and_add(&x, &Tensor::zeros((1, 8, 1), x.dtype(), x.device())?)?;
+    let repeated = repeat_frames_and_add(&x, &Tensor::zeros((1, 8, 1), x.dtype(), x.device())?, false)?;
     assert_eq!(repeated.flatten_all()?.to_vec1::<f64>()?, [0.0, 0.0, 1.0, 1.0, 2.0, 2.0, 3.0, 3.0]);
     Ok(())
 }
