@@ -7,6 +7,7 @@
 # make test-data   the tests that the last `make test` skipped, with the real data and models in ORATOR_DATA
 # make prove   the long-running tests and the benchmarks
 # make prove-cuda   the feature `cuda`, for NVIDIA GPUs, without a GPU: build, start, messages; packs what measures it
+# make prove-live   ten minutes of `orator live` on one core, received by a program of others
 # make build   target/release/orator and target/release/orator-lab
 # make dist    a Python wheel and relocatable archives in target/dist, with all libraries and licences
 # Requires Debian 12 (x86-64) and Rust. The scripts in .ci/setup install all other dependencies.
@@ -14,7 +15,7 @@
 SHELL := /bin/bash
 .SHELLFLAGS := -euo pipefail -c
 .DEFAULT_GOAL := build
-.PHONY: cuda spelling test-data setup runtime models readers aligner browser blender validator vrm page web driver loader build dist check test prove prove-dist prove-rule prove-words prove-people prove-cluster prove-cuda prove-study demo demo-quick demo-study clean-demo docs
+.PHONY: cuda spelling test-data setup runtime models readers aligner browser blender validator vrm page web driver loader build dist check test prove prove-dist prove-rule prove-words prove-people prove-cluster prove-cuda prove-live prove-study demo demo-quick demo-study clean-demo docs
 
 TARGET := $(or $(CARGO_TARGET_DIR),target)
 ORATOR := $(TARGET)/release/orator
@@ -79,6 +80,10 @@ prove prove-rule prove-words prove-people prove-cluster: build models aligner lo
 	.ci/$@
 
 prove-cuda: build
+	.ci/$@
+
+prove prove-live: readers
+prove-live: build
 	.ci/$@
 
 prove: prove-dist

@@ -6,14 +6,14 @@ use crate::cli::sandbox::{enter_sandbox, this_program};
 use crate::cli::ui::Ui;
 use anyhow::{Result, ensure};
 use orator_base::stage::progress::Progress as _;
-use orator_base::text::length;
+use orator_base::text::{counted, length};
 use orator_base::types::device::DeviceChoice;
 use orator_gesture::generate::GestureGenerator;
 use orator_gesture::generate::model::{GenerationChoice, checkpoint_file, model_lock};
 use orator_live::lines::JsonLines;
 use orator_live::pose::LiveBody;
-use orator_live::session::{self, LiveReport, PoseSink, SpeechSource};
-use orator_live::vmc::{DEFAULT_ADDRESS, VmcSender};
+use orator_live::session::{self, LiveReport, LiveSource, PoseSink};
+use orator_live::vmc::{DEFAULT_ADDRESS, VmcSocket};
 use orator_view::live::LiveFeed;
 use orator_view::view_server::{self, ViewRequest};
 use serde_json::json;
@@ -66,7 +66,7 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     let generator = GestureGenerator::open_as(&checkpoint, &choice, &device)?;
     let look_ahead = generator.look_ahead()?;
     let body = LiveBody::new(&generator.metadata);
-    let mut vmc = args.vmc.as_deref().map(|address| VmcSender::connect(address, body.bones.clone())).transpose()?;
+    let mut vmc = args.vmc.as_deref().map(|address| VmcSocket::connect(address, body.bones.clone())).transpose()?;
     if device.is_cpu() && !args.page {
         enter_sandbox([], [checkpoint.as_path()]);
     }
@@ -77,8 +77,8 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
         serve(feed.clone(), args.port, ui)?;
     }
     let source = match args.audio {
-        Some(path) => SpeechSource::File(path),
-        None => SpeechSource::Pcm(Box::new(std::io::stdin())),
+        Some(path) => LiveSource::File(path),
+        None => LiveSource::Pcm(Box::new(std::io::stdin())),
     };
     ui.say(&format!(
         "{} gestures {:.2} s after the speech",
@@ -134,7 +134,7 @@ fn text(report: &LiveReport) -> String {
     }
     if sound.n_gaps > 0 {
         let silent = sound.n_silent_samples as f64 / 16_000.0;
-        text += &format!("speech was late {} times; {} of silence inserted\n", sound.n_gaps, length(silent));
+        text += &format!("speech was late {}; {} of silence inserted\n", counted(sound.n_gaps, "time"), length(silent));
     }
     text += &sound.notes.iter().map(|note| format!("note: {note}\n")).collect::<String>();
     for output in outputs {

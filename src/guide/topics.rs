@@ -26,7 +26,7 @@ pub const TOPICS: [Topic; 21] = [
     topic!("lifting", "2D keypoints to 3D joints: input, output, errors, custom lifters"),
     topic!("keypoints", "keypoints of OpenPose, MMPose, AlphaPose, MediaPipe and PATS instead of videos"),
     topic!("training", "training: settings, recipes, fine-tuning, validation, checkpoints; generating motion"),
-    topic!("live", "gestures while somebody speaks: microphones, VSeeFace and other programs, a page, voice agents"),
+    topic!("live", "gestures while you speak: microphones, VSeeFace and other programs, a page, voice agents"),
     topic!("onnx", "trained models in Python, browsers and Unity: files, example programs"),
     topic!("gpu", "training and generation on an NVIDIA GPU: building, libraries, measurements"),
     topic!("animation", "joints to BVH, GLB, JSON and MP4: rig, smoothing, constraints"),

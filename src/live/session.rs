@@ -57,7 +57,7 @@ pub struct SinkFacts {
 }
 
 /// Where the speech comes from.
-pub enum SpeechSource {
+pub enum LiveSource {
     /// 16-bit little-endian mono samples at 16 kHz, in real time.
     Pcm(Box<dyn Read + Send>),
     /// A sound file, played in real time.
@@ -94,18 +94,18 @@ pub struct LiveReport {
 pub fn run(
     generator: &GestureGenerator,
     mut body: LiveBody,
-    source: SpeechSource,
+    source: LiveSource,
     sinks: &mut [&mut dyn PoseSink],
     progress: &dyn Progress,
 ) -> Result<LiveReport> {
     let look_ahead_secs = generator.look_ahead()?.secs;
     let sound = LiveSound::default();
     let reader = sound.clone();
-    let is_file = matches!(source, SpeechSource::File(_));
+    let is_file = matches!(source, LiveSource::File(_));
     let start = Instant::now();
     thread::spawn(move || match source {
-        SpeechSource::Pcm(samples) => reader.read_pcm(samples),
-        SpeechSource::File(path) => reader.read_file(&path),
+        LiveSource::Pcm(samples) => reader.read_pcm(samples),
+        LiveSource::File(path) => reader.read_file(&path),
     });
     let (sender, frames) = sync_channel(MAX_AHEAD);
     thread::scope(|scope| {
@@ -113,7 +113,8 @@ pub fn run(
         let (body, heard) = (&mut body, &sound);
         let generation = scope.spawn(move || generate(generator, body, heard, arrival, &sender));
         let zero = arrival.map(|start| start + Duration::from_secs_f64(look_ahead_secs) + MARGIN);
-        let mut clock = Clock { frames, fps: generator.fps().per_sec(), last: Vec::new(), n_frames: 0, is_over: false };
+        let mut clock =
+            PoseClock { frames, fps: generator.fps().per_sec(), last: Vec::new(), n_frames: 0, is_over: false };
         let mut report = clock.run(zero, &sound, sinks, progress);
         sound.close();
         drop(clock);
@@ -160,7 +161,7 @@ fn generate(
 }
 
 /// Interpolates frames to poses, and sends them by the clock.
-struct Clock {
+struct PoseClock {
     frames: Receiver<HumanoidPose>,
     fps: f64,
     /// The last two frames.
@@ -169,7 +170,7 @@ struct Clock {
     is_over: bool,
 }
 
-impl Clock {
+impl PoseClock {
     /// Sends poses; the first at `zero`, or as soon as it is there.
     fn run(
         &mut self,

@@ -16,9 +16,9 @@ pub const PIECE: usize = SAMPLE_RATE as usize / 50;
 /// Capacity of the queue in samples, 2 s. A writer that is faster than real time waits.
 const CAPACITY: usize = 2 * SAMPLE_RATE as usize;
 /// Time by which sound may arrive late before silence replaces it.
-pub const ARRIVAL_SLACK: Duration = Duration::from_millis(60);
-/// Seconds for which the queue is full before this is reported.
-const FULL_SECS: f64 = 5.0;
+pub const LATE_LIMIT: Duration = Duration::from_millis(60);
+/// Seconds for which the source waits between two gaps before this is reported.
+const FULL_SECS: f64 = 20.0;
 /// Number of gaps within a time, in seconds, that are reported as sound of a lower rate.
 const FREQUENT_GAPS: (usize, f64) = (20, 10.0);
 /// Beginnings of sound files, which are not plain samples.
@@ -43,8 +43,8 @@ struct Queue {
     is_complete: bool,
     error: Option<anyhow::Error>,
     facts: SoundFacts,
-    /// Whether all samples of a source that has ended were taken.
-    is_over: bool,
+    /// Number of samples of the session, once the source has ended and its last sample was taken.
+    n_at_end: Option<usize>,
     /// Whether the session has ended, so that the reader can stop.
     is_closed: bool,
     /// Time for which a source in real time had to wait for space.
@@ -107,13 +107,7 @@ impl LiveSound {
         loop {
             let n_read = source.read(&mut bytes[n_left..])?;
             let n = n_left + n_read;
-            if n_read == 0 {
-                if n_left > 0 {
-                    self.shared.lock().note_once("the speech ended within a sample; its last byte is ignored");
-                }
-                return Ok(());
-            }
-            if n < 4 && is_first {
+            if n < 4 && is_first && n_read > 0 {
                 n_left = n;
                 continue;
             }
@@ -127,6 +121,12 @@ impl LiveSound {
             let samples = bytes[..n].chunks_exact(2).map(|of| f32::from(i16::from_le_bytes([of[0], of[1]])) / 32_768.0);
             self.push(&samples.collect::<Vec<_>>(), &mut note_fast)?;
             n_left = n % 2;
+            if n_read == 0 {
+                if n_left > 0 {
+                    self.shared.lock().note_once("the speech ended within a sample; its last byte is ignored");
+                }
+                return Ok(());
+            }
             bytes.copy_within(n - n_left..n, 0);
         }
     }
@@ -154,7 +154,7 @@ impl LiveSound {
         let mut end = 0;
         std::iter::from_fn(move || {
             end += PIECE;
-            let due = start.map(|start| start + ARRIVAL_SLACK + secs(end));
+            let due = start.map(|start| start + LATE_LIMIT + secs(end));
             let mut queue = shared.lock();
             loop {
                 let now = Instant::now();
@@ -176,8 +176,7 @@ impl LiveSound {
 
     /// Number of samples of the session, once the source has ended and its last sample was taken.
     pub fn n_samples_at_end(&self) -> Option<usize> {
-        let queue = self.shared.lock();
-        queue.is_over.then_some(queue.facts.n_samples)
+        self.shared.lock().n_at_end
     }
 
     pub fn facts(&self) -> SoundFacts {
@@ -212,7 +211,7 @@ fn take(queue: &mut Queue, now: Instant) -> Result<Option<Vec<f32>>> {
             return Err(error);
         }
         if n == 0 {
-            queue.is_over = true;
+            queue.n_at_end = Some(queue.facts.n_samples);
             return Ok(None);
         }
     }
@@ -223,6 +222,7 @@ fn take(queue: &mut Queue, now: Instant) -> Result<Option<Vec<f32>>> {
         queue.facts.n_silent_samples += PIECE - n;
         if !queue.is_in_gap {
             queue.facts.n_gaps += 1;
+            queue.full_secs = 0.0;
             note_frequent_gaps(queue, now);
         }
     }

@@ -16,7 +16,7 @@ pub const DEFAULT_ADDRESS: &str = "127.0.0.1:39539";
 /// OSC time tag of a bundle that is valid at once.
 const IMMEDIATELY: OscTime = OscTime { seconds: 0, fractional: 1 };
 
-pub struct VmcSender {
+pub struct VmcSocket {
     socket: UdpSocket,
     address: SocketAddr,
     bones: Arc<[HumanoidBone]>,
@@ -26,7 +26,7 @@ pub struct VmcSender {
     n_refused: u64,
 }
 
-impl VmcSender {
+impl VmcSocket {
     /// Opens a socket that sends to `address`, a host and port.
     ///
     /// # Errors
@@ -69,7 +69,7 @@ fn transform(name: &str, [x, y, z]: Vec3, rotation: Rotation) -> Vec<OscType> {
     std::iter::once(OscType::String(name.to_owned())).chain(numbers).collect()
 }
 
-impl PoseSink for VmcSender {
+impl PoseSink for VmcSocket {
     fn send(&mut self, pose: &TimedPose) {
         let Ok(bytes) = bundle(&self.bones, pose) else { return self.n_dropped += 1 };
         let mut sent = self.socket.send(&bytes);

@@ -10,7 +10,8 @@ use orator_base::stage::progress::Silent;
 use orator_base::types::sound::Sound;
 use orator_gesture::generate::GestureGenerator;
 use orator_live::pose::{HumanoidPose, LiveBody};
-use orator_live::session::{self, PoseSink, SinkFacts, SpeechSource, TimedPose};
+use orator_live::session::{self, LiveSource, PoseSink, SinkFacts, TimedPose};
+use std::io::{BufRead, BufReader};
 use std::path::Path;
 use std::process::{Command, Output, Stdio};
 
@@ -65,7 +66,7 @@ fn poses_are_those_of_the_complete_sound_and_rest_in_silence() -> anyhow::Result
     let body = LiveBody::new(&generator.metadata);
     let (rig, is_bone) = (body.rig.clone(), body.rig.skeleton.joints.iter().map(|joint| !joint.end));
     let is_bone: Vec<bool> = is_bone.collect();
-    let report = session::run(&generator, body, SpeechSource::File(wav), &mut [&mut collected], &Silent)?;
+    let report = session::run(&generator, body, LiveSource::File(wav), &mut [&mut collected], &Silent)?;
     eprintln!("{report:?}");
     let poses = &collected.poses;
     assert!(collected.is_finished && report.outputs[0].n_sent == poses.len() as u64);
@@ -90,8 +91,7 @@ fn poses_are_those_of_the_complete_sound_and_rest_in_silence() -> anyhow::Result
     let steps: Vec<f64> = poses.windows(2).map(|two| most_degrees(&two[0].1, &two[1].1.rotations)).collect();
     let jumps = steps.iter().copied().fold(0.0, f64::max);
     eprintln!("largest step between poses: {jumps} degrees");
-    let spoken = steps[24..180].iter().copied().fold(0.0, f64::max);
-    assert!(jumps <= 2.0 * spoken.max(1.0), "{jumps} degrees, {spoken} within speech");
+    assert!(jumps < 5.0, "{jumps} degrees");
     assert!(report.drift_ms.abs() < 1000.0 / 15.0 || report.n_omitted > 0, "{report:?}");
     Ok(())
 }
@@ -152,17 +152,18 @@ fn lines_are_json_and_a_reader_that_leaves_ends_the_session() -> anyhow::Result<
     let summary = String::from_utf8_lossy(&done.stderr);
     assert!(summary.contains("poses sent, 0 dropped"), "{summary}");
 
-    let program = env!("CARGO_BIN_EXE_orator");
-    let script = format!("(cat; sleep 20) | {program} live --checkpoint {} --lines | head -n 3", model.display());
-    let started = std::time::Instant::now();
-    let mut shell = Command::new("timeout");
-    let mut shell = shell.args(["15", "bash", "-c", &script]).stdin(Stdio::piped()).stdout(Stdio::piped()).spawn()?;
-    std::io::Write::write_all(&mut shell.stdin.take().unwrap(), &samples)?;
-    let mut text = String::new();
-    std::io::Read::read_to_string(&mut shell.stdout.take().unwrap(), &mut text)?;
-    assert_eq!(text.lines().count(), 3);
-    let _ = shell.kill();
-    shell.wait()?;
-    assert!(started.elapsed().as_secs() < 15);
+    let mut command = Command::new(env!("CARGO_BIN_EXE_orator"));
+    command.args(["live", "--lines", "--checkpoint"]).arg(&model).stdin(Stdio::piped()).stdout(Stdio::piped());
+    let mut process = command.spawn()?;
+    // The source goes on, but the reader leaves after three lines.
+    let _open = process.stdin.take();
+    let mut poses = BufReader::new(process.stdout.take().unwrap()).lines();
+    assert_eq!(poses.by_ref().take(3).filter_map(Result::ok).count(), 3);
+    drop(poses);
+    let ended = (0..100).find_map(|_| {
+        std::thread::sleep(std::time::Duration::from_millis(100));
+        process.try_wait().ok().flatten()
+    });
+    assert!(ended.is_some_and(|status| status.success()), "{ended:?}");
     Ok(())
 }

@@ -109,3 +109,20 @@ impl<'d> TrainingIntervals<'d> {
         Ok(IntervalRows { features, mask, mels, first_frame, first_mel })
     }
 }
+
+/// Neighbouring frames of a fractional frame position, at most `last`, and the weight 0..1 of the second one.
+pub(super) fn between(at: f64, last: usize) -> (usize, usize, f32) {
+    let low = (at.max(0.0) as usize).min(last);
+    (low, (low + 1).min(last), if low < last { (at - low as f64) as f32 } else { 0.0 })
+}
+
+/// Position in a sequence from 0 to `last` for one in its continuation by mirror images.
+pub(super) fn mirrored(at: f64, last: f64) -> f64 {
+    last - (at.rem_euclid(2.0 * last.max(1.0)) - last).abs()
+}
+
+/// Smallest range that contains these indices.
+pub(super) fn covered(indices: &[usize]) -> Range<usize> {
+    let [low, high] = [indices.iter().min(), indices.iter().max()];
+    low.copied().unwrap_or(0)..high.map_or(0, |high| high + 1)
+}

@@ -1,7 +1,7 @@
 //! Training data: windows of the intervals of a split, as batches of normalised poses and log-mels.
 
 use super::augment::{self, WindowChange, WindowRows};
-use super::interval_rows::{IntervalRows, TrainingIntervals};
+use super::interval_rows::{IntervalRows, TrainingIntervals, between, covered, mirrored};
 use crate::generate::generator::mel_frames;
 use crate::generate::normalisation::{N_FEATURES, Normalisation};
 use crate::generate::seq2seq::architecture::{NumberedWord, Vocabulary};
@@ -151,7 +151,7 @@ impl<'d> WindowLoader<'d> {
         let (first, n_mels) = (mel_frames(self.fps, frames.start), mel_frames(self.fps, frames.len()));
         let n_padded = mel_frames(self.fps, frames.len().next_multiple_of(FRAMES_MULTIPLE)).max(n_mels);
         let sources = self.mel_sources(interval, first, n_padded);
-        let rows = self.intervals.rows(interval, frames.clone(), spanned(&sources))?;
+        let rows = self.intervals.rows(interval, frames.clone(), covered(&sources))?;
         let IntervalRows { features, mask, mels, first_frame, first_mel } = &*rows;
         let words =
             self.words_of(&[(interval, frames.start as f64, 1.0)], frames.len().next_multiple_of(FRAMES_MULTIPLE))?;
@@ -241,7 +241,7 @@ impl<'d> WindowLoader<'d> {
         };
         let frames = between(at(0), last).0..between(at(n - 1), last).1 + 1;
         let ends: Vec<usize> = (0..n_mels).map(|t| between(mel_at(t), last_mel)).flat_map(|(a, b, _)| [a, b]).collect();
-        let mel_range = spanned(&ends);
+        let mel_range = covered(&ends);
         let rows = self.intervals.rows(interval, frames, mel_range)?;
         let IntervalRows { features, mask, mels, .. } = &*rows;
         let mut poses = Array2::zeros((self.n_features, n));
@@ -287,7 +287,7 @@ impl<'d> WindowLoader<'d> {
         let read = |i: &usize| {
             let (interval, start) = self.starts[*i];
             let sources = self.mel_sources(interval, mel_frames(self.fps, start), n_mels);
-            let rows = self.intervals.rows(interval, start..start + self.n_frames, spanned(&sources))?;
+            let rows = self.intervals.rows(interval, start..start + self.n_frames, covered(&sources))?;
             anyhow::Ok((rows, start, sources))
         };
         for (rows, start, sources) in which.par_iter().map(read).collect::<Result<Vec<_>>>()? {
@@ -379,23 +379,6 @@ fn joined(parts: &[WindowBatch]) -> Result<WindowBatch> {
 
 fn mask_row(feature: usize) -> usize {
     if feature < N_FEATURES { feature / 3 } else { feature - N_FEATURES + N_BONES }
-}
-
-/// Neighbouring frames of a fractional frame position, at most `last`, and the weight 0..1 of the second one.
-fn between(at: f64, last: usize) -> (usize, usize, f32) {
-    let low = (at.max(0.0) as usize).min(last);
-    (low, (low + 1).min(last), if low < last { (at - low as f64) as f32 } else { 0.0 })
-}
-
-/// Position in a sequence from 0 to `last` for one in its continuation by mirror images.
-fn mirrored(at: f64, last: f64) -> f64 {
-    last - (at.rem_euclid(2.0 * last.max(1.0)) - last).abs()
-}
-
-/// Smallest range that contains these indices.
-fn spanned(indices: &[usize]) -> Range<usize> {
-    let [low, high] = [indices.iter().min(), indices.iter().max()];
-    low.copied().unwrap_or(0)..high.map_or(0, |high| high + 1)
 }
 
 #[cfg(test)]
