@@ -22,6 +22,10 @@ impl Delays {
         self.max_ms = self.max_ms.max(ms);
     }
 
+    pub fn is_empty(&self) -> bool {
+        self.n == 0
+    }
+
     pub fn max_ms(&self) -> f64 {
         self.max_ms
     }

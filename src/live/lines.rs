@@ -8,15 +8,19 @@ use std::io::Write;
 use std::sync::Arc;
 use std::sync::mpsc::{SyncSender, TrySendError, sync_channel};
 use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
 
 /// Number of lines that wait for the reader, one second.
 const MAX_WAITING: usize = 60;
+
+/// Longest time in which the last lines are delivered.
+const MAX_END: Duration = Duration::from_secs(1);
 
 pub struct JsonLines {
     bones: Arc<[HumanoidBone]>,
     /// `None` once the reader has gone.
     lines: Option<SyncSender<String>>,
-    writer: Option<JoinHandle<()>>,
+    writer: JoinHandle<()>,
     n_sent: u64,
     n_dropped: u64,
 }
@@ -31,7 +35,7 @@ impl JsonLines {
                 }
             }
         });
-        Self { bones, lines: Some(lines), writer: Some(writer), n_sent: 0, n_dropped: 0 }
+        Self { bones, lines: Some(lines), writer, n_sent: 0, n_dropped: 0 }
     }
 }
 
@@ -65,8 +69,11 @@ impl PoseSink for JsonLines {
     }
 
     fn finish(&mut self) {
-        if self.lines.take().is_some() {
-            self.writer.take().map(JoinHandle::join);
+        // The thread of a reader that is stuck is left behind.
+        self.lines = None;
+        let end = Instant::now() + MAX_END;
+        while !self.writer.is_finished() && Instant::now() < end {
+            std::thread::sleep(Duration::from_millis(5));
         }
     }
 

@@ -31,13 +31,13 @@ impl RestBlend {
 
     /// Adds the next piece of sound (16 kHz), about 20 ms.
     pub fn push(&mut self, piece: &[f32]) {
-        if piece.is_empty() {
-            return;
-        }
-        let power = piece.iter().map(|v| f64::from(*v).powi(2)).sum::<f64>() / piece.len() as f64;
+        let power = piece.iter().map(|v| f64::from(*v).powi(2)).sum::<f64>() / piece.len().max(1) as f64;
         let level = 10.0 * (power + 1e-10).log10();
-        let secs = piece.len() as f64 / f64::from(SAMPLE_RATE);
-        self.background_db = level.min(self.background_db + BACKGROUND_RISE_DB * secs);
+        // Inserted silence says nothing about the background.
+        if power > 0.0 {
+            let secs = piece.len() as f64 / f64::from(SAMPLE_RATE);
+            self.background_db = level.min(self.background_db + BACKGROUND_RISE_DB * secs);
+        }
         let [low, high] = THRESHOLD_DB;
         if level > (self.background_db + ABOVE_BACKGROUND_DB).clamp(low, high) {
             self.speech.push_back(self.n_samples as f64 / f64::from(SAMPLE_RATE));

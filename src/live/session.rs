@@ -1,26 +1,25 @@
 //! A session: one thread generates poses as their speech arrives, this one sends them at 60 Hz by the clock. A pose is
-//! sent a constant time after its speech: the look-ahead of the network, and [`MARGIN`].
+//! sent a constant time after its speech, see [`delay`].
 
 use super::delays::Delays;
 use super::pose::{HumanoidPose, LiveBody};
 use super::rest::RestBlend;
-use super::sound::{LiveSound, SoundFacts};
+use super::sound::{LATE_LIMIT, LiveSound, SoundFacts};
 use anyhow::{Result, anyhow};
 use orator_base::stage::progress::Progress;
+use orator_base::types::time::FrameRate;
 use orator_gesture::generate::GestureGenerator;
 use serde::Serialize;
 use std::cell::RefCell;
-use std::io::Read;
-use std::path::PathBuf;
+use std::collections::BTreeSet;
 use std::sync::mpsc::{Receiver, SyncSender, TryRecvError, sync_channel};
 use std::thread;
 use std::time::{Duration, Instant};
 
 /// Poses per second.
 pub const RATE: u32 = 60;
-/// Time between the arrival of the last sample that a pose depends on and the pose: lateness of the sound, 60 ms; the
-/// next frame of the network, to which poses are interpolated, 67 ms at 15 fps; computation.
-pub const MARGIN: Duration = Duration::from_millis(200);
+/// Time for the computation of a frame.
+const COMPUTATION: Duration = Duration::from_millis(40);
 /// Number of frames that are generated ahead, if the sound is there.
 const MAX_AHEAD: usize = 8;
 /// Number of poses by which the clock may be late before poses are omitted.
@@ -56,12 +55,10 @@ pub struct SinkFacts {
     pub note: Option<String>,
 }
 
-/// Where the speech comes from.
-pub enum LiveSource {
-    /// 16-bit little-endian mono samples at 16 kHz, in real time.
-    Pcm(Box<dyn Read + Send>),
-    /// A sound file, played in real time.
-    File(PathBuf),
+/// Time from speech to the pose for it beyond the look-ahead: lateness of the sound; the next frame of the network, to which
+/// poses are interpolated; computation. 167 ms at 15 fps.
+pub fn delay(fps: FrameRate) -> Duration {
+    LATE_LIMIT + Duration::from_secs_f64(1.0 / fps.per_sec()) + COMPUTATION
 }
 
 /// What a session did.
@@ -70,8 +67,8 @@ pub struct LiveReport {
     /// Seconds of motion that were sent.
     pub secs: f64,
     pub look_ahead_secs: f64,
-    /// Time between speech and its pose beyond the look-ahead, ms.
-    pub latency_ms: f64,
+    /// Time from speech to the pose for it beyond the look-ahead, ms.
+    pub delay_ms: f64,
     /// Time from the arrival of the last sample that a frame depends on to the frame, ms: 99 % of frames, and all. Only
     /// for sound in real time.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -81,45 +78,41 @@ pub struct LiveReport {
     /// Number of poses that repeat the one before because the network was late, and number of omitted ones.
     pub n_repeated: u64,
     pub n_omitted: u64,
-    /// Difference at the end between the time of the last pose by the clock and by the number of samples, ms.
-    pub drift_ms: f64,
     pub sound: SoundFacts,
     pub outputs: Vec<SinkFacts>,
 }
 
-/// Runs a session until its speech ends, all sinks are closed or `progress` requests a stop.
+/// Runs a session until its speech ends, all sinks are closed or `progress` requests a stop. A thread is reading the
+/// `sound` already, in real time or, with `is_file`, as fast as it is used.
 ///
 /// # Errors
 /// A network that reads the complete speech; speech that cannot be read; network output that is not finite.
 pub fn run(
     generator: &GestureGenerator,
     mut body: LiveBody,
-    source: LiveSource,
+    (sound, is_file): (&LiveSound, bool),
     sinks: &mut [&mut dyn PoseSink],
     progress: &dyn Progress,
 ) -> Result<LiveReport> {
     let look_ahead_secs = generator.look_ahead()?.secs;
-    let sound = LiveSound::default();
-    let reader = sound.clone();
-    let is_file = matches!(source, LiveSource::File(_));
-    let start = Instant::now();
-    thread::spawn(move || match source {
-        LiveSource::Pcm(samples) => reader.read_pcm(samples),
-        LiveSource::File(path) => reader.read_file(&path),
-    });
+    let delay = delay(generator.fps());
+    // Speech that arrived while the model was loaded keeps its time.
+    let start = sound.first_arrival().unwrap_or_else(Instant::now);
     let (sender, frames) = sync_channel(MAX_AHEAD);
     thread::scope(|scope| {
         let arrival = (!is_file).then_some(start);
-        let (body, heard) = (&mut body, &sound);
-        let generation = scope.spawn(move || generate(generator, body, heard, arrival, &sender));
-        let zero = arrival.map(|start| start + Duration::from_secs_f64(look_ahead_secs) + MARGIN);
+        let body = &mut body;
+        let generation = scope.spawn(move || generate(generator, body, sound, arrival, &sender));
+        let zero = arrival.map(|start| start + Duration::from_secs_f64(look_ahead_secs) + delay);
         let mut clock =
             PoseClock { frames, fps: generator.fps().per_sec(), last: Vec::new(), n_frames: 0, is_over: false };
-        let mut report = clock.run(zero, &sound, sinks, progress);
+        let mut report = clock.run(zero, sound, sinks, progress);
         sound.close();
         drop(clock);
-        let ready = generation.join().map_err(|_| anyhow!("the generation failed unexpectedly"))??;
+        let ended = generation.join().map_err(|_| anyhow!("the generation failed unexpectedly"));
         sinks.iter_mut().for_each(|sink| sink.finish());
+        let ready = ended??;
+        report.delay_ms = 1e3 * delay.as_secs_f64();
         report.look_ahead_secs = look_ahead_secs;
         report.ready_ms = (!is_file).then(|| [ready.quantile_ms(0.99), ready.max_ms()]);
         report.sound = sound.facts();
@@ -180,7 +173,7 @@ impl PoseClock {
         progress: &dyn Progress,
     ) -> LiveReport {
         let task = progress.begin("live", 0);
-        let (mut jitter, mut n_repeated, mut n_omitted, mut n_notes) = (Delays::new(), 0, 0, 0);
+        let (mut jitter, mut n_repeated, mut n_omitted, mut said) = (Delays::new(), 0, 0, BTreeSet::new());
         let zero = zero.unwrap_or_else(|| {
             // A file has no arrival times: its clock begins with its second frame.
             while self.n_frames < 2 && !self.is_over {
@@ -188,14 +181,14 @@ impl PoseClock {
             }
             Instant::now()
         });
-        let (mut tick, mut drift_ms) = (0u32, 0.0);
+        let mut tick = 0u32;
         while !progress.is_to_stop() && !sinks.iter().all(|sink| sink.is_closed()) {
             let due = zero + Duration::from_secs(1) * tick / RATE;
             thread::sleep(due.saturating_duration_since(Instant::now()));
             let late = Instant::now().saturating_duration_since(due);
             if late * RATE > MAX_LATE * Duration::from_secs(1) {
                 let n = (late * RATE).as_secs() as u32;
-                n_omitted += u64::from(n);
+                n_omitted += if jitter.is_empty() { 0 } else { u64::from(n) };
                 tick += n;
                 continue;
             }
@@ -210,25 +203,29 @@ impl PoseClock {
                 n_repeated += u64::from(place > last);
                 jitter.add(1e3 * late.as_secs_f64());
                 sinks.iter_mut().for_each(|sink| sink.send(&TimedPose { secs, pose: pose.clone() }));
-                drift_ms = 1e3 * (zero.elapsed().as_secs_f64() - secs);
             }
             tick += 1;
             if tick % RATE == 0 {
                 task.advance(1);
-                let notes = sound.facts().notes;
-                notes.iter().skip(n_notes).for_each(|note| progress.say(note));
-                n_notes = notes.len();
+                let of_sinks =
+                    sinks.iter().map(|sink| sink.facts()).filter_map(|facts| Some((facts.name, facts.note?)));
+                let of_sound = sound.facts().notes.into_iter().map(|note| ("speech", note));
+                for (about, note) in of_sinks.chain(of_sound) {
+                    // Counts in the note of a sink change.
+                    if said.insert(if about == "speech" { note.clone() } else { about.to_owned() }) {
+                        progress.say(&format!("{about}: {note}"));
+                    }
+                }
             }
         }
         LiveReport {
             secs: f64::from(tick) / f64::from(RATE),
             look_ahead_secs: 0.0,
-            latency_ms: 1e3 * MARGIN.as_secs_f64(),
+            delay_ms: 0.0,
             ready_ms: None,
             jitter_ms: [jitter.quantile_ms(0.99), jitter.max_ms()],
             n_repeated,
             n_omitted,
-            drift_ms,
             sound: SoundFacts::default(),
             outputs: Vec::new(),
         }

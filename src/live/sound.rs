@@ -1,9 +1,11 @@
 //! Speech in real time: a thread reads it into a bounded queue, and the generator takes it in pieces of 20 ms. Sound that
-//! does not arrive in time is replaced by silence, so that the motion goes on; it takes its place as soon as it comes.
+//! does not arrive in time is replaced by silence, so that the motion goes on, and follows the silence when it comes. If a
+//! source in real time stays behind for this reason, or because its clock is fast, quiet pieces are skipped.
 
 use anyhow::{Result, bail, ensure};
 use orator_base::types::sound::SAMPLE_RATE;
 use orator_media::ffmpeg::audio::stream_mono;
+use orator_media::sandbox::{FileAccess, restrict_thread};
 use serde::Serialize;
 use std::collections::VecDeque;
 use std::io::Read;
@@ -13,6 +15,14 @@ use std::time::{Duration, Instant};
 
 /// Number of samples per piece, 20 ms.
 pub const PIECE: usize = SAMPLE_RATE as usize / 50;
+/// Number of pieces, 2 s, for which a lag is measured, and the lag in samples, 80 ms, from which quiet pieces are skipped.
+const LAG_PIECES: usize = 100;
+const MAX_LAG: usize = 4 * PIECE;
+/// Root mean square of a quiet piece, -46 dB.
+const QUIET: f32 = 0.005;
+/// Time by which pieces are taken late, after the first seconds, if the network is too slow.
+const SLOW_SECS: f64 = 0.5;
+const FIRST_SECS: usize = 5;
 /// Capacity of the queue in samples, 2 s. A writer that is faster than real time waits.
 const CAPACITY: usize = 2 * SAMPLE_RATE as usize;
 /// Time by which sound may arrive late before silence replaces it.
@@ -32,6 +42,11 @@ pub struct SoundFacts {
     /// Number of times that sound was late, and the number of samples of silence that replaced it.
     pub n_gaps: usize,
     pub n_silent_samples: usize,
+    /// Number of quiet samples that were skipped.
+    pub n_skipped_samples: usize,
+    /// Time in the session of the end of the speech after its time by the clock, ms; only for sound in real time.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub lag_ms: Option<f64>,
     /// Notes about the source, each once.
     pub notes: Vec<String>,
 }
@@ -39,8 +54,9 @@ pub struct SoundFacts {
 #[derive(Default)]
 struct Queue {
     samples: VecDeque<f32>,
-    /// Whether the source has ended; an error that ended it.
+    /// Whether the source has ended; when, and an error that ended it.
     is_complete: bool,
+    ended: Option<Instant>,
     error: Option<anyhow::Error>,
     facts: SoundFacts,
     /// Number of samples of the session, once the source has ended and its last sample was taken.
@@ -51,6 +67,35 @@ struct Queue {
     full_secs: f64,
     latest_gaps: VecDeque<Instant>,
     is_in_gap: bool,
+    /// Arrival of the first sample, and time until which a gap goes on after speech has come again.
+    first_arrival: Option<Instant>,
+    resumes: Option<Instant>,
+    lag: LagMeter,
+}
+
+/// Measures over [`LAG_PIECES`] whether a source in real time stays behind.
+#[derive(Default)]
+struct LagMeter {
+    n_pieces: usize,
+    n_arrived: usize,
+    n_waited: usize,
+    least: usize,
+    /// Number of samples that may be skipped.
+    n_behind: usize,
+}
+
+impl LagMeter {
+    /// Counts a piece that was taken and left this number of samples in the queue.
+    fn add_piece(&mut self, n_left: usize) {
+        self.least = if self.n_pieces == 0 { n_left } else { self.least.min(n_left) };
+        self.n_pieces += 1;
+        if self.n_pieces == LAG_PIECES {
+            let expected = LAG_PIECES * PIECE;
+            let is_in_real_time = self.n_waited == 0 && (expected * 4 / 5..expected * 6 / 5).contains(&self.n_arrived);
+            let n_behind = if is_in_real_time { self.least.saturating_sub(MAX_LAG) } else { 0 };
+            *self = Self { n_behind, ..Self::default() };
+        }
+    }
 }
 
 impl Queue {
@@ -85,8 +130,10 @@ impl LiveSound {
         self.complete(self.pcm(source));
     }
 
-    /// Reads the sound of a file.
+    /// Reads the sound of a file. From now on this thread can open no other file.
     pub fn read_file(&self, path: &Path) {
+        let reads = Some(vec![path.canonicalize().unwrap_or_else(|_| path.to_owned())]);
+        restrict_thread(&FileAccess { reads, writes: Vec::new() });
         let ended = stream_mono(path, 0, SAMPLE_RATE, &mut |samples| self.push(samples, &mut |_, _| ()));
         self.complete(ended.and_then(|found| match found {
             Some(_) => Ok(()),
@@ -98,6 +145,7 @@ impl LiveSound {
         let mut queue = self.shared.lock();
         queue.is_complete = true;
         queue.error = ended.err().filter(|_| !queue.is_closed);
+        queue.ended = Some(Instant::now());
         self.shared.changed.notify_all();
     }
 
@@ -138,9 +186,16 @@ impl LiveSound {
             while queue.samples.len() + part.len() > CAPACITY && !queue.is_closed {
                 let before = Instant::now();
                 queue = self.shared.changed.wait(queue).unwrap_or_else(PoisonError::into_inner);
+                queue.lag.n_waited += 1;
                 waited(&mut queue, before.elapsed().as_secs_f64());
             }
             ensure!(!queue.is_closed, "the session has ended");
+            let now = Instant::now();
+            queue.first_arrival.get_or_insert(now);
+            if queue.is_in_gap && queue.samples.is_empty() {
+                queue.resumes = Some(now + LATE_LIMIT);
+            }
+            queue.lag.n_arrived += part.len();
             queue.samples.extend(part);
             self.shared.changed.notify_all();
         }
@@ -156,11 +211,20 @@ impl LiveSound {
             end += PIECE;
             let due = start.map(|start| start + LATE_LIMIT + secs(end));
             let mut queue = shared.lock();
+            let behind = due.map_or(0.0, |due| Instant::now().saturating_duration_since(due).as_secs_f64());
+            if behind > SLOW_SECS && end > FIRST_SECS * SAMPLE_RATE as usize && queue.samples.len() > PIECE {
+                queue.note_once(
+                    "the network is slower than the speech on this machine: train a smaller one (gan.preset)",
+                );
+                queue.full_secs = 0.0;
+            }
             loop {
                 let now = Instant::now();
                 let is_late = due.is_some_and(|due| now >= due);
-                if queue.samples.len() >= PIECE || queue.is_complete || is_late {
-                    let piece = take(&mut queue, now);
+                // After a gap, the speech gets its slack again.
+                let is_held = queue.is_in_gap && !queue.is_complete && due < queue.resumes;
+                if (queue.samples.len() >= PIECE && !is_held) || queue.is_complete || is_late {
+                    let piece = take(&mut queue, now, start, is_held);
                     shared.changed.notify_all();
                     return piece.transpose();
                 }
@@ -177,6 +241,11 @@ impl LiveSound {
     /// Number of samples of the session, once the source has ended and its last sample was taken.
     pub fn n_samples_at_end(&self) -> Option<usize> {
         self.shared.lock().n_at_end
+    }
+
+    /// Time at which the first sample arrived.
+    pub fn first_arrival(&self) -> Option<Instant> {
+        self.shared.lock().first_arrival
     }
 
     pub fn facts(&self) -> SoundFacts {
@@ -204,14 +273,18 @@ fn note_fast(queue: &mut Queue, secs: f64) {
 }
 
 /// The next piece of a queue: full, the rest of a source that has ended, or one completed by silence.
-fn take(queue: &mut Queue, now: Instant) -> Result<Option<Vec<f32>>> {
-    let n = queue.samples.len().min(PIECE);
+fn take(queue: &mut Queue, now: Instant, start: Option<Instant>, is_held: bool) -> Result<Option<Vec<f32>>> {
+    skip_quiet(queue);
+    let n = if is_held { 0 } else { queue.samples.len().min(PIECE) };
     if n < PIECE && queue.is_complete {
         if let Some(error) = queue.error.take() {
             return Err(error);
         }
         if n == 0 {
             queue.n_at_end = Some(queue.facts.n_samples);
+            let by_clock = start.zip(queue.ended).map(|(start, ended)| ended.saturating_duration_since(start));
+            let of_samples = secs(queue.facts.n_samples).as_secs_f64();
+            queue.facts.lag_ms = by_clock.map(|by_clock| 1e3 * (of_samples - by_clock.as_secs_f64()));
             return Ok(None);
         }
     }
@@ -228,7 +301,21 @@ fn take(queue: &mut Queue, now: Instant) -> Result<Option<Vec<f32>>> {
     }
     queue.is_in_gap = is_gap;
     queue.facts.n_samples += piece.len();
+    queue.lag.add_piece(queue.samples.len());
     Ok(Some(piece))
+}
+
+/// Skips quiet pieces at the start of the queue while the speech stays behind.
+fn skip_quiet(queue: &mut Queue) {
+    while queue.lag.n_behind >= PIECE && queue.samples.len() > PIECE {
+        let power: f32 = queue.samples.iter().take(PIECE).map(|sample| sample * sample).sum();
+        if power > QUIET * QUIET * PIECE as f32 {
+            return;
+        }
+        queue.samples.drain(..PIECE);
+        queue.facts.n_skipped_samples += PIECE;
+        queue.lag.n_behind -= PIECE;
+    }
 }
 
 fn note_frequent_gaps(queue: &mut Queue, now: Instant) {

@@ -27,18 +27,26 @@ pub struct VmcSocket {
 }
 
 impl VmcSocket {
-    /// Opens a socket that sends to `address`, a host and port.
+    /// Opens a socket that sends to `address`, a host and port. [`Self::with_bones`] is required before poses are sent.
     ///
     /// # Errors
     /// An address that is invalid or cannot be resolved or reached.
-    pub fn connect(address: &str, bones: Arc<[HumanoidBone]>) -> Result<Self> {
+    pub fn connect(address: &str) -> Result<Self> {
         let context = || format!("--vmc: cannot send to {address}, expected HOST:PORT such as {DEFAULT_ADDRESS}");
-        let found = address.to_socket_addrs().with_context(context)?.next().with_context(context)?;
+        // Receivers listen on IPv4 addresses; `localhost` often has one of IPv6 first.
+        let mut found: Vec<SocketAddr> = address.to_socket_addrs().with_context(context)?.collect();
+        found.sort_by_key(SocketAddr::is_ipv6);
+        let found = *found.first().with_context(context)?;
         let own = if found.is_ipv4() { (Ipv4Addr::UNSPECIFIED, 0).into() } else { (Ipv6Addr::UNSPECIFIED, 0).into() };
         let socket = UdpSocket::bind::<SocketAddr>(own).with_context(context)?;
         socket.connect(found).with_context(context)?;
         socket.set_nonblocking(true)?;
-        Ok(Self { socket, address: found, bones, n_sent: 0, n_dropped: 0, n_refused: 0 })
+        Ok(Self { socket, address: found, bones: Arc::default(), n_sent: 0, n_dropped: 0, n_refused: 0 })
+    }
+
+    #[must_use]
+    pub fn with_bones(self, bones: Arc<[HumanoidBone]>) -> Self {
+        Self { bones, ..self }
     }
 }
 

@@ -72,8 +72,8 @@ async fn next_event(poses: &mut Receiver<Arc<str>>, n_missed: &AtomicU64) -> Opt
 
 impl PoseSink for LiveFeed {
     fn send(&mut self, pose: &TimedPose) {
-        self.n_sent += 1;
         if self.poses.receiver_count() > 0 {
+            self.n_sent += 1;
             let _ = self.poses.send(pose_json(&self.bones, pose).to_string().into());
         }
     }

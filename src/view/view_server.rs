@@ -33,7 +33,7 @@ const POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self'; m
     connect-src 'self' blob: data:; img-src 'self' data: blob:; base-uri 'none'; form-action 'none'; \
     frame-ancestors 'none'";
 const PERMISSIONS: &str = "camera=(), microphone=(self), geolocation=(), display-capture=(), usb=()";
-const MISDIRECTED: &str = "Open the address that `orator view` printed.";
+const MISDIRECTED: &str = "Open the address that the program printed.";
 /// Time limit for a request up to the start of its reply, including reading an uploaded sound.
 const REQUEST_TIMEOUT: Duration = Duration::from_secs(600);
 /// Number of requests that read the arrays of a video at the same time, which bounds memory.
@@ -53,7 +53,8 @@ pub struct ViewRequest {
 /// State shared by the request handlers.
 struct Viewer {
     request: ViewRequest,
-    results: Results,
+    /// Of a project.
+    results: Option<Results>,
     readers: Arc<Semaphore>,
 }
 
@@ -68,7 +69,7 @@ pub fn run(request: ViewRequest, address: SocketAddr, on_listening: impl FnOnce(
     ensure!(address.ip().is_loopback(), "{} is not a loopback address", address.ip());
     let token = hex(&random::<16>()?);
     let hosts = AllowedHosts::new(address.ip(), &[], MISDIRECTED)?;
-    let results = Results::start(request.program.clone())?;
+    let results = request.project.as_ref().map(|_| Results::start(request.program.clone())).transpose()?;
     let readers = Arc::new(Semaphore::new(MAX_READERS));
     let router = router(Viewer { request, results, readers }, &token);
     let router = secured(router, hosts, [POLICY, PERMISSIONS], REQUEST_TIMEOUT);
@@ -231,7 +232,7 @@ async fn curves(State(viewer): Shared, Query(query): Query<TrainingQuery>) -> Re
 
 /// Generated and true motion of a clip of the speaker's dataset, by the newest checkpoint.
 async fn pair(State(viewer): Shared, Query(query): Query<TrainingQuery>) -> Reply {
-    let results = viewer.results.clone();
+    let results = results_of(&viewer)?.clone();
     of_project(viewer, move |project| {
         let checkpoint_file = training::newest_checkpoint(project.work(), &query.name)?;
         let (speaker, dataset) = training::dataset(project.work(), &query.name, &checkpoint_file)?;
@@ -274,23 +275,27 @@ async fn generate(State(viewer): Shared, Query(query): Query<GenerateQuery>, req
         let GenerateQuery { checkpoint, seed, speaker, name } = query;
         let checkpoint_file = checkpoint_file(&training::folder(project.work(), &checkpoint)?)?;
         let request = ResultRequest { checkpoint, checkpoint_file, seed, speaker, name };
-        viewer.results.add(request).map(Some)
+        viewer.results.as_ref().map(|results| results.add(request)).transpose()
     });
     let pending = added.await?.ok_or_else(unknown)?;
     save_body(request, &pending.sound).await?;
     Ok(json_reply(&json!({ "id": pending.generate() })))
 }
 
-async fn results(State(viewer): Shared) -> HttpResponse {
-    json_reply(&viewer.results.facts())
+fn results_of(viewer: &Viewer) -> Result<&Results, ApiError> {
+    viewer.results.as_ref().ok_or_else(unknown)
+}
+
+async fn results(State(viewer): Shared) -> Reply {
+    Ok(json_reply(&results_of(&viewer)?.facts()))
 }
 
 async fn film(State(viewer): Shared, Path(id): Path<String>) -> Reply {
-    if viewer.results.film(&id) { Ok(json_reply(&json!({ "queued": true }))) } else { Err(unknown()) }
+    if results_of(&viewer)?.film(&id) { Ok(json_reply(&json!({ "queued": true }))) } else { Err(unknown()) }
 }
 
 async fn result_file(State(viewer): Shared, Path((id, file)): Path<(String, String)>, request: Request) -> Reply {
-    let path = viewer.results.file(&id, &file).ok_or_else(unknown)?;
+    let path = results_of(&viewer)?.file(&id, &file).ok_or_else(unknown)?;
     Ok(serve_file(&path, request).await)
 }
 

@@ -142,8 +142,9 @@ impl GestureGenerator {
         let n_frames = self.n_frames(n_samples)?;
         let n_of = move |first: usize| chunk.min(n_frames - first);
         if self.metadata.network.look_ahead.is_some() {
-            let chunks = self.live_features(pieces, chunk)?.zip((0..n_frames).step_by(chunk));
-            return Ok(Box::new(chunks.map(move |(poses, first)| Ok(poses?.slice_move(s![.., ..n_of(first)])))));
+            let chunk = chunk.min(n_frames);
+            let chunks = (0..n_frames).step_by(chunk).zip(self.live_features(pieces, chunk)?);
+            return Ok(Box::new(chunks.map(move |(first, poses)| Ok(poses?.slice_move(s![.., ..n_of(first)])))));
         }
         let padded = (n_frames / FRAMES_MULTIPLE + 1) * FRAMES_MULTIPLE;
         let n_mel_frames = mel_frames(self.fps(), padded);
@@ -208,9 +209,7 @@ impl<I: Iterator<Item = Result<Vec<f32>>>> MelStream<I> {
     /// Log-mels [1, 64, T] of these spectrogram frames. Successive ranges may overlap, but starts must not decrease.
     pub fn log_mels(&mut self, frames: Range<usize>) -> Result<Tensor> {
         let first = frames.start * mel::HOP;
-        let mels = mel::log_mel(&self.mirrored(first..first + mel::n_samples(frames.len()))?);
-        let shape = (1, mel::N_MELS, frames.len());
-        Ok(Tensor::from_iter(mels.t().iter().copied(), &Device::Cpu)?.reshape(shape)?)
+        log_mel_tensor(&self.mirrored(first..first + mel::n_samples(frames.len()))?)
     }
 
     /// These samples of the sound extended periodically by its mirror image.
@@ -238,6 +237,13 @@ impl<I: Iterator<Item = Result<Vec<f32>>>> MelStream<I> {
     }
 }
 
+/// Log-mels [1, 64, T] of these samples.
+pub(super) fn log_mel_tensor(samples: &[f32]) -> Result<Tensor> {
+    let mels = mel::log_mel(samples);
+    let shape = (1, mel::N_MELS, mels.nrows());
+    Ok(Tensor::from_iter(mels.t().iter().copied(), &Device::Cpu)?.reshape(shape)?)
+}
+
 /// Period in samples of a sound that is extended by its mirror image.
 fn period(n_samples: usize) -> usize {
     (2 * n_samples).saturating_sub(2).max(1)
@@ -256,6 +262,15 @@ mod tests {
     fn stream(samples: &[f32], piece: usize, n_mel_frames: usize) -> MelStream<impl Iterator<Item = Result<Vec<f32>>>> {
         let pieces = samples.chunks(piece).map(|piece| Ok(piece.to_vec())).collect::<Vec<_>>();
         MelStream::new(pieces.into_iter(), samples.len(), n_mel_frames)
+    }
+
+    #[test]
+    fn mel_frames_cover_the_motion() {
+        let fps = FrameRate::new(15, 1);
+        assert_eq!([64, 1_500].map(|n| mel_frames(fps, n)), [427, 10_000]);
+        for (start, n) in [(0, 64), (5, 64), (7, 96), (1_001, 64)] {
+            assert!(mel_frames(fps, start) + mel_frames(fps, n) <= mel_frames(fps, start + n) + 1);
+        }
     }
 
     #[test]

@@ -1,18 +1,32 @@
 //! Generation from speech that is not over yet, by a network with a bounded view of the future: a stream of poses without
 //! end, each computed as soon as the sound that it depends on has arrived.
 
-use super::generator::{GestureGenerator, network_output};
+use super::generator::{GestureGenerator, log_mel_tensor, network_output};
 use anyhow::{Context, Result};
-use candle_core::{Device, Tensor};
+use candle_core::Tensor;
 use ndarray::Array2;
 use orator_base::audio::mel;
+use orator_base::types::sound::SAMPLE_RATE;
+use orator_base::types::time::FrameRate;
+use orator_nn::gan::generator::Preset;
 use orator_nn::gan::look_ahead::LookAhead;
-use orator_nn::gan::streaming::StreamingGenerator;
+use orator_nn::gan::streaming::{FRAMES_READ_AHEAD, StreamingGenerator};
 use std::ops::Range;
 
 /// Number of pose frames of a stream "without end", two months at 15 fps; and of its spectrogram frames.
 const MAX_FRAMES: usize = 1 << 26;
 const MAX_MEL_FRAMES: usize = 1 << 30;
+
+/// Smallest and largest view of the future, seconds.
+pub const LOOK_AHEAD_SECS: [f64; 2] = [0.25, 2.0];
+const MELS_PER_SEC: usize = SAMPLE_RATE as usize / mel::HOP;
+
+/// View of the future of `secs` for poses at `fps`.
+pub fn look_ahead(preset: Preset, secs: f64, fps: FrameRate) -> LookAhead {
+    let mels_per_frame = (MELS_PER_SEC * fps.den as usize, fps.num as usize);
+    let window = mel::WINDOW as f64 / mel::HOP as f64;
+    LookAhead::new(preset, secs, mels_per_frame, MELS_PER_SEC as f64, window)
+}
 
 impl GestureGenerator {
     /// View of the future of the network.
@@ -21,9 +35,10 @@ impl GestureGenerator {
     /// A network that reads the complete speech.
     pub fn look_ahead(&self) -> Result<LookAhead> {
         self.metadata.network.look_ahead.with_context(|| {
+            let secs = self.fps().secs(FRAMES_READ_AHEAD);
             format!(
-                "the model of {} reads 6.5 s of speech after each pose, so it cannot follow speech that is not over yet: \
-                 train one with `--set gan.look_ahead_secs=0.5`",
+                "the model of {} reads {secs:.1} s of speech after each pose, so it cannot follow speech that is not over \
+                 yet: train one with `--set gan.look_ahead_secs=0.5`",
                 self.name()
             )
         })
@@ -76,8 +91,6 @@ impl<I: Iterator<Item = Result<Vec<f32>>>> OpenSound<I> {
         let unused = start.checked_sub(self.first).context("spectrogram frames were requested out of order")?;
         self.samples.drain(..unused);
         self.first = start;
-        let mels = mel::log_mel(&self.samples[..end - start]);
-        let shape = (1, mel::N_MELS, frames.len());
-        Ok(Tensor::from_iter(mels.t().iter().copied(), &Device::Cpu)?.reshape(shape)?)
+        log_mel_tensor(&self.samples[..end - start])
     }
 }

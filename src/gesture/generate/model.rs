@@ -1,5 +1,6 @@
 //! Checkpoints of the GAN generator: the metadata that generation needs, and loading of the network.
 
+use super::live::{LOOK_AHEAD_SECS, look_ahead};
 use super::normalisation::Normalisation;
 use super::representation::Representation;
 use super::seq2seq::metadata::is_sequence_kind;
@@ -237,6 +238,13 @@ pub fn build(contents: &Contents, device: &Device) -> Result<(SpeakerMetadata, G
     ensure!(metadata.words.iter().all(|words| words.vocabulary.is_sorted()), "the vocabulary is not sorted");
     contents.expect_numbers((network.width * network.width).max(network.vocabulary * network.word))?;
     ensure!(fps.is_plausible(), "the frame rate is {fps}, expected 1 to 1000 fps");
+    if let Some(of) = network.look_ahead {
+        let [low, high] = LOOK_AHEAD_SECS;
+        ensure!(
+            (low..=high).contains(&of.secs) && of == look_ahead(network.preset, of.secs, fps),
+            "invalid view of the future: {of:?}"
+        );
+    }
     metadata.normalisation.check()?;
     metadata.representation.check()?;
     let mut params = Params::frozen().on(device);

@@ -23,8 +23,10 @@ const PIECE: usize = 256;
 /// even and odd lengths alike (both pad one position at the start); the last layer of `paper` is not padded and reads
 /// `i..=i + 2`.
 const AUDIO_BEFORE: usize = 22;
-/// Number of frames before and after 32 pose frames that the UNet reads for them: 97, rounded up to complete pieces.
-const MARGIN: usize = 97usize.next_multiple_of(FRAMES_MULTIPLE);
+/// Number of frames before and after 32 pose frames that the UNet reads for them.
+pub const FRAMES_READ_AHEAD: usize = 97;
+/// This number, rounded up to complete pieces.
+const MARGIN: usize = FRAMES_READ_AHEAD.next_multiple_of(FRAMES_MULTIPLE);
 /// Number of frames before a pose frame that the UNet reads with a bounded view of the future, rounded up likewise: 8 for
 /// the decoder and 4 for `enter`, and `n -> 2 n + 6` for each of the 5 levels in between.
 const CAUSAL_MARGIN: usize = 198usize.next_multiple_of(FRAMES_MULTIPLE);
@@ -65,7 +67,8 @@ pub struct StreamingGenerator<'a, M> {
 impl<'a, M: FnMut(Range<usize>) -> Result<Tensor>> StreamingGenerator<'a, M> {
     /// Creates a stream that converts `n_mel_frames` of sound to `n_frames` of poses, `chunk` at a time. The generator
     /// is one for a single speaker. `mels` is called with successive ranges of spectrogram frames. `n_frames` and
-    /// `chunk` are multiples of 32, and `n_frames` covers the same time as the sound.
+    /// `chunk` are multiples of 32, and `n_frames` covers the same time as the sound; with a bounded view of the future,
+    /// `chunk` may be any number, and both numbers of frames only limit the stream.
     pub fn new(
         generator: &'a Generator,
         preset: Preset,

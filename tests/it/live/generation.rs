@@ -52,7 +52,7 @@ fn frame_by_frame_equals_the_whole_sound_and_needs_no_later_sound() -> anyhow::R
 }
 
 #[test]
-fn complete_networks_and_other_layouts_are_refused() -> anyhow::Result<()> {
+fn complete_networks_are_refused() -> anyhow::Result<()> {
     let dir = tempfile::tempdir()?;
     let file = dir.path().join("complete.safetensors");
     crate::fixtures::models::untrained::write_untrained_speaker(&file);

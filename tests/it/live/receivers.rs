@@ -81,7 +81,7 @@ fn receivers_that_are_missing_or_stuck_delay_nobody() -> anyhow::Result<()> {
     let generator = GestureGenerator::open(&model)?;
     let mut body = LiveBody::new(&generator.metadata);
     let closed = UdpSocket::bind("127.0.0.1:0")?.local_addr()?.to_string();
-    let mut vmc = VmcSocket::connect(&closed, body.bones.clone())?;
+    let mut vmc = VmcSocket::connect(&closed)?.with_bones(body.bones.clone());
     let mut lines = JsonLines::new(Stuck, body.bones.clone());
     let pose = TimedPose { secs: 1.0, pose: body.pose(&Array2::zeros((144, 1)), 1.0)? };
     let started = Instant::now();

@@ -10,7 +10,8 @@ use orator_base::stage::progress::Silent;
 use orator_base::types::sound::Sound;
 use orator_gesture::generate::GestureGenerator;
 use orator_live::pose::{HumanoidPose, LiveBody};
-use orator_live::session::{self, LiveSource, PoseSink, SinkFacts, TimedPose};
+use orator_live::session::{self, PoseSink, SinkFacts, TimedPose};
+use orator_live::sound::LiveSound;
 use std::io::{BufRead, BufReader};
 use std::path::Path;
 use std::process::{Command, Output, Stdio};
@@ -66,7 +67,12 @@ fn poses_are_those_of_the_complete_sound_and_rest_in_silence() -> anyhow::Result
     let body = LiveBody::new(&generator.metadata);
     let (rig, is_bone) = (body.rig.clone(), body.rig.skeleton.joints.iter().map(|joint| !joint.end));
     let is_bone: Vec<bool> = is_bone.collect();
-    let report = session::run(&generator, body, LiveSource::File(wav), &mut [&mut collected], &Silent)?;
+    let report = {
+        let speech = LiveSound::default();
+        let reader = speech.clone();
+        std::thread::spawn(move || reader.read_file(&wav));
+        session::run(&generator, body, (&speech, true), &mut [&mut collected], &Silent)?
+    };
     eprintln!("{report:?}");
     let poses = &collected.poses;
     assert!(collected.is_finished && report.outputs[0].n_sent == poses.len() as u64);
@@ -92,7 +98,6 @@ fn poses_are_those_of_the_complete_sound_and_rest_in_silence() -> anyhow::Result
     let jumps = steps.iter().copied().fold(0.0, f64::max);
     eprintln!("largest step between poses: {jumps} degrees");
     assert!(jumps < 5.0, "{jumps} degrees");
-    assert!(report.drift_ms.abs() < 1000.0 / 15.0 || report.n_omitted > 0, "{report:?}");
     Ok(())
 }
 

@@ -4,16 +4,15 @@
 use super::losses::BoneConstancy;
 use super::pretrained;
 use super::windows::WindowLoader;
+use crate::generate::live;
 use crate::generate::model::SpeakerMetadata;
 use crate::generate::normalisation::{ChannelNormalisation, Normalisation};
 use crate::generate::representation::{PoseDecoder, Representation};
 use anyhow::{Context, Result, bail, ensure};
 use candle_core::{DType, Device, Tensor};
-use orator_base::audio::mel;
 use orator_base::motion::bones;
 use orator_base::types::posture::PostureChannel;
 use orator_base::types::skeleton::N_BONES;
-use orator_base::types::sound::SAMPLE_RATE;
 use orator_base::types::time::FrameRate;
 use orator_dataset::config::{BoneLoss, GanSettings, MotionRepresentation, NetworkPreset};
 use orator_dataset::{Dataset, Split};
@@ -154,7 +153,6 @@ pub fn normalisation_with_channels(dataset: &Dataset, wanted: &[PostureChannel])
     Ok(Normalisation { channels: channels(dataset, wanted)?, ..normalisation(dataset)? })
 }
 
-const MELS_PER_SEC: usize = SAMPLE_RATE as usize / mel::HOP;
 /// Frames read at a time for statistics of all poses.
 const PART_FRAMES: usize = 4096;
 
@@ -222,10 +220,8 @@ pub fn network(preset: NetworkPreset, n_out: usize) -> Config {
 /// View of the future of a network with these settings; `None`: the complete speech.
 pub fn look_ahead(settings: &GanSettings, fps: FrameRate) -> Option<LookAhead> {
     let Config { preset, .. } = network(settings.preset, 0);
-    let mels_per_frame = (MELS_PER_SEC * fps.den as usize, fps.num as usize);
-    let window = mel::WINDOW as f64 / mel::HOP as f64;
     let secs = settings.look_ahead_secs;
-    (secs > 0.0).then(|| LookAhead::new(preset, secs, mels_per_frame, MELS_PER_SEC as f64, window))
+    (secs > 0.0).then(|| live::look_ahead(preset, secs, fps))
 }
 
 fn channels(dataset: &Dataset, wanted: &[PostureChannel]) -> Result<Vec<ChannelNormalisation>> {

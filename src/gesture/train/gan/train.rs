@@ -10,6 +10,7 @@ use super::step::{GanTrainer, Losses, StepBatch, TrainerState};
 use super::validate::ValidationIntervals;
 use super::windows::{JoinedWindows, WindowLoader, needed};
 use super::{augment, speakers, words};
+use crate::generate::live::LOOK_AHEAD_SECS;
 pub use crate::generate::model::BEST;
 use crate::generate::model::SpeakerMetadata;
 use crate::generate::normalisation::Normalisation;
@@ -47,8 +48,6 @@ impl Default for TrainingStart<'_> {
     }
 }
 
-/// Smallest view of the future with which a network can follow the speech.
-const MIN_LOOK_AHEAD_SECS: f64 = 0.25;
 /// Largest number of threads that read batches for a GPU.
 const MAX_READERS: usize = 8;
 
@@ -334,8 +333,10 @@ fn check(settings: &GanConfig) -> Result<()> {
     );
     let secs = settings.look_ahead_secs;
     ensure!(
-        secs == 0.0 || secs >= MIN_LOOK_AHEAD_SECS,
-        "gan.look_ahead_secs is {secs}: expected {MIN_LOOK_AHEAD_SECS} to 2, or 0 for a network that reads the whole speech"
+        secs == 0.0 || secs >= LOOK_AHEAD_SECS[0],
+        "gan.look_ahead_secs is {secs}: expected {} to {}, or 0 for a network that reads the whole speech",
+        LOOK_AHEAD_SECS[0],
+        LOOK_AHEAD_SECS[1]
     );
     ensure!(
         secs == 0.0 || !settings.words,

@@ -22,6 +22,8 @@ use orator_nn::gan::words::WordFrames;
 use rayon::prelude::*;
 use std::ops::Range;
 
+/// Largest number of spectrogram frames of a window for a bounded view of the future that are mirrored.
+const MAX_MIRRORED_MELS: i64 = 20;
 /// Largest number of bytes of intervals that are cached in memory.
 pub const CACHE_BYTES: usize = 384 << 20;
 
@@ -102,9 +104,17 @@ impl<'d> WindowLoader<'d> {
     }
 
     /// Moves the sound of all windows for a network with this view of the future. Sound beyond an interval is its mirror
-    /// image.
+    /// image, in windows at most 0.2 s of it.
     pub fn with_look_ahead(mut self, look_ahead: Option<LookAhead>) -> Self {
         self.sound_shift = look_ahead.map_or(0, |of| of.shift);
+        let n_beyond = (self.sound_shift - MAX_MIRRORED_MELS).max(0) as usize;
+        let mut starts = self.starts.clone();
+        let end = |start: usize| mel_frames(self.fps, start + self.n_frames) + n_beyond;
+        starts.retain(|(interval, start)| end(*start) <= self.intervals.n_mels(*interval));
+        // Intervals of one window each have no others.
+        if !starts.is_empty() {
+            self.starts = starts;
+        }
         self
     }
 
@@ -379,20 +389,4 @@ fn joined(parts: &[WindowBatch]) -> Result<WindowBatch> {
 
 fn mask_row(feature: usize) -> usize {
     if feature < N_FEATURES { feature / 3 } else { feature - N_FEATURES + N_BONES }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn mel_frames_cover_the_motion() {
-        let fps = FrameRate::new(15, 1);
-        assert_eq!(mel_frames(fps, 64), 427);
-        assert_eq!(mel_frames(fps, 1_500), 10_000);
-        for (start, n) in [(0, 64), (5, 64), (7, 96), (1_001, 64)] {
-            let total = mel_frames(fps, start + n) + 1;
-            assert!(mel_frames(fps, start) + mel_frames(fps, n) <= total);
-        }
-    }
 }
