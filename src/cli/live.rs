@@ -31,7 +31,7 @@ use std::sync::mpsc::channel;
 /// Unity), --lines as JSON, --page to a page with the avatar. Silence is inserted while speech is late; after a second
 /// of silence the avatar comes to rest.
 ///
-/// The model must be trained with a bounded view of the future: `orator train gan --set gan.look_ahead_secs=0.5`. The
+/// The model must be trained with a limited look-ahead: `orator train gan --set gan.look_ahead_secs=0.5`. The
 /// motion follows the speech by this time and 0.17 s. `orator guide live` has microphones, avatars and voice agents.
 #[derive(clap::Args)]
 pub struct Args {

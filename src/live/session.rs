@@ -205,7 +205,7 @@ impl PoseClock {
                 sinks.iter_mut().for_each(|sink| sink.send(&TimedPose { secs, pose: pose.clone() }));
             }
             tick += 1;
-            if tick % RATE == 0 {
+            if tick.is_multiple_of(RATE) {
                 task.advance(1);
                 let of_sinks =
                     sinks.iter().map(|sink| sink.facts()).filter_map(|facts| Some((facts.name, facts.note?)));

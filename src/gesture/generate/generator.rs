@@ -131,7 +131,7 @@ impl GestureGenerator {
 
     /// Raw network output [features, T] in chunks of at most `chunk` frames, which [`SpeakerMetadata::motion`] converts
     /// to motion, for sound pieces as in [`Self::motion_from_stream`]. The sound is extended by its mirror image to a
-    /// multiple of 32 frames; for a network with a bounded view of the future by silence.
+    /// multiple of 32 frames; for a network with a limited look-ahead by silence.
     pub fn features<'a>(
         &'a self,
         pieces: impl Iterator<Item = Result<Vec<f32>>> + 'a,

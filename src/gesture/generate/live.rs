@@ -1,4 +1,4 @@
-//! Generation from speech that is not over yet, by a network with a bounded view of the future: a stream of poses without
+//! Generation from speech that is not over yet, by a network with a limited look-ahead: a stream of poses without
 //! end, each computed as soon as the sound that it depends on has arrived.
 
 use super::generator::{GestureGenerator, log_mel_tensor, network_output};
@@ -17,11 +17,11 @@ use std::ops::Range;
 const MAX_FRAMES: usize = 1 << 26;
 const MAX_MEL_FRAMES: usize = 1 << 30;
 
-/// Smallest and largest view of the future, seconds.
+/// Smallest and largest look-ahead, seconds.
 pub const LOOK_AHEAD_SECS: [f64; 2] = [0.25, 2.0];
 const MELS_PER_SEC: usize = SAMPLE_RATE as usize / mel::HOP;
 
-/// View of the future of `secs` for poses at `fps`.
+/// Look-ahead of `secs` for poses at `fps`.
 pub fn look_ahead(preset: Preset, secs: f64, fps: FrameRate) -> LookAhead {
     let mels_per_frame = (MELS_PER_SEC * fps.den as usize, fps.num as usize);
     let window = mel::WINDOW as f64 / mel::HOP as f64;
@@ -29,7 +29,7 @@ pub fn look_ahead(preset: Preset, secs: f64, fps: FrameRate) -> LookAhead {
 }
 
 impl GestureGenerator {
-    /// View of the future of the network.
+    /// Look-ahead of the network.
     ///
     /// # Errors
     /// A network that reads the complete speech.

@@ -27,7 +27,7 @@ use std::path::{Path, PathBuf};
 pub const GENERATOR: &str = "generator.";
 /// Name and version of the checkpoint layout; any other is rejected.
 const KIND: &str = "orator speaker 2";
-/// That of a network with a bounded view of the future, which earlier versions of the program would run as a complete one.
+/// That of a network with a limited look-ahead, which earlier versions of the program would run as a complete one.
 const BOUNDED_KIND: &str = "orator speaker 3";
 const SKELETON: &str = "49 joints, house order";
 /// Largest accepted number of channels; the published network has 256.
@@ -242,7 +242,7 @@ pub fn build(contents: &Contents, device: &Device) -> Result<(SpeakerMetadata, G
         let [low, high] = LOOK_AHEAD_SECS;
         ensure!(
             (low..=high).contains(&of.secs) && of == look_ahead(network.preset, of.secs, fps),
-            "invalid view of the future: {of:?}"
+            "the look-ahead of the network is invalid: {of:?}; expected {low} to {high} s, and what follows from it"
         );
     }
     metadata.normalisation.check()?;

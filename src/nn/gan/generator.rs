@@ -69,7 +69,7 @@ pub struct Config {
     pub vocabulary: usize,
     #[serde(default, skip_serializing_if = "is_zero")]
     pub word: usize,
-    /// Bounded view of the future; `None`: the complete network.
+    /// Limited look-ahead; `None`: the complete network.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub look_ahead: Option<LookAhead>,
 }

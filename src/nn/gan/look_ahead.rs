@@ -1,4 +1,4 @@
-//! Bounded view of the future, for gestures to speech that is not over yet: the UNet reads only earlier frames (zeros
+//! Limited look-ahead, for gestures to speech that is not over yet: the UNet reads only earlier frames (zeros
 //! before the input of its convolutions, repeated frames delayed by one), and the sound is moved so that the audio encoder
 //! ends its view at the chosen time. The audio encoder itself is unchanged.
 
@@ -18,7 +18,7 @@ pub struct LookAhead {
 }
 
 impl LookAhead {
-    /// View of the future of `secs` seconds for a network with `mels_per_frame` spectrogram frames per pose frame
+    /// Look-ahead of `secs` seconds for a network with `mels_per_frame` spectrogram frames per pose frame
     /// (numerator and denominator), `mels_per_sec` per second, each of `window` frames of sound.
     pub fn new(preset: Preset, secs: f64, mels_per_frame: (usize, usize), mels_per_sec: f64, window: f64) -> Self {
         // A pose is interpolated between two results of the encoder, and the second may be one further.

@@ -1,5 +1,5 @@
 //! The networks of the speech-to-gesture GAN: audio encoder and motion UNet (`generator`) with speaker-specific layers
-//! (`speaker_layer`), word input (`words`) and a bounded view of the future (`look_ahead`), motion discriminator, and the
+//! (`speaker_layer`), word input (`words`) and a limited look-ahead (`look_ahead`), motion discriminator, and the
 //! generator run in chunks (`streaming`).
 
 pub mod discriminator;

@@ -1,7 +1,7 @@
 //! The generator for sound of any length in constant memory: audio encoder and UNet run piece by piece, each piece
 //! with enough context that the padding at its ends does not affect the part that is used. Pieces start at multiples
 //! of all strides, and the resize between encoder and UNet counts from the start of the sound, so the result equals
-//! that of one pass. With a bounded view of the future (`look_ahead`) no sound is read before it is needed, so the
+//! that of one pass. With a limited look-ahead (`look_ahead`) no sound is read before it is needed, so the
 //! length of the sound may be unknown, and a chunk may have any number of frames.
 
 use super::generator::{FRAMES_MULTIPLE, Generator, Preset};
@@ -27,7 +27,7 @@ const AUDIO_BEFORE: usize = 22;
 pub const FRAMES_READ_AHEAD: usize = 97;
 /// This number, rounded up to complete pieces.
 const MARGIN: usize = FRAMES_READ_AHEAD.next_multiple_of(FRAMES_MULTIPLE);
-/// Number of frames before a pose frame that the UNet reads with a bounded view of the future, rounded up likewise: 8 for
+/// Number of frames before a pose frame that the UNet reads with a limited look-ahead, rounded up likewise: 8 for
 /// the decoder and 4 for `enter`, and `n -> 2 n + 6` for each of the 5 levels in between.
 const CAUSAL_MARGIN: usize = 198usize.next_multiple_of(FRAMES_MULTIPLE);
 
@@ -67,7 +67,7 @@ pub struct StreamingGenerator<'a, M> {
 impl<'a, M: FnMut(Range<usize>) -> Result<Tensor>> StreamingGenerator<'a, M> {
     /// Creates a stream that converts `n_mel_frames` of sound to `n_frames` of poses, `chunk` at a time. The generator
     /// is one for a single speaker. `mels` is called with successive ranges of spectrogram frames. `n_frames` and
-    /// `chunk` are multiples of 32, and `n_frames` covers the same time as the sound; with a bounded view of the future,
+    /// `chunk` are multiples of 32, and `n_frames` covers the same time as the sound; with a limited look-ahead,
     /// `chunk` may be any number, and both numbers of frames only limit the stream.
     pub fn new(
         generator: &'a Generator,

@@ -1,4 +1,4 @@
-//! Generation by a network with a bounded view of the future.
+//! Generation by a network with a limited look-ahead.
 
 use crate::fixtures::models::untrained::write_bounded_speaker;
 use crate::generate::onnx_export::sound;

@@ -5,3 +5,4 @@ mod page;
 mod receivers;
 mod session;
 mod sound;
+mod training;

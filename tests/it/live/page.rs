@@ -48,14 +48,15 @@ fn a_voice_agent_gestures_in_the_page() {
     let mut command = Command::new("node");
     command.args(["tests/it/live/browser/live.mjs", "--url", &url]).env("ORATOR_DRIVER", driver);
     let mut page = command.stdout(Stdio::piped()).spawn().unwrap();
+    let mut lines = BufReader::new(page.stdout.take().unwrap()).lines().map_while(Result::ok);
+    assert_eq!(lines.next().as_deref(), Some("ready"));
     for sentence in ["Hello, I am a voice agent and I talk about many things.", "A second sentence, a little later."] {
         writeln!(sentences, "{sentence}").unwrap();
         thread::sleep(Duration::from_secs(6));
     }
     drop(sentences);
     let agent = agent.wait().unwrap();
-    let mut report = String::new();
-    std::io::Read::read_to_string(&mut page.stdout.take().unwrap(), &mut report).unwrap();
+    let report = lines.next().unwrap_or_default();
     assert!(page.wait().unwrap().success() && agent.success(), "{report}");
     let report: Value = serde_json::from_str(&report).unwrap();
     eprintln!("{report}");

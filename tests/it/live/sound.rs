@@ -92,7 +92,7 @@ fn late_speech_is_replaced_by_silence_and_follows_it() {
 #[test]
 fn a_rate_that_is_too_low_is_reported() {
     // 20 ms of sound every 45 ms, so that every second piece is silence.
-    let source = Source { bytes: Cursor::new(ramp(30 * PIECE)), n: 2 * PIECE, pause: Duration::from_millis(45) };
+    let source = Source { bytes: Cursor::new(ramp(90 * PIECE)), n: 2 * PIECE, pause: Duration::from_millis(45) };
     let (_, facts, _) = taken(source, Some(Instant::now()));
     assert!(facts.notes.len() == 1 && facts.notes[0].contains("below 16 kHz"), "{facts:?}");
 }

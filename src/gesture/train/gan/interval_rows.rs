@@ -122,7 +122,7 @@ pub(super) fn mirrored(at: f64, last: f64) -> f64 {
 }
 
 /// Smallest range that contains these indices.
-pub(super) fn covered(indices: &[usize]) -> Range<usize> {
+pub(super) fn range_of(indices: &[usize]) -> Range<usize> {
     let [low, high] = [indices.iter().min(), indices.iter().max()];
     low.copied().unwrap_or(0)..high.map_or(0, |high| high + 1)
 }

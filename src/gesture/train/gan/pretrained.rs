@@ -87,7 +87,7 @@ impl PretrainedModel {
         let secs = |of: &Config| of.look_ahead.map_or(0.0, |of| of.secs);
         ensure!(
             secs(own) == secs(other),
-            "{} has a view of the future of {} s (0: all), this training of {} s: set gan.look_ahead_secs = {}",
+            "{} has a look-ahead of {} s (0: the whole speech), this training of {} s: set gan.look_ahead_secs = {}",
             self.path.display(),
             secs(other),
             secs(own),

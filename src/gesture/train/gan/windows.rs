@@ -1,7 +1,7 @@
 //! Training data: windows of the intervals of a split, as batches of normalised poses and log-mels.
 
 use super::augment::{self, WindowChange, WindowRows};
-use super::interval_rows::{IntervalRows, TrainingIntervals, between, covered, mirrored};
+use super::interval_rows::{IntervalRows, TrainingIntervals, between, mirrored, range_of};
 use crate::generate::generator::mel_frames;
 use crate::generate::normalisation::{N_FEATURES, Normalisation};
 use crate::generate::seq2seq::architecture::{NumberedWord, Vocabulary};
@@ -22,7 +22,7 @@ use orator_nn::gan::words::WordFrames;
 use rayon::prelude::*;
 use std::ops::Range;
 
-/// Largest number of spectrogram frames of a window for a bounded view of the future that are mirrored.
+/// Largest number of spectrogram frames of a window for a limited look-ahead that are mirrored.
 const MAX_MIRRORED_MELS: i64 = 20;
 /// Largest number of bytes of intervals that are cached in memory.
 pub const CACHE_BYTES: usize = 384 << 20;
@@ -103,7 +103,7 @@ impl<'d> WindowLoader<'d> {
         Ok(Self { fps, n_frames, n_features, normal, intervals, starts, words, sound_shift: 0 })
     }
 
-    /// Moves the sound of all windows for a network with this view of the future. Sound beyond an interval is its mirror
+    /// Moves the sound of all windows for a network with this look-ahead. Sound beyond an interval is its mirror
     /// image, in windows at most 0.2 s of it.
     pub fn with_look_ahead(mut self, look_ahead: Option<LookAhead>) -> Self {
         self.sound_shift = look_ahead.map_or(0, |of| of.shift);
@@ -161,7 +161,7 @@ impl<'d> WindowLoader<'d> {
         let (first, n_mels) = (mel_frames(self.fps, frames.start), mel_frames(self.fps, frames.len()));
         let n_padded = mel_frames(self.fps, frames.len().next_multiple_of(FRAMES_MULTIPLE)).max(n_mels);
         let sources = self.mel_sources(interval, first, n_padded);
-        let rows = self.intervals.rows(interval, frames.clone(), covered(&sources))?;
+        let rows = self.intervals.rows(interval, frames.clone(), range_of(&sources))?;
         let IntervalRows { features, mask, mels, first_frame, first_mel } = &*rows;
         let words =
             self.words_of(&[(interval, frames.start as f64, 1.0)], frames.len().next_multiple_of(FRAMES_MULTIPLE))?;
@@ -251,7 +251,7 @@ impl<'d> WindowLoader<'d> {
         };
         let frames = between(at(0), last).0..between(at(n - 1), last).1 + 1;
         let ends: Vec<usize> = (0..n_mels).map(|t| between(mel_at(t), last_mel)).flat_map(|(a, b, _)| [a, b]).collect();
-        let mel_range = covered(&ends);
+        let mel_range = range_of(&ends);
         let rows = self.intervals.rows(interval, frames, mel_range)?;
         let IntervalRows { features, mask, mels, .. } = &*rows;
         let mut poses = Array2::zeros((self.n_features, n));
@@ -297,7 +297,7 @@ impl<'d> WindowLoader<'d> {
         let read = |i: &usize| {
             let (interval, start) = self.starts[*i];
             let sources = self.mel_sources(interval, mel_frames(self.fps, start), n_mels);
-            let rows = self.intervals.rows(interval, start..start + self.n_frames, covered(&sources))?;
+            let rows = self.intervals.rows(interval, start..start + self.n_frames, range_of(&sources))?;
             anyhow::Ok((rows, start, sources))
         };
         for (rows, start, sources) in which.par_iter().map(read).collect::<Result<Vec<_>>>()? {

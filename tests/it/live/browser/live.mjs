@@ -1,4 +1,4 @@
-// Watches the page of `orator live` until the speech ends. Prints one line of JSON.
+// Watches the page of `orator live` until the speech ends. Prints `ready` and a line of JSON.
 //
 //   node live.mjs --url URL [--avatar FILE.vrm] [--width 360] [--scheme dark] [--screenshot FILE]
 
@@ -14,7 +14,9 @@ await visit("live", async ({ page }) => {
     await input.uploadFile(options.avatar);
     await page.waitForFunction(() => document.querySelector("#status").textContent.includes("performs the speech"), { timeout: 60_000 });
   }
-  // Pictures of the avatar, which moves.
+  // Whoever reads this line now speaks, and the avatar moves.
+  console.log("ready");
+  await sleep(4000);
   const canvas = await page.$(".avatar canvas");
   const pictures = new Set();
   for (let n = 0; n < 6; n += 1) {
