@@ -150,6 +150,10 @@ fn text(report: &LiveReport) -> String {
         let silent = sound.n_silent_samples as f64 / f64::from(SAMPLE_RATE);
         text += &format!("speech was late {}; {} of silence inserted\n", counted(sound.n_gaps, "time"), length(silent));
     }
+    if sound.n_skipped_samples > 0 {
+        let skipped = sound.n_skipped_samples as f64 / f64::from(SAMPLE_RATE);
+        text += &format!("{} of pauses skipped, because the speech stayed behind\n", length(skipped));
+    }
     text += &sound.notes.iter().map(|note| format!("note: {note}\n")).collect::<String>();
     for output in outputs {
         text += &format!("{:6} {} poses sent, {} dropped\n", output.name, output.n_sent, output.n_dropped);
