@@ -15,9 +15,9 @@ use std::time::{Duration, Instant};
 
 /// Number of samples per piece, 20 ms.
 pub const PIECE: usize = SAMPLE_RATE as usize / 50;
-/// Number of pieces, 2 s, for which a lag is measured, and the lag in samples, 80 ms, from which quiet pieces are skipped.
-const LAG_PIECES: usize = 100;
-const MAX_LAG: usize = 4 * PIECE;
+/// Seconds of speech over which a lag is measured, and the lag from which quiet pieces are skipped.
+const LAG_SECS: f64 = 2.0;
+const MAX_LAG_SECS: f64 = 0.08;
 /// Root mean square of a quiet piece, -46 dB.
 const QUIET: f32 = 0.005;
 /// Time by which pieces are taken late, after the first seconds, if the network is too slow.
@@ -67,32 +67,36 @@ struct Queue {
     full_secs: f64,
     latest_gaps: VecDeque<Instant>,
     is_in_gap: bool,
+    /// Start of the session, for sound in real time.
+    start: Option<Instant>,
     /// Arrival of the first sample, and time until which a gap goes on after speech has come again.
     first_arrival: Option<Instant>,
     resumes: Option<Instant>,
     lag: LagMeter,
 }
 
-/// Measures over [`LAG_PIECES`] whether a source in real time stays behind.
+/// Measures over [`LAG_SECS`] of speech whether a source in real time stays behind.
 #[derive(Default)]
 struct LagMeter {
-    n_pieces: usize,
+    first: Option<Instant>,
     n_arrived: usize,
     n_waited: usize,
-    least: usize,
+    /// Smallest lag, seconds.
+    least: f64,
     /// Number of samples that may be skipped.
     n_behind: usize,
 }
 
 impl LagMeter {
-    /// Counts a piece that was taken and left this number of samples in the queue.
-    fn add_piece(&mut self, n_left: usize) {
-        self.least = if self.n_pieces == 0 { n_left } else { self.least.min(n_left) };
-        self.n_pieces += 1;
-        if self.n_pieces == LAG_PIECES {
-            let expected = LAG_PIECES * PIECE;
-            let is_in_real_time = self.n_waited == 0 && (expected * 4 / 5..expected * 6 / 5).contains(&self.n_arrived);
-            let n_behind = if is_in_real_time { self.least.saturating_sub(MAX_LAG) } else { 0 };
+    /// Counts `n` samples that arrive now and are used `lag` seconds later than in a session without gaps.
+    fn add(&mut self, n: usize, lag: f64, now: Instant) {
+        let first = *self.first.get_or_insert(now);
+        self.least = if self.n_arrived == 0 { lag } else { self.least.min(lag) };
+        self.n_arrived += n;
+        if self.n_arrived as f64 >= LAG_SECS * f64::from(SAMPLE_RATE) {
+            let speed = secs(self.n_arrived).as_secs_f64() / now.duration_since(first).as_secs_f64().max(1e-3);
+            let is_behind = self.n_waited == 0 && (0.8..1.25).contains(&speed) && self.least > MAX_LAG_SECS;
+            let n_behind = if is_behind { (self.least * f64::from(SAMPLE_RATE)) as usize } else { 0 };
             *self = Self { n_behind, ..Self::default() };
         }
     }
@@ -195,7 +199,11 @@ impl LiveSound {
             if queue.is_in_gap && queue.samples.is_empty() {
                 queue.resumes = Some(now + LATE_LIMIT);
             }
-            queue.lag.n_arrived += part.len();
+            if let Some(start) = queue.start {
+                let place = secs(queue.facts.n_samples + queue.samples.len()).as_secs_f64();
+                let lag = place - now.saturating_duration_since(start).as_secs_f64();
+                queue.lag.add(part.len(), lag, now);
+            }
             queue.samples.extend(part);
             self.shared.changed.notify_all();
         }
@@ -206,6 +214,7 @@ impl LiveSound {
     /// not there in time; without one, pieces wait for the source.
     pub fn pieces(&self, start: Option<Instant>) -> impl Iterator<Item = Result<Vec<f32>>> + use<> {
         let shared = self.shared.clone();
+        shared.lock().start = start;
         let mut end = 0;
         std::iter::from_fn(move || {
             end += PIECE;
@@ -219,12 +228,13 @@ impl LiveSound {
                 queue.full_secs = 0.0;
             }
             loop {
+                skip_quiet(&mut queue);
                 let now = Instant::now();
                 let is_late = due.is_some_and(|due| now >= due);
                 // After a gap, the speech gets its slack again.
                 let is_held = queue.is_in_gap && !queue.is_complete && due < queue.resumes;
                 if (queue.samples.len() >= PIECE && !is_held) || queue.is_complete || is_late {
-                    let piece = take(&mut queue, now, start, is_held);
+                    let piece = take(&mut queue, now, is_held);
                     shared.changed.notify_all();
                     return piece.transpose();
                 }
@@ -273,8 +283,7 @@ fn note_fast(queue: &mut Queue, secs: f64) {
 }
 
 /// The next piece of a queue: full, the rest of a source that has ended, or one completed by silence.
-fn take(queue: &mut Queue, now: Instant, start: Option<Instant>, is_held: bool) -> Result<Option<Vec<f32>>> {
-    skip_quiet(queue);
+fn take(queue: &mut Queue, now: Instant, is_held: bool) -> Result<Option<Vec<f32>>> {
     let n = if is_held { 0 } else { queue.samples.len().min(PIECE) };
     if n < PIECE && queue.is_complete {
         if let Some(error) = queue.error.take() {
@@ -282,7 +291,7 @@ fn take(queue: &mut Queue, now: Instant, start: Option<Instant>, is_held: bool) 
         }
         if n == 0 {
             queue.n_at_end = Some(queue.facts.n_samples);
-            let by_clock = start.zip(queue.ended).map(|(start, ended)| ended.saturating_duration_since(start));
+            let by_clock = queue.start.zip(queue.ended).map(|(start, ended)| ended.saturating_duration_since(start));
             let of_samples = secs(queue.facts.n_samples).as_secs_f64();
             queue.facts.lag_ms = by_clock.map(|by_clock| 1e3 * (of_samples - by_clock.as_secs_f64()));
             return Ok(None);
@@ -301,13 +310,12 @@ fn take(queue: &mut Queue, now: Instant, start: Option<Instant>, is_held: bool) 
     }
     queue.is_in_gap = is_gap;
     queue.facts.n_samples += piece.len();
-    queue.lag.add_piece(queue.samples.len());
     Ok(Some(piece))
 }
 
 /// Skips quiet pieces at the start of the queue while the speech stays behind.
 fn skip_quiet(queue: &mut Queue) {
-    while queue.lag.n_behind >= PIECE && queue.samples.len() > PIECE {
+    while queue.lag.n_behind >= PIECE && queue.samples.len() >= PIECE {
         let power: f32 = queue.samples.iter().take(PIECE).map(|sample| sample * sample).sum();
         if power > QUIET * QUIET * PIECE as f32 {
             return;

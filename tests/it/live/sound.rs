@@ -98,6 +98,44 @@ fn a_rate_that_is_too_low_is_reported() {
 }
 
 #[test]
+fn a_microphone_that_stays_behind_catches_up_in_pauses() {
+    // 0.6 s of silence at once, then 5 s in real time; a tone in the middle is kept.
+    let tone = |i: usize| if (48_000..56_000).contains(&i) { 3000i16 } else { 1 };
+    let bytes: Vec<u8> = (0..90_000).flat_map(|i| tone(i).to_le_bytes()).collect();
+    let (sound, start) = (LiveSound::default(), Instant::now());
+    let reader = sound.clone();
+    let reading = thread::spawn(move || {
+        let burst = bytes.chunks(4096).take(5).map(|chunk| (chunk, 0.0));
+        let steady = bytes[5 * 4096..].chunks(640).zip(1..).map(|(chunk, i)| (chunk, 0.02 * f64::from(i)));
+        let mut chunks = burst.chain(steady).map(|(chunk, at)| {
+            thread::sleep((start + Duration::from_secs_f64(at)).saturating_duration_since(Instant::now()));
+            chunk
+        });
+        reader.read_pcm(Chunks { next: Box::new(|| chunks.next().map(<[u8]>::to_vec)) });
+    });
+    let samples: Vec<f32> = sound.pieces(Some(start)).flat_map(Result::unwrap).collect();
+    reading.join().unwrap();
+    let facts = sound.facts();
+    assert!(samples.iter().filter(|sample| **sample > 0.05).count() == 8000, "{facts:?}");
+    let skipped = facts.n_skipped_samples as f64 / 16_000.0;
+    assert!((0.4..0.7).contains(&skipped) && facts.lag_ms.unwrap().abs() < 150.0, "{facts:?}");
+    assert_eq!(facts.n_samples, 90_000 + facts.n_silent_samples - facts.n_skipped_samples, "{facts:?}");
+}
+
+/// A source whose reads return the chunks of a function.
+struct Chunks<'a> {
+    next: Box<dyn FnMut() -> Option<Vec<u8>> + 'a>,
+}
+
+impl Read for Chunks<'_> {
+    fn read(&mut self, buffer: &mut [u8]) -> std::io::Result<usize> {
+        let chunk = (self.next)().unwrap_or_default();
+        buffer[..chunk.len()].copy_from_slice(&chunk);
+        Ok(chunk.len())
+    }
+}
+
+#[test]
 fn a_closed_session_ends_its_reader() {
     let sound = LiveSound::default();
     let reader = sound.clone();
