@@ -24,7 +24,8 @@
 //! | `orator-report` | HTML pages |
 //! | `orator-web` | HTTP servers: connections, limits, security headers |
 //! | `orator-study` | user studies: films, server, statistics |
-//! | `orator-view` | the local page of `orator view` |
+//! | `orator-live` | gestures to speech in real time: clock, VMC, JSON lines |
+//! | `orator-view` | the local page of `orator view` and `orator live` |
 //! | `orator-cluster` | several machines that share one work folder |
 //! | `orator` | this library and the program |
 //! | `orator-test-support` | inputs with known truth for tests |

@@ -26,7 +26,8 @@ pub struct HumanoidBone {
     pub vrm: String,
     /// Name in Unity's `HumanBodyBones`, which VMC uses, such as `LeftUpperArm`.
     pub unity: String,
-    /// Position at rest, metres, relative to the parent, or to the floor for the hips; y up, facing +z, x to the left of the body.
+    /// Position at rest relative to the parent, or to the floor below the hips, metres; y up, facing +z, x to the left of
+    /// the body.
     pub offset: Vec3,
 }
 
@@ -75,7 +76,7 @@ impl<'a> LiveBody<'a> {
         Self { metadata, rig, bones, last: Array2::zeros((metadata.network.n_out, 0)), n_left: 0, bent: [None, None] }
     }
 
-    /// Pose for the network output [features, 1] with this weight; the rest of it is the mean pose of the speaker.
+    /// Pose for the network output [features, 1], blended with the speaker's mean pose: `weight` 1 is the output alone.
     pub fn pose(&mut self, features: &Array2<f32>, weight: f32) -> Result<HumanoidPose> {
         let column = features * weight;
         let first = self.last.ncols().saturating_sub(N_BEFORE);

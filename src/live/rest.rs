@@ -1,6 +1,7 @@
 //! Blend of the generated motion with the rest pose: in silence the speaker comes to rest, and begins to move when speech
 //! is ahead. During speech, and in pauses of less than a second, the motion is that of the network.
 
+use orator_avatar::animate::solve::track::smoothstep;
 use orator_base::types::sound::SAMPLE_RATE;
 use std::collections::VecDeque;
 
@@ -53,7 +54,6 @@ impl RestBlend {
         let is_speech = self.speech.front().is_some_and(|at| *at < secs + LEAD_SECS);
         let change = if is_speech { step / RISE_SECS } else { -step / FALL_SECS };
         self.weight = (self.weight + change).clamp(0.0, 1.0);
-        let share = self.weight as f32;
-        share * share * (3.0 - 2.0 * share)
+        smoothstep([0.0, 1.0], self.weight) as f32
     }
 }

@@ -55,8 +55,8 @@ pub struct SinkFacts {
     pub note: Option<String>,
 }
 
-/// Time from speech to the pose for it beyond the look-ahead: lateness of the sound; the next frame of the network, to which
-/// poses are interpolated; computation. 167 ms at 15 fps.
+/// Time from speech to its pose, without the look-ahead: the allowed lateness of the sound, the wait for the next frame of
+/// the network, between which and the last one poses are interpolated, and the computation. 167 ms at 15 fps.
 pub fn delay(fps: FrameRate) -> Duration {
     LATE_LIMIT + Duration::from_secs_f64(1.0 / fps.per_sec()) + COMPUTATION
 }

@@ -1,6 +1,6 @@
 //! Speech in real time: a thread reads it into a bounded queue, and the generator takes it in pieces of 20 ms. Sound that
-//! does not arrive in time is replaced by silence, so that the motion goes on, and follows the silence when it comes. If a
-//! source in real time stays behind for this reason, or because its clock is fast, quiet pieces are skipped.
+//! does not arrive in time is preceded by silence, so that the motion continues. If a source in real time stays behind
+//! for this reason, or because its clock is fast, quiet pieces are skipped.
 
 use anyhow::{Result, bail, ensure};
 use orator_base::types::sound::SAMPLE_RATE;

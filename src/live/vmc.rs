@@ -81,7 +81,7 @@ impl PoseSink for VmcSocket {
     fn send(&mut self, pose: &TimedPose) {
         let Ok(bytes) = bundle(&self.bones, pose) else { return self.n_dropped += 1 };
         let mut sent = self.socket.send(&bytes);
-        // This error is about an earlier bundle; the one at hand was not sent.
+        // The system reports the refusal of an earlier bundle and does not send this one.
         if sent.as_ref().is_err_and(|error| error.kind() == ErrorKind::ConnectionRefused) {
             self.n_refused += 1;
             sent = self.socket.send(&bytes);

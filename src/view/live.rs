@@ -10,7 +10,7 @@ use serde_json::{Value, json};
 use std::convert::Infallible;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 use tokio::sync::broadcast::error::RecvError;
 use tokio::sync::broadcast::{Receiver, Sender};
 
@@ -18,6 +18,9 @@ use tokio::sync::broadcast::{Receiver, Sender};
 const MAX_WAITING: usize = 30;
 /// Time after which a browser connects again.
 const RETRY: Duration = Duration::from_millis(200);
+
+/// Longest time in which the last poses are delivered.
+const MAX_END: Duration = Duration::from_secs(2);
 
 /// A session as the page shows it.
 #[derive(Clone)]
@@ -80,7 +83,11 @@ impl PoseSink for LiveFeed {
 
     fn finish(&mut self) {
         let _ = self.poses.send("".into());
-        // The server sends the last poses on its own threads.
+        // The server sends the last poses on its own threads; a browser that is stuck is not waited for.
+        let end = Instant::now() + MAX_END;
+        while !self.poses.is_empty() && Instant::now() < end {
+            std::thread::sleep(RETRY / 10);
+        }
         std::thread::sleep(RETRY);
     }
 

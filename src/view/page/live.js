@@ -3,8 +3,11 @@
 import { AvatarView } from "./avatar.js";
 import { announce, attempt, el, getBytes, labelled, row } from "./dom.js";
 
+// Time without a connection after which the session counts as ended.
+const MAX_LOST_MS = 3000;
+
 export class LiveView {
-  #latest = null; #isShown = false; #n = 0; #since = 0;
+  #latest = null; #isShown = false; #n = 0; #since = 0; #lost = null;
 
   constructor(panel, { live }) {
     this.live = live;
@@ -16,7 +19,8 @@ export class LiveView {
     this.poses = new EventSource("./live/poses");
     this.poses.addEventListener("message", (event) => (this.#latest = JSON.parse(event.data)));
     this.poses.addEventListener("end", () => this.#end());
-    this.poses.addEventListener("error", () => (this.rate.textContent = "Connecting …"));
+    this.poses.addEventListener("open", () => (this.#lost = null));
+    this.poses.addEventListener("error", () => this.#connectAgain());
   }
 
   async enter() {
@@ -34,6 +38,13 @@ export class LiveView {
     if (!file) return;
     await this.view.load(await file.arrayBuffer());
     announce(`${file.name} performs the speech.`);
+  }
+
+  // The browser tries again by itself; a program that does not answer for a while has ended.
+  #connectAgain() {
+    this.#lost ??= performance.now();
+    this.rate.textContent = "Connecting …";
+    if (performance.now() - this.#lost > MAX_LOST_MS) this.#end();
   }
 
   #end() {

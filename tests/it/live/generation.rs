@@ -43,10 +43,8 @@ fn frame_by_frame_equals_the_whole_sound_and_needs_no_later_sound() -> anyhow::R
         let off = difference(&live, &whole);
         assert!(off < 1e-4, "{secs} s: {off} m");
         // The network does react to the sound.
-        let other = generator.motion(&crate::generate::onnx_export::sound(24.0), &[])?;
         let silence = orator_base::types::sound::Sound { rate: 16_000, samples: vec![0.0; sound.samples.len()] };
         assert!(difference(&generator.motion(&silence, &[])?, &whole) > 1e-3);
-        assert_eq!(other.n_frames(), 360);
     }
     Ok(())
 }

@@ -103,8 +103,8 @@ impl<'d> WindowLoader<'d> {
         Ok(Self { fps, n_frames, n_features, normal, intervals, starts, words, sound_shift: 0 })
     }
 
-    /// Moves the sound of all windows for a network with this look-ahead. Sound beyond an interval is its mirror
-    /// image, in windows at most 0.2 s of it.
+    /// Moves the sound of all windows for a network with this look-ahead. Sound beyond an interval is mirrored;
+    /// windows that would need more than 0.2 s of mirrored sound are left out.
     pub fn with_look_ahead(mut self, look_ahead: Option<LookAhead>) -> Self {
         self.sound_shift = look_ahead.map_or(0, |of| of.shift);
         let n_beyond = (self.sound_shift - MAX_MIRRORED_MELS).max(0) as usize;
